@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+# Compiler settings shared by every target of the project, and the function that declares a room.
+
+add_library(dkb_compile_options INTERFACE)
+target_compile_features(dkb_compile_options INTERFACE cxx_std_20)
+# -ffp-contract=off: the same source gives the same bits whatever the compiler would like to fuse.
+target_compile_options(dkb_compile_options INTERFACE -ffp-contract=off)
+if(DKB_SANITIZE)
+  target_compile_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE} -fno-omit-frame-pointer -g1 -fno-sanitize-recover=all)
+  target_link_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE})
+endif()
+add_library(dkb_warnings INTERFACE)
+target_compile_options(dkb_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+  -Wno-restrict)  # GCC 12 warns falsely on string concatenation (GCC bug 105651)
+if(DKB_WERROR)
+  target_compile_options(dkb_warnings INTERFACE -Werror)
+endif()
+
+# dkb_room(NAME SOURCES a.cpp ... TESTS a_test.cpp ... DEPENDS lower rooms and libraries PRIVATE_DEPENDS ... TEST_DEPENDS ...)
+#
+# One folder, one static library dkb_NAME, one test program dkb_NAME_test. A room names only rooms below it.
+function(dkb_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;TESTS;DEPENDS;PRIVATE_DEPENDS;TEST_DEPENDS" ${ARGN})
+  if(ROOM_SOURCES)
+    add_library(dkb_${name} STATIC ${ROOM_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(dkb_${name} PRIVATE $<BUILD_INTERFACE:dkb_warnings> ${ROOM_PRIVATE_DEPENDS})
+    set_target_properties(dkb_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  else()
+    add_library(dkb_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_include_directories(dkb_${name} ${scope} $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(dkb_${name} ${scope} dkb_compile_options ${ROOM_DEPENDS})
+  set_target_properties(dkb_${name} PROPERTIES EXPORT_NAME ${name})
+  set_property(GLOBAL APPEND PROPERTY DKB_ROOMS dkb_${name})
+  if(BUILD_TESTING AND ROOM_TESTS)
+    add_executable(dkb_${name}_test ${ROOM_TESTS})
+    target_link_libraries(dkb_${name}_test PRIVATE dkb_${name} dkb_warnings ${ROOM_TEST_DEPENDS} GTest::gtest GTest::gtest_main)
+    gtest_discover_tests(dkb_${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS unit)
+  endif()
+endfunction()

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "dkb/image/image.h"
+
+namespace dkb {
+
+// One pair of a colour (or grey) and a depth image of the same size, registered to the colour camera.
+// Cheap to move, expensive to copy; passed as shared_ptr<const RgbdImage> between threads.
+struct RgbdImage {
+  double timestamp = 0;        // [s] of the colour image, middle of the exposure
+  double depth_timestamp = 0;  // [s] of the depth image
+  GreyImage grey;              // always there
+  ColourImage colour;          // empty for grey cameras
+  DepthImage depth;            // [m], 0 = no data; same size as grey
+};
+
+}  // namespace dkb

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace dkb {
+
+// Whole file as bytes. Throws InputError naming the file.
+std::string read_file(const std::filesystem::path& path);
+
+// Replaces `path` by `content` atomically: temporary file in the same folder, fsync, rename, fsync of the folder.
+// A reader sees the old file or the new one, never a part. Throws OutputError naming the file and the reason.
+void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+// Makes `path` (and its parents) and proves that files can be written there. Throws OutputError.
+void make_output_folder(const std::filesystem::path& path);
+
+}  // namespace dkb

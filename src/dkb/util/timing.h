@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dkb {
+
+// Steady-clock stopwatch in milliseconds. For reports only: no decision of a dataset run reads a clock.
+class Stopwatch {
+ public:
+  Stopwatch() : start_(std::chrono::steady_clock::now()) {}
+  double ms() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_;
+};
+
+struct StageSummary {
+  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;
+  size_t count = 0;
+};
+
+// Durations of named stages; one instance per thread, merged at the end.
+class StageTimes {
+ public:
+  void add(const std::string& stage, double ms) { samples_[stage].push_back(static_cast<float>(ms)); }
+  void merge(const StageTimes& other);
+  std::map<std::string, StageSummary> summaries() const;
+
+ private:
+  std::map<std::string, std::vector<float>> samples_;
+};
+
+}  // namespace dkb

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <thread>
+#include <vector>
+
+#include "dkb/util/bounded_queue.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/log.h"
+#include "dkb/util/random.h"
+#include "dkb/util/timing.h"
+
+namespace dkb {
+namespace {
+namespace fs = std::filesystem;
+
+TEST(Random, SameSeedGivesTheSameNumbers) {
+  Random a(7), b(7), c(8);
+  EXPECT_EQ(a.next(), b.next());
+  EXPECT_NE(a.next(), c.next());
+}
+
+TEST(Random, NormalHasUnitVariance) {
+  Random r(1);
+  double sum = 0, squares = 0;
+  const int n = 100000;
+  for (int i = 0; i < n; ++i) {
+    const double x = r.normal();
+    sum += x;
+    squares += x * x;
+  }
+  EXPECT_NEAR(sum / n, 0.0, 0.02);
+  EXPECT_NEAR(squares / n, 1.0, 0.02);
+}
+
+TEST(Random, BelowStaysInRangeAndReachesEveryValue) {
+  Random r(3);
+  std::vector<int> seen(7);
+  for (int i = 0; i < 1000; ++i) ++seen.at(r.below(7));
+  for (int count : seen) EXPECT_GT(count, 80);
+}
+
+TEST(BoundedQueue, KeepsOrderAcrossThreadsAndDrainsAfterClose) {
+  BoundedQueue<int> queue(3);
+  std::vector<int> got;
+  std::thread consumer([&] {
+    while (auto v = queue.pop()) got.push_back(*v);
+  });
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(queue.push(i));
+  queue.close();
+  consumer.join();
+  ASSERT_EQ(got.size(), 1000u);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(got[static_cast<size_t>(i)], i);
+  EXPECT_FALSE(queue.push(1));
+}
+
+TEST(BoundedQueue, DropsTheOldestWhenAskedNotToWait) {
+  BoundedQueue<int> queue(2);
+  EXPECT_EQ(queue.push_dropping_oldest(1), 0u);
+  EXPECT_EQ(queue.push_dropping_oldest(2), 0u);
+  EXPECT_EQ(queue.push_dropping_oldest(3), 1u);
+  EXPECT_EQ(queue.pop(), 2);
+  EXPECT_EQ(queue.pop(), 3);
+}
+
+TEST(Files, AtomicWriteReplacesTheWholeFile) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "dkb_files_test";
+  make_output_folder(folder);
+  write_file_atomically(folder / "a.txt", "first, and longer");
+  write_file_atomically(folder / "a.txt", "second");
+  EXPECT_EQ(read_file(folder / "a.txt"), "second");
+  size_t entries = 0;
+  for ([[maybe_unused]] const auto& e : fs::directory_iterator(folder)) ++entries;
+  EXPECT_EQ(entries, 1u) << "no temporary file is left behind";
+  fs::remove_all(folder);
+}
+
+TEST(Files, AnUnwritablePlaceIsNamed) {
+  try {
+    write_file_atomically("/proc/nowhere/a.txt", "x");
+    FAIL() << "must throw";
+  } catch (const OutputError& e) {
+    EXPECT_NE(std::string(e.what()).find("/proc/nowhere/a.txt"), std::string::npos);
+  }
+  EXPECT_THROW(make_output_folder("/proc/nowhere"), OutputError);
+  EXPECT_THROW(read_file("/nowhere/at/all"), InputError);
+}
+
+TEST(StageTimes, SummarisesWithPercentiles) {
+  StageTimes a, b;
+  for (int i = 1; i <= 50; ++i) a.add("x", i);
+  for (int i = 51; i <= 100; ++i) b.add("x", i);
+  a.merge(b);
+  const StageSummary s = a.summaries().at("x");
+  EXPECT_EQ(s.count, 100u);
+  EXPECT_DOUBLE_EQ(s.mean_ms, 50.5);
+  EXPECT_DOUBLE_EQ(s.max_ms, 100);
+  EXPECT_DOUBLE_EQ(s.p95_ms, 96);
+}
+
+TEST(WarningLog, MergesRepeatedWarnings) {
+  std::vector<std::string> lines;
+  WarningLog log([&](const std::string& l) { lines.push_back(l); });
+  log.warn("bad image", "frame 3 is bad");
+  log.warn("bad image", "frame 4 is bad");
+  log.warn("other", "once");
+  log.finish();
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0], "warning: frame 3 is bad");
+  EXPECT_EQ(lines[2], "warning: bad image: 2 times in all");
+}
+
+}  // namespace
+}  // namespace dkb
