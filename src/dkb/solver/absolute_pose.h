@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/rigid3.h"
+#include "dkb/solver/pose_optimiser.h"
+
+namespace dkb {
+
+struct RansacOptions {
+  int max_iterations = 300;   // samples drawn at most, >= 1
+  double confidence = 0.999;  // of having drawn one sample without outliers, (0, 1); ends early
+  double chi2 = 5.991;        // inlier limit of the squared error over sigma^2, > 0
+  int min_inliers = 10;       // fewer: not ok, >= 3
+  uint64_t seed = 1;
+
+  void check() const;  // throws InvalidOption
+};
+
+struct RansacPose {
+  bool ok = false;
+  Rigid3 pose;                  // cam_from_world or to_from_from; identity where not ok
+  std::vector<uint8_t> inlier;  // per correspondence
+  int inliers = 0;
+  int iterations = 0;
+};
+
+// Poses of a calibrated camera from three points (perspective-3-point, distances by Grunert's quartic): up to 4.
+// `rays` are unit vectors in the camera. Nothing for degenerate input (collinear points).
+std::vector<Rigid3> solve_p3p(const Eigen::Vector3d (&points_in_world)[3], const Eigen::Vector3d (&rays)[3]);
+
+// cam_from_world from 2D-3D matches with outliers (relocalisation): RANSAC over P3P, then optimise_pose on the inliers
+// of the best sample, whose inliers are those returned. Depths of the observations take part in that refinement and,
+// within 7.815, in the choice of inliers. Deterministic for a seed.
+RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const PoseObservation> observations,
+                                  const RansacOptions& options = {});
+
+// to_from_from with point_in_to = to_from_from * point_in_from from 3D-3D matches with outliers (loop verification with
+// depth): RANSAC over three pairs, refined on the inliers. `sigma` [m] per pair, of the distance along each axis;
+// options.chi2 applies to |error|^2 / sigma^2 (7.815 for 3 d.o.f. is apt). Deterministic for a seed.
+RansacPose estimate_rigid_motion(std::span<const Eigen::Vector3d> points_in_from,
+                                 std::span<const Eigen::Vector3d> points_in_to, std::span<const double> sigma,
+                                 const RansacOptions& options = {});
+
+}  // namespace dkb

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dkb/geometry/rigid3.h"
+
+namespace dkb {
+
+// Measured motion between two keyframes: cam_b_from_world * world_from_cam_a = b_from_a * T(d), with
+// d = [translation m, rotation rad] in the axes of a, of this information (inverse covariance).
+struct PoseGraphEdge {
+  int a = 0, b = 0;  // indices into PoseGraph::cam_from_world, a != b
+  Rigid3 b_from_a;
+  Matrix6d information = Matrix6d::Identity();
+  bool robust = false;  // Huber kernel on d^T information d (loop edges)
+};
+
+struct PoseGraph {
+  std::vector<Rigid3> cam_from_world;
+  std::vector<uint8_t> fixed;  // per keyframe; at least one of each connected part ought to be fixed
+  std::vector<PoseGraphEdge> edges;
+};
+
+struct PoseGraphOptions {
+  int iterations = 20;               // Levenberg-Marquardt steps, >= 1
+  double huber_chi2 = 16.81;         // corner of the kernel of robust edges (6 d.o.f., 99 %), > 0
+  double initial_damping = 1e-6;     // Marquardt's factor on the diagonal at the start, > 0
+  double relative_tolerance = 1e-6;  // a step that lowers the cost by less than this part is the last, >= 0
+
+  void check() const;  // throws InvalidOption
+};
+
+struct PoseGraphResult {
+  double initial_cost = 0, final_cost = 0;  // sum of rho(d^T information d)
+  int iterations = 0;
+};
+
+// Refines the free poses of `graph` in place (block-sparse Cholesky factorisation). Deterministic.
+// Throws InputError for indices or sizes that do not fit.
+PoseGraphResult optimise_pose_graph(PoseGraph& graph, const PoseGraphOptions& options = {});
+
+}  // namespace dkb

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/rigid3.h"
+
+namespace dkb {
+
+// One match of a known point with a feature of the image whose pose is sought.
+struct PoseObservation {
+  Eigen::Vector3d point_in_world;  // [m]
+  Eigen::Vector2d pixel;           // [px] ideal (undistorted)
+  double pixel_sigma = 1.0;        // [px] > 0, standard deviation of each coordinate
+  double depth = 0.0;              // [m] along the optical axis; 0 = none
+  double depth_sigma = 0.01;       // [m] > 0 where depth is given
+};
+
+struct PoseOptions {
+  int rounds = 4;                       // classifications of inliers, each followed by an optimisation, >= 1
+  int iterations = 10;                  // Levenberg-Marquardt steps of one round, >= 1
+  int robust_rounds = 2;                // first rounds that use the Huber kernel, >= 0
+  double chi2_pixel = 5.991;            // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
+  double chi2_depth = 7.815;            // the same with depth (3 d.o.f.), > 0
+  double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
+  double translation_tolerance = 1e-6;  // [m] a step below both tolerances ends a round, >= 0
+  double rotation_tolerance = 1e-6;     // [rad] >= 0
+  int min_inliers = 6;                  // fewer at the end: not ok, >= 3
+
+  void check() const;  // throws InvalidOption
+};
+
+// Gaussian knowledge of the pose from elsewhere (motion model): world_from_cam = prior.world_from_cam * T(d), with
+// d = [translation m, rotation rad] in camera axes, normal with zero mean and this information (inverse covariance).
+struct PosePrior {
+  Rigid3 cam_from_world;
+  Matrix6d information = Matrix6d::Zero();
+};
+
+struct PoseEstimate {
+  bool ok = false;        // enough inliers, a well-conditioned system, finite numbers
+  Rigid3 cam_from_world;  // the initial pose where not ok
+  // Of the right perturbation of world_from_cam, [translation m, rotation rad], camera axes, from the inliers (and the
+  // prior) with the sigmas as given. Zero where not ok.
+  Matrix6d covariance = Matrix6d::Zero();
+  std::vector<uint8_t> inlier;  // per observation
+  int inliers = 0;
+  double mean_chi2 = 0;  // of the inliers, e^T Sigma^-1 e
+  int iterations = 0;    // over all rounds
+};
+
+// Pose that minimises sum rho(e^T Sigma^-1 e), e = [reprojection px, depth m], by Levenberg-Marquardt on 6 numbers;
+// observations are classified anew after each round, all of them, so that an outlier may come back. Ends early when
+// a round changed no classification and took no step. Deterministic; never throws but for options out of range.
+PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_world_initial,
+                           std::span<const PoseObservation> observations, const PoseOptions& options = {},
+                           const PosePrior* prior = nullptr);
+
+}  // namespace dkb
