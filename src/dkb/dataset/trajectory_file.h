@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dkb/geometry/rigid3.h"
+
+namespace dkb {
+
+struct StampedPose {
+  double timestamp = 0;   // [s]
+  std::string stamp;      // as read, or as it shall be written; empty: written from `timestamp` with 6 decimals
+  Rigid3 world_from_cam;  // [m], unit quaternion
+};
+using Trajectory = std::vector<StampedPose>;  // stamps not falling
+
+// TUM format, `stamp tx ty tz qx qy qz qw` (camera in world). Comments, blank lines and CRLF are fine; rows are sorted
+// by stamp, equal stamps stay in the file's order; quaternions are normalised; further columns are ignored. Throws
+// InputError with file:line for malformed rows, values that are not finite and quaternions of length 0. An empty file
+// gives an empty trajectory.
+Trajectory read_trajectory(const std::filesystem::path& path);
+Trajectory parse_trajectory(const std::string& text, const std::string& name);
+
+// TUM format with `#` header, 9 decimals, w of the quaternion not negative. Rows in the order given.
+std::string trajectory_to_text(const Trajectory& trajectory);
+// Written atomically. Throws OutputError.
+void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory);
+
+}  // namespace dkb

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dkb {
+
+// One colour image and the depth image that goes with it.
+struct DatasetPair {
+  double timestamp = 0;               // [s] of the colour image
+  double depth_timestamp = 0;         // [s] of the depth image
+  std::string stamp;                  // the colour image's, as written in the list
+  std::string depth_stamp;            // the depth image's
+  std::filesystem::path colour_path;  // list's folder / name in the list
+  std::filesystem::path depth_path;
+};
+
+struct AssociationOptions {
+  double max_difference = 0.02;  // [s] between the stamps of a pair, > 0
+  void check() const;            // throws InvalidOption
+};
+
+struct TumDataset {
+  std::filesystem::path folder;
+  std::string list;                // "associations.txt" or "rgb.txt and depth.txt"
+  std::vector<DatasetPair> pairs;  // colour stamps strictly rising, at least one
+};
+
+// Reads the lists of a folder in TUM layout (no image is opened): the rows of associations.txt as they are
+// (`rgb_stamp rgb_path depth_stamp depth_path`) when it is there, else rgb.txt and depth.txt (`stamp path`), paired one
+// to one, nearest stamps first. Comments, blank lines and CRLF are fine. Throws InputError with file:line: folder or
+// lists missing or empty; a row malformed, with too few columns, with a stamp that is not finite, repeated or out of
+// order; nothing pairs. In associations.txt depth stamps may repeat.
+TumDataset open_tum_dataset(const std::filesystem::path& folder, const AssociationOptions& options = {});
+
+// The rows of one list, parsed from text; `name` opens the messages.
+struct ListRow {
+  double timestamp = 0;
+  std::string stamp;
+  std::string path;
+};
+std::vector<ListRow> parse_image_list(const std::string& text, const std::string& name);
+std::vector<DatasetPair> parse_associations(const std::string& text, const std::string& name,
+                                            const std::filesystem::path& folder);
+
+// Index pairs (i of a, j of b), rising in i: each used once, nearest stamps first (ties: earlier i, then earlier j).
+std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
+                                                 const AssociationOptions& options);
+
+// What --start, --end and --max-frames choose.
+struct DatasetSelection {
+  double start = 0;                                      // [s] after the first pair's colour stamp, inclusive, >= 0
+  double end = std::numeric_limits<double>::infinity();  // [s] likewise, inclusive, >= start
+  std::optional<int64_t> max_frames;                     // pairs counted from start, >= 1
+  void check() const;                                    // throws InvalidOption
+};
+// Throws InputError when nothing is left.
+void select_pairs(const DatasetSelection& selection, TumDataset* dataset);
+
+}  // namespace dkb

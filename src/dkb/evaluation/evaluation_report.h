@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "dkb/evaluation/trajectory_error.h"
+
+namespace dkb {
+
+// The evaluation as a table for people (a few lines, one of which begins with APE).
+std::string evaluation_table(const Evaluation& evaluation);
+
+// The evaluation as JSON: matched, estimated, scale, ape.translation_m.{rmse, mean, median, std, min, max},
+// ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs. Numbers of an empty
+// set are null.
+std::string evaluation_json(const Evaluation& evaluation);
+
+struct PlotNames {
+  std::string title = "Trajectory error";
+  std::string truth = "ground truth";
+  std::string estimate = "estimate";
+};
+// Both paths in their two widest projections, and the APE over time, as one SVG picture without outside references.
+std::string evaluation_svg(const Evaluation& evaluation, const PlotNames& names = {});
+
+}  // namespace dkb
