@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/image_pyramid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/util/errors.h"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace dkb {
+namespace {
+
+constexpr int kRowOne = 128;      // weight of one row: 255 * 128 fits a signed 16-bit number
+constexpr int kColumnOne = 2048;  // weight of one column
+constexpr int kShift = 18;        // log2(kRowOne * kColumnOne)
+constexpr int kRound = 1 << (kShift - 1);
+constexpr int kPadding = 32;  // entries that vector loads may read past the end of a row buffer
+
+// One output row between the vertical blend and the end: scalar columns from `first` on.
+template <class Taps>
+void interpolate_columns(const Taps& columns, size_t first, const int16_t* blended, uint8_t* out) {
+  for (size_t x = first; x < columns.size(); ++x) {
+    const int32_t w = columns[x].weight;
+    const int16_t* v = blended + columns[x].index;
+    out[x] = static_cast<uint8_t>((v[0] * (kColumnOne - w) + v[1] * w + kRound) >> kShift);
+  }
+}
+
+}  // namespace
+
+void ImagePyramidOptions::check() const {
+  require_option(levels >= 1 && levels <= 16, "levels", levels, "in 1 ... 16");
+  require_option(scale > 1.0 && scale <= 4.0, "scale", scale, "in (1, 4]");
+  require_option(min_size >= 1, "min_size", min_size, ">= 1");
+}
+
+ImagePyramid::ImagePyramid(ImagePyramidOptions options, Simd simd) : options_(options), simd_(simd) {
+  options_.check();
+}
+
+std::vector<ImagePyramid::Tap> ImagePyramid::make_taps(int source, int target, int one) {
+  std::vector<Tap> taps(static_cast<size_t>(target));
+  const double ratio = static_cast<double>(source) / target;
+  for (int i = 0; i < target; ++i) {
+    const double position = std::clamp((i + 0.5) * ratio - 0.5, 0.0, source - 1.0);
+    const int index = std::clamp(static_cast<int>(position), 0, std::max(0, source - 2));
+    const int weight = source == 1 ? 0 : static_cast<int>(std::lround((position - index) * one));
+    taps[static_cast<size_t>(i)] = {index, weight};
+  }
+  return taps;
+}
+
+ImagePyramid::Resampling ImagePyramid::make_resampling(int width, int height, int next_width, int next_height) {
+  Resampling plan;
+  plan.rows = make_taps(height, next_height, kRowOne);
+  plan.columns = make_taps(width, next_width, kColumnOne);
+  plan.vectorised = true;
+  for (size_t x = 0; x + 8 <= plan.columns.size(); x += 4) {
+    const int start = plan.columns[x].index;
+    plan.group_start.push_back(start);
+    for (size_t i = 0; i < 4; ++i) {
+      const Tap& tap = plan.columns[x + i];
+      const int byte = 2 * (tap.index - start);
+      if (byte > 12) plan.vectorised = false;  // two 16-bit pixels must lie within the 16 bytes loaded
+      for (int k = 0; k < 4; ++k) plan.shuffles.push_back(static_cast<uint8_t>(byte + k));
+      plan.weights.push_back(static_cast<int16_t>(kColumnOne - tap.weight));
+      plan.weights.push_back(static_cast<int16_t>(tap.weight));
+    }
+  }
+  return plan;
+}
+
+void ImagePyramid::plan(int width, int height) {
+  images_.assign(1, GreyImage(width, height));
+  resamplings_.clear();
+  scales_.assign(1, Scale{});
+  for (int i = 1; i < options_.levels; ++i) {
+    const double factor = std::pow(options_.scale, i);
+    const int w = static_cast<int>(std::lround(width / factor)), h = static_cast<int>(std::lround(height / factor));
+    if (std::min(w, h) < options_.min_size) break;
+    resamplings_.push_back(make_resampling(images_.back().width(), images_.back().height(), w, h));
+    images_.emplace_back(w, h);
+    scales_.push_back({static_cast<double>(width) / w, static_cast<double>(height) / h});
+  }
+  levels_ = static_cast<int>(images_.size());
+  row_buffer_.assign(static_cast<size_t>(width + kPadding), 0);
+}
+
+void ImagePyramid::build(const GreyImage& image) {
+  if (image.empty()) throw InputError("image pyramid: the image is empty; give one with at least one pixel");
+  if (levels_ == 0 || images_[0].width() != image.width() || images_[0].height() != image.height())
+    plan(image.width(), image.height());
+  std::copy(image.data(), image.data() + image.size(), images_[0].data());
+  for (size_t i = 0; i < resamplings_.size(); ++i) {
+    const Resampling& resampling = resamplings_[i];
+#if defined(__x86_64__)
+    if (simd_ == Simd::avx2 && resampling.vectorised) {
+      resample_avx2(resampling, images_[i], row_buffer_.data(), images_[i + 1]);
+      continue;
+    }
+#endif
+    resample_scalar(resampling, images_[i], row_buffer_.data(), images_[i + 1]);
+  }
+}
+
+void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
+                                   GreyImage& target) {
+  for (int y = 0; y < target.height(); ++y) {
+    const Tap row = plan.rows[static_cast<size_t>(y)];
+    const uint8_t* a = source.row(row.index);
+    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
+    for (int x = 0; x < source.width(); ++x)
+      row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+    interpolate_columns(plan.columns, 0, row_buffer, target.row(y));
+  }
+}
+
+#if defined(__x86_64__)
+DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
+                                                 GreyImage& target) {
+  const int width = source.width();
+  const size_t groups = plan.group_start.size() & ~size_t{1};  // two groups of four pixels a step
+  for (int y = 0; y < target.height(); ++y) {
+    const Tap row = plan.rows[static_cast<size_t>(y)];
+    const uint8_t* a = source.row(row.index);
+    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
+    const __m256i wa = _mm256_set1_epi16(static_cast<int16_t>(kRowOne - row.weight));
+    const __m256i wb = _mm256_set1_epi16(static_cast<int16_t>(row.weight));
+    int x = 0;
+    for (; x + 16 <= width; x += 16) {
+      const __m256i va = _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + x)));
+      const __m256i vb = _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(b + x)));
+      const __m256i blend = _mm256_add_epi16(_mm256_mullo_epi16(va, wa), _mm256_mullo_epi16(vb, wb));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(row_buffer + x), blend);
+    }
+    for (; x < width; ++x) row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+
+    uint8_t* out = target.row(y);
+    const __m256i round = _mm256_set1_epi32(kRound);
+    for (size_t g = 0; g < groups; g += 2) {
+      const __m128i low = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row_buffer + plan.group_start[g]));
+      const __m128i high = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row_buffer + plan.group_start[g + 1]));
+      const __m256i shuffle = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(plan.shuffles.data() + 16 * g));
+      const __m256i weights = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(plan.weights.data() + 8 * g));
+      const __m256i pairs = _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1), shuffle);
+      const __m256i sums = _mm256_srai_epi32(_mm256_add_epi32(_mm256_madd_epi16(pairs, weights), round), kShift);
+      const __m256i words = _mm256_packus_epi32(sums, sums);
+      const __m256i bytes = _mm256_packus_epi16(words, words);
+      const uint32_t left = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_castsi256_si128(bytes)));
+      const uint32_t right = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_extracti128_si256(bytes, 1)));
+      const uint64_t both = left | (static_cast<uint64_t>(right) << 32);
+      __builtin_memcpy(out + 4 * g, &both, 8);
+    }
+    interpolate_columns(plan.columns, 4 * groups, row_buffer, out);
+  }
+}
+#endif
+
+}  // namespace dkb

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/rgbd_features.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr int kNodeSpacing = 8;  // [px]
+
+// Depth at a pixel: the median of the valid 3 x 3 neighbours around a valid centre; 0 where the surface is torn.
+float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
+  const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
+  if (cx < 1 || cy < 1 || cx >= depth.width() - 1 || cy >= depth.height() - 1) return 0;
+  const float centre = depth(cx, cy);
+  if (!(centre > 0)) return 0;
+  float values[9];
+  int n = 0;
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const float d = depth(cx + dx, cy + dy);
+      if (d > 0) values[n++] = d;
+    }
+  std::sort(values, values + n);
+  if (values[n - 1] - values[0] > edge_fraction * centre) return 0;
+  return n % 2 == 1 ? values[n / 2] : 0.5f * (values[n / 2 - 1] + values[n / 2]);
+}
+
+}  // namespace
+
+void DepthOptions::check() const { require_option(edge_fraction > 0, "edge_fraction", edge_fraction, "greater than 0"); }
+
+UndistortionTable::UndistortionTable(const CameraModel& camera) {
+  if (!camera.distorted()) return;
+  identity_ = false;
+  columns_ = (camera.width - 1) / kNodeSpacing + 2;
+  rows_ = (camera.height - 1) / kNodeSpacing + 2;
+  offset_.reserve(static_cast<size_t>(columns_ * rows_));
+  for (int r = 0; r < rows_; ++r)
+    for (int c = 0; c < columns_; ++c) {
+      const Eigen::Vector2d pixel(c * kNodeSpacing, r * kNodeSpacing);
+      offset_.push_back((camera.undistort(pixel) - pixel).cast<float>());
+    }
+}
+
+Eigen::Vector2f UndistortionTable::operator()(float x, float y) const {
+  if (identity_) return {x, y};
+  const float gx = std::clamp(x / kNodeSpacing, 0.0f, static_cast<float>(columns_ - 1) - 1e-3f);
+  const float gy = std::clamp(y / kNodeSpacing, 0.0f, static_cast<float>(rows_ - 1) - 1e-3f);
+  const int c = static_cast<int>(gx), r = static_cast<int>(gy);
+  const float fx = gx - static_cast<float>(c), fy = gy - static_cast<float>(r);
+  const Eigen::Vector2f* node = &offset_[static_cast<size_t>(r * columns_ + c)];
+  return Eigen::Vector2f(x, y) + (1 - fy) * ((1 - fx) * node[0] + fx * node[1]) +
+         fy * ((1 - fx) * node[columns_] + fx * node[columns_ + 1]);
+}
+
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
+                                const UndistortionTable& undistort, const Rigid3& colour_cam_from_depth_cam,
+                                const DepthOptions& options) {
+  RgbdFeatures result;
+  result.descriptors = orb.descriptors;
+  result.keypoints.resize(orb.corners.size());
+  const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
+  const Eigen::Matrix3d back = rotation.transpose();
+  const bool moved = options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
+                                                   vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
+  std::vector<float> xs(orb.corners.size()), ys(orb.corners.size());
+  for (size_t i = 0; i < orb.corners.size(); ++i) {
+    const Corner& c = orb.corners[i];
+    Keypoint& k = result.keypoints[i];
+    k.image_pixel = {c.x, c.y};
+    k.pixel = undistort(c.x, c.y);
+    k.angle = c.angle;
+    k.response = c.response;
+    k.octave = c.octave;
+    xs[i] = k.pixel.x();
+    ys[i] = k.pixel.y();
+    float z = depth_at(image.depth, c.x, c.y, options.edge_fraction);
+    if (moved && z > 0) {
+      // Where was this surface point when the depth image was taken? Ask there, and carry the answer over.
+      const Eigen::Vector3d now = camera.unproject(k.pixel.cast<double>(), z);
+      const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
+      if (then.z() > 0.05) {
+        const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
+        const float z_then = depth_at(image.depth, c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y()),
+                                      options.edge_fraction);
+        z = z_then > 0 ? static_cast<float>((rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
+                       : 0.0f;
+      }
+    }
+    k.depth = z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max) ? z : 0.0f;
+    const int ix = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.grey.width() - 1);
+    const int iy = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.grey.height() - 1);
+    if (!image.colour.empty()) {
+      k.colour = image.colour(ix, iy);
+    } else {
+      const uint8_t g = image.grey(ix, iy);
+      k.colour = {g, g, g};
+    }
+  }
+  result.grid = KeypointGrid(xs, ys, camera.width, camera.height);
+  return result;
+}
+
+}  // namespace dkb

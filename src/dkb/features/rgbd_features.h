@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "dkb/features/features.h"
+#include "dkb/features/keypoint_grid.h"
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/rigid3.h"
+#include "dkb/image/rgbd_image.h"
+
+namespace dkb {
+
+struct Keypoint {
+  Eigen::Vector2f pixel;        // [px] ideal (undistorted)
+  Eigen::Vector2f image_pixel;  // [px] where it lies in the image as read
+  float depth = 0;              // [m] along the optical axis at the colour image's time, 0 = unknown
+  float angle = 0;              // [rad]
+  float response = 0;
+  uint8_t octave = 0;
+  Rgb colour;
+};
+
+// All that is kept of an image: corners with depth and descriptors. Immutable once made, shared between threads.
+struct RgbdFeatures {
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;  // same length
+  KeypointGrid grid;                    // over the ideal pixels
+  size_t size() const { return keypoints.size(); }
+};
+
+struct DepthOptions {
+  float edge_fraction = 0.05f;   // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
+  bool model_time_offset = true;  // move depths to the colour image's time with the camera's motion
+  void check() const;
+};
+
+// Ideal-pixel lookup for every image pixel of a distorted camera, tabulated once (bilinear between nodes 8 px apart).
+class UndistortionTable {
+ public:
+  explicit UndistortionTable(const CameraModel& camera);
+  Eigen::Vector2f operator()(float x, float y) const;
+
+ private:
+  int columns_ = 0, rows_ = 0;
+  bool identity_ = true;
+  std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
+};
+
+// Joins corners with the depth image. `cam_motion` is the motion of the camera from the depth image's time to the colour
+// image's, as colour_cam_from_depth_cam (identity when unknown): hand-held Kinects move millimetres between the two stamps.
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
+                                const UndistortionTable& undistort, const Rigid3& colour_cam_from_depth_cam,
+                                const DepthOptions& options);
+
+}  // namespace dkb
