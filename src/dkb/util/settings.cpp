@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/util/settings.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+
+constexpr size_t kMaxYamlBytes = size_t{1} << 20;  // a settings file is a page, not a data set
+constexpr int kMaxYamlDepth = 32;
+
+size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<size_t> row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row[b.size()];
+}
+
+// The shortest text that reads back as the same number.
+template <class T>
+std::string number_to_text(T value) {
+  char buffer[64];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return std::string(buffer, end);
+}
+
+std::string yaml_quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto u = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (u < 0x20 || u == 0x7F) {
+      const char* digits = "0123456789ABCDEF";
+      out += "\\x";
+      out += digits[u >> 4];
+      out += digits[u & 15];
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+// Keeps a message one line long, whatever it quotes.
+std::string one_line(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  if (text.size() > 120) text = text.substr(0, 117) + "...";
+  return text;
+}
+
+std::string place(const std::string& file, const YAML::Mark& mark) {
+  return mark.is_null() ? file : file + ":" + std::to_string(mark.line + 1);
+}
+
+}  // namespace
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
+  std::string best;
+  size_t best_distance = std::numeric_limits<size_t>::max();
+  if (name.size() > 200) return best;
+  for (const std::string& candidate : candidates) {
+    const size_t distance = edit_distance(name, candidate);
+    const size_t longer = std::max(name.size(), candidate.size());
+    const size_t shorter = std::min(name.size(), candidate.size());
+    const bool plausible = distance <= std::max<size_t>(2, longer / 3) && distance < shorter;
+    if (plausible && distance < best_distance) best = candidate, best_distance = distance;
+  }
+  return best;
+}
+
+std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
+  const std::string nearest = nearest_name(name, candidates);
+  return nearest.empty() ? "" : " (did you mean \"" + nearest + "\"?)";
+}
+
+bool parse_number(std::string_view text, int64_t* value) {
+  int64_t parsed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
+  *value = parsed;
+  return true;
+}
+
+bool parse_number(std::string_view text, double* value) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  double parsed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
+  *value = parsed;
+  return true;
+}
+
+void Settings::add(const std::string& key, Binding binding) {
+  if (key.empty()) throw std::logic_error("a setting needs a key");
+  for (const auto& [other, unused] : bindings_) {
+    const auto is_section = [](const std::string& section, const std::string& of) {
+      return of.size() > section.size() && of.compare(0, section.size(), section) == 0 && of[section.size()] == '.';
+    };
+    if (other == key || is_section(other, key) || is_section(key, other))
+      throw std::logic_error("setting " + key + " clashes with " + other);
+  }
+  bindings_.emplace(key, std::move(binding));
+}
+
+void Settings::bind(const std::string& key, bool* field, const std::string& doc) {
+  add(key, {doc, "", "true or false",
+            [field](const std::string& text) {
+              if (text != "true" && text != "false") return false;
+              *field = text == "true";
+              return true;
+            },
+            [field] { return std::string(*field ? "true" : "false"); }});
+}
+
+namespace {
+
+template <class Integer>
+bool read_integer(const std::string& text, Integer* field) {
+  Integer parsed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
+  *field = parsed;
+  return true;
+}
+
+template <class Real>
+bool read_real(const std::string& text, Real* field) {
+  double parsed = 0;
+  if (!parse_number(text, &parsed) || !std::isfinite(parsed) || !std::isfinite(static_cast<Real>(parsed))) return false;
+  *field = static_cast<Real>(parsed);
+  return true;
+}
+
+}  // namespace
+
+void Settings::bind(const std::string& key, int* field, const std::string& doc) {
+  add(key, {doc, "", "a whole number", [field](const std::string& text) { return read_integer(text, field); },
+            [field] { return number_to_text(*field); }});
+}
+
+void Settings::bind(const std::string& key, int64_t* field, const std::string& doc) {
+  add(key, {doc, "", "a whole number", [field](const std::string& text) { return read_integer(text, field); },
+            [field] { return number_to_text(*field); }});
+}
+
+void Settings::bind(const std::string& key, uint64_t* field, const std::string& doc) {
+  add(key,
+      {doc, "", "a whole number, not negative", [field](const std::string& text) { return read_integer(text, field); },
+       [field] { return number_to_text(*field); }});
+}
+
+void Settings::bind(const std::string& key, float* field, const std::string& doc) {
+  add(key, {doc, "", "a number", [field](const std::string& text) { return read_real(text, field); },
+            [field] { return number_to_text(*field); }});
+}
+
+void Settings::bind(const std::string& key, double* field, const std::string& doc) {
+  add(key, {doc, "", "a number", [field](const std::string& text) { return read_real(text, field); },
+            [field] { return number_to_text(*field); }});
+}
+
+void Settings::bind(const std::string& key, std::string* field, const std::string& doc) {
+  add(key, {doc, "", "a text",
+            [field](const std::string& text) {
+              *field = text;
+              return true;
+            },
+            [field] { return yaml_quoted(*field); }});
+}
+
+void Settings::set(const std::string& key, const std::string& value, const std::string& where) {
+  const auto it = bindings_.find(key);
+  if (it == bindings_.end())
+    throw InputError(where + ": unknown key \"" + one_line(key) + "\"" + did_you_mean(key, keys()));
+  if (!it->second.read(value))
+    throw InputError(where + ": " + key + ": \"" + one_line(value) + "\" is not " + it->second.expected);
+  it->second.where = where;
+}
+
+void Settings::set_assignment(const std::string& assignment, const std::string& where) {
+  const size_t equals = assignment.find('=');
+  if (equals == std::string::npos)
+    throw InputError(where + ": \"" + one_line(assignment) + "\" has no value; write key=value");
+  set(assignment.substr(0, equals), assignment.substr(equals + 1), where);
+}
+
+void Settings::load_yaml(const std::filesystem::path& path) {
+  load_yaml_text(read_file(path), path.string());
+}
+
+void Settings::load_yaml_text(const std::string& text, const std::string& name) {
+  if (text.size() > kMaxYamlBytes) throw InputError(name + ": is too large for a settings file");
+  if (text.find('\0') != std::string::npos) throw InputError(name + ": is not a text file");
+  YAML::Node root;
+  try {
+    root = YAML::Load(text);
+  } catch (const YAML::Exception& e) {
+    throw InputError(place(name, e.mark) + ": is not valid YAML (" + one_line(e.msg) + ")");
+  }
+
+  // Every node that is entered has a key of its own that is a known one or a known section, so that aliases cannot make
+  // the walk long.
+  const std::vector<std::string> known = keys();
+  std::set<std::string> seen;
+  const std::function<void(const YAML::Node&, const std::string&, int)> walk =
+      [&](const YAML::Node& node, const std::string& prefix, int depth) {
+        const std::string section = prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1);
+        if (node.IsNull()) return;  // a section with all its lines commented out
+        if (!node.IsMap() || depth > kMaxYamlDepth)
+          throw InputError(place(name, node.Mark()) + ": " + (section.empty() ? "" : section + ": ") +
+                           "expected lines of the form `key: value`");
+        for (const auto& item : node) {
+          const YAML::Node &first = item.first, &second = item.second;
+          const std::string where = place(name, first.Mark());
+          if (!first.IsScalar()) throw InputError(where + ": a key must be a word");
+          const std::string key = prefix + first.Scalar();
+          if (!seen.insert(key).second) throw InputError(where + ": key \"" + one_line(key) + "\" is given twice");
+          const auto at = std::lower_bound(known.begin(), known.end(), key + ".");
+          const bool is_section = at != known.end() && at->compare(0, key.size() + 1, key + ".") == 0;
+          if (is_section) {
+            walk(second, key + ".", depth + 1);
+          } else if (bindings_.count(key) != 0 && !second.IsScalar()) {
+            throw InputError(where + ": " + key + ": has no value; it must be " + bindings_.at(key).expected);
+          } else {
+            set(key, second.IsScalar() ? second.Scalar() : "", where);
+          }
+        }
+      };
+  try {
+    walk(root, "", 0);
+  } catch (const YAML::Exception& e) {
+    throw InputError(place(name, e.mark) + ": is not valid YAML (" + one_line(e.msg) + ")");
+  }
+}
+
+std::string Settings::to_yaml() const {
+  std::string out;
+  std::vector<std::string> open;  // sections of the line before
+  for (const auto& [key, binding] : bindings_) {
+    std::vector<std::string> parts;
+    for (size_t start = 0;;) {
+      const size_t dot = key.find('.', start);
+      parts.push_back(key.substr(start, dot == std::string::npos ? dot : dot - start));
+      if (dot == std::string::npos) break;
+      start = dot + 1;
+    }
+    const std::string leaf = parts.back();
+    parts.pop_back();
+    size_t common = 0;
+    while (common < open.size() && common < parts.size() && open[common] == parts[common]) ++common;
+    for (size_t i = common; i < parts.size(); ++i) out += std::string(2 * i, ' ') + parts[i] + ":\n";
+    open = parts;
+    out += std::string(2 * parts.size(), ' ') + leaf + ": " + binding.write();
+    if (!binding.doc.empty()) out += "  # " + binding.doc;
+    out += "\n";
+  }
+  return out;
+}
+
+std::vector<SettingEntry> Settings::entries() const {
+  std::vector<SettingEntry> result;
+  for (const auto& [key, binding] : bindings_) result.push_back({key, binding.write(), binding.doc, binding.where});
+  return result;
+}
+
+std::vector<std::string> Settings::keys() const {
+  std::vector<std::string> result;
+  for (const auto& [key, unused] : bindings_) result.push_back(key);
+  return result;
+}
+
+std::string Settings::where(const std::string& key) const {
+  const auto it = bindings_.find(key);
+  if (it == bindings_.end()) throw std::logic_error("no setting " + key);
+  return it->second.where;
+}
+
+}  // namespace dkb
