@@ -1,0 +1,66 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs what the build, the tests and the benchmarks need from the distribution's packages (Debian 12, Ubuntu 22.04
+# and newer). Does nothing, without touching the network, when all of it is there.
+#
+#   scripts/deps.sh          what `make demo`, `make test` and `make bench` need
+#   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
+#
+# DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
+set -euo pipefail
+
+packages=(
+  g++ cmake make ninja-build ccache
+  libeigen3-dev libpng-dev libjpeg-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libnanoflann-dev
+  # Tests and benchmarks only: the frameworks, and the references that fast code is compared with.
+  libgtest-dev libbenchmark-dev libceres-dev
+  libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
+  libopencv-dnn-dev
+)
+case "${1:-}" in
+  "") ;;
+  lint) packages+=(clang-format clang-tidy cppcheck git) ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [lint]" >&2; exit 2 ;;
+esac
+
+if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then
+  echo "deps: not checked (DKB_SKIP_DEPS=1)"
+  exit 0
+fi
+
+if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+  {
+    echo "error: this system has no apt-get, so the packages cannot be installed from here."
+    echo "Install what corresponds to these Debian packages, then set DKB_SKIP_DEPS=1 and run the command again:"
+    printf '  %s\n' "${packages[@]}"
+  } >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f='${db:Status-Status} ' "$package" 2>/dev/null || true)
+  [[ " $status" == *" installed "* ]] || missing+=("$package")
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  echo "deps: all packages are installed"
+  exit 0
+fi
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  if ! command -v sudo >/dev/null; then
+    {
+      echo "error: packages are missing, and installing them needs root or sudo. As root, run:"
+      echo "  apt-get install --no-install-recommends ${missing[*]}"
+    } >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+echo "deps: installing ${missing[*]}"
+apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
+"${apt[@]}" update -qq
+"${apt[@]}" install -y -qq --no-install-recommends "${missing[@]}" </dev/null
+echo "deps: done"
