@@ -31,7 +31,9 @@ float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
 
 }  // namespace
 
-void DepthOptions::check() const { require_option(edge_fraction > 0, "edge_fraction", edge_fraction, "greater than 0"); }
+void DepthOptions::check() const {
+  require_option(edge_fraction > 0, "edge_fraction", edge_fraction, "greater than 0");
+}
 
 UndistortionTable::UndistortionTable(const CameraModel& camera) {
   if (!camera.distorted()) return;
@@ -65,8 +67,9 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
   result.keypoints.resize(orb.corners.size());
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
   const Eigen::Matrix3d back = rotation.transpose();
-  const bool moved = options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
-                                                   vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
+  const bool moved =
+      options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
+                                    vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
   std::vector<float> xs(orb.corners.size()), ys(orb.corners.size());
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     const Corner& c = orb.corners[i];
@@ -85,9 +88,10 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
       const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
       if (then.z() > 0.05) {
         const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
-        const float z_then = depth_at(image.depth, c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y()),
-                                      options.edge_fraction);
-        z = z_then > 0 ? static_cast<float>((rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
+        const float z_then = depth_at(image.depth, c.x + static_cast<float>(shift.x()),
+                                      c.y + static_cast<float>(shift.y()), options.edge_fraction);
+        z = z_then > 0 ? static_cast<float>(
+                             (rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
                        : 0.0f;
       }
     }

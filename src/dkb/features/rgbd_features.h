@@ -31,7 +31,8 @@ struct RgbdFeatures {
 };
 
 struct DepthOptions {
-  float edge_fraction = 0.05f;   // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
+  float edge_fraction =
+      0.05f;  // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
   bool model_time_offset = true;  // move depths to the colour image's time with the camera's motion
   void check() const;
 };
@@ -48,8 +49,9 @@ class UndistortionTable {
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
 };
 
-// Joins corners with the depth image. `cam_motion` is the motion of the camera from the depth image's time to the colour
-// image's, as colour_cam_from_depth_cam (identity when unknown): hand-held Kinects move millimetres between the two stamps.
+// Joins corners with the depth image. `cam_motion` is the motion of the camera from the depth image's time to the
+// colour image's, as colour_cam_from_depth_cam (identity when unknown): hand-held Kinects move millimetres between the
+// two stamps.
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                                 const UndistortionTable& undistort, const Rigid3& colour_cam_from_depth_cam,
                                 const DepthOptions& options);

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/corner_spread.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace dkb {
+
+void CornerSpread::sort_into_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners) {
+  const size_t cells = static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows);
+  starts_.assign(cells + 1, 0);
+  cell_of_.resize(corners.size());
+  order_.resize(corners.size());
+  // Cell of a pixel = (pixel - left) * columns / width, by a 16-bit reciprocal that is exact enough to be monotonous.
+  const uint64_t step_x = (static_cast<uint64_t>(grid.columns) << 32) / static_cast<uint64_t>(region.width());
+  const uint64_t step_y = (static_cast<uint64_t>(grid.rows) << 32) / static_cast<uint64_t>(region.height());
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const uint64_t column = (static_cast<uint64_t>(corners[i].x - region.left) * step_x) >> 32;
+    const uint64_t row = (static_cast<uint64_t>(corners[i].y - region.top) * step_y) >> 32;
+    cell_of_[i] = static_cast<uint32_t>(row * static_cast<uint64_t>(grid.columns) + column);
+    ++starts_[cell_of_[i] + 1];
+  }
+  for (size_t c = 0; c < cells; ++c) starts_[c + 1] += starts_[c];
+  // Fill each cell from its start; the starts move up by one cell and are moved back at the end.
+  for (size_t i = 0; i < corners.size(); ++i) order_[starts_[cell_of_[i]]++] = static_cast<uint32_t>(i);
+  for (size_t c = cells; c > 0; --c) starts_[c] = starts_[c - 1];
+  starts_[0] = 0;
+}
+
+void CornerSpread::drop_weak(const CornerRegion& region, int strong, int cell_size, std::vector<PixelCorner>& corners) {
+  if (corners.empty()) return;
+  const Grid grid{std::max(1, region.width() / cell_size), std::max(1, region.height() / cell_size)};
+  sort_into_cells(region, grid, corners);
+  taken_.assign(starts_.size(), 0);
+  for (size_t i = 0; i < corners.size(); ++i)
+    if (corners[i].score >= strong) taken_[cell_of_[i]] = 1;
+  size_t kept = 0;
+  for (size_t i = 0; i < corners.size(); ++i)
+    if (corners[i].score >= strong || taken_[cell_of_[i]] == 0) corners[kept++] = corners[i];
+  corners.resize(kept);
+}
+
+void CornerSpread::keep(const CornerRegion& region, int count, std::vector<PixelCorner>& corners) {
+  if (static_cast<int>(corners.size()) <= count) return;
+  if (count <= 0) return corners.clear();
+  const double side = std::sqrt(static_cast<double>(region.width()) * region.height() / count);
+  const Grid grid{std::max(1, static_cast<int>(std::lround(region.width() / side))),
+                  std::max(1, static_cast<int>(std::lround(region.height() / side)))};
+  sort_into_cells(region, grid, corners);
+  const size_t cells = starts_.size() - 1;
+
+  // Strongest first; the earlier corner wins a tie, hence its complemented index in the low bits.
+  keys_.resize(corners.size());
+  for (size_t i = 0; i < corners.size(); ++i)
+    keys_[i] = static_cast<uint64_t>(corners[order_[i]].score) << 32 | (0xFFFFFFFFu - order_[i]);
+  for (size_t c = 0; c < cells; ++c)
+    std::sort(keys_.begin() + starts_[c], keys_.begin() + starts_[c + 1], std::greater<>());
+
+  taken_.assign(cells, 0);
+  size_t left = static_cast<size_t>(count);
+  for (uint32_t round = 0; left > 0; ++round) {
+    last_round_.clear();
+    for (size_t c = 0; c < cells; ++c)
+      if (starts_[c] + round < starts_[c + 1])
+        last_round_.emplace_back(keys_[starts_[c] + round], static_cast<uint32_t>(c));
+    if (last_round_.size() > left) {
+      std::nth_element(last_round_.begin(), last_round_.begin() + static_cast<ptrdiff_t>(left), last_round_.end(),
+                       std::greater<>());
+      last_round_.resize(left);
+    }
+    for (const auto& [key, cell] : last_round_) ++taken_[cell];
+    left -= last_round_.size();
+  }
+  kept_.clear();
+  for (size_t c = 0; c < cells; ++c)
+    for (uint32_t i = 0; i < taken_[c]; ++i)
+      kept_.push_back(corners[0xFFFFFFFFu - static_cast<uint32_t>(keys_[starts_[c] + i])]);
+  corners.swap(kept_);
+}
+
+}  // namespace dkb

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/orb_extractor.h"
+
+#include <algorithm>
+
+#include "dkb/features/orientation.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+void OrbOptions::check() const {
+  require_option(count >= 1, "count", count, ">= 1");
+  require_option(scale > 1.0 && scale <= 4.0, "scale", scale, "in (1, 4]");
+  require_option(levels >= 1 && levels <= 16, "levels", levels, "in 1 ... 16");
+  require_option(fast_threshold_min >= 1 && fast_threshold_min <= 254, "fast_threshold_min", fast_threshold_min,
+                 "in 1 ... 254");
+  require_option(fast_threshold >= fast_threshold_min && fast_threshold <= 254, "fast_threshold", fast_threshold,
+                 "in fast_threshold_min ... 254");
+  require_option(cell_size >= 8, "cell_size", cell_size, ">= 8");
+  require_option(border >= kBriefRadius + kBlurRadius + 1, "border", border, ">= 19, what a descriptor reaches");
+}
+
+OrbExtractor::OrbExtractor(OrbOptions options, Simd simd)
+    : options_(options),
+      simd_(simd),
+      pyramid_({.levels = options.levels, .scale = options.scale}, simd),
+      finder_(simd),
+      blur_(simd),
+      brief_(simd) {
+  options_.check();
+}
+
+CornerRegion OrbExtractor::region(int level) const {
+  const GreyImage& image = pyramid_.level(level);
+  return {options_.border, options_.border, image.width() - options_.border, image.height() - options_.border};
+}
+
+void OrbExtractor::find_corners() {
+  const size_t levels = static_cast<size_t>(pyramid_.levels());
+  corners_.resize(levels);
+  for (size_t i = 0; i < levels; ++i) {
+    const int level = static_cast<int>(i);
+    finder_.find(pyramid_.level(level), options_.fast_threshold_min, options_.border, corners_[i]);
+    spread_.drop_weak(region(level), options_.fast_threshold, options_.cell_size, corners_[i]);
+  }
+}
+
+std::vector<int> OrbExtractor::quotas() const {
+  std::vector<int> quotas(corners_.size(), 0);
+  int left = options_.count;
+  for (bool full = false; left > 0 && !full;) {
+    // Share what is left among the levels that still have corners, in proportion to their area.
+    double area = 0;
+    for (size_t i = 0; i < corners_.size(); ++i)
+      if (quotas[i] < static_cast<int>(corners_[i].size()))
+        area += static_cast<double>(pyramid_.level(static_cast<int>(i)).size());
+    full = true;
+    const int shared = left;
+    for (size_t i = 0; i < corners_.size() && left > 0; ++i) {
+      const int room = static_cast<int>(corners_[i].size()) - quotas[i];
+      if (room <= 0) continue;
+      const double share = shared * static_cast<double>(pyramid_.level(static_cast<int>(i)).size()) / area;
+      const int given = std::min({room, left, std::max(1, static_cast<int>(share + 0.5))});
+      quotas[i] += given;
+      left -= given;
+      full = false;
+    }
+  }
+  return quotas;
+}
+
+OrbFeatures OrbExtractor::extract(const GreyImage& image) {
+  if (image.width() > 65535 || image.height() > 65535)
+    throw InputError("feature extraction: the image is " + std::to_string(image.width()) + " x " +
+                     std::to_string(image.height()) + " pixels; at most 65535 per side are possible");
+  pyramid_.build(image);
+  find_corners();
+  const std::vector<int> quota = quotas();
+  OrbFeatures features;
+  features.corners.reserve(static_cast<size_t>(options_.count));
+  features.descriptors.reserve(static_cast<size_t>(options_.count));
+  for (size_t i = 0; i < corners_.size(); ++i) {
+    const int level = static_cast<int>(i);
+    std::vector<PixelCorner>& corners = corners_[i];
+    if (corners.empty()) continue;
+    spread_.keep(region(level), quota[i], corners);
+    const GreyImage& pixels = pyramid_.level(level);
+    blur_.apply(pixels, blurred_);
+    for (const PixelCorner& pixel : corners) {
+      Corner corner;
+      corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
+      corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x));
+      corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y));
+      corner.response = pixel.score;
+      corner.octave = static_cast<uint8_t>(level);
+      features.corners.push_back(corner);
+      features.descriptors.push_back(brief_.describe(blurred_.row(pixel.y) + pixel.x, pixels.width(), corner.angle));
+    }
+  }
+  return features;
+}
+
+}  // namespace dkb

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dkb/features/corner_spread.h"
+#include "dkb/features/fast_corners.h"
+#include "dkb/features/features.h"
+#include "dkb/features/gaussian_blur.h"
+#include "dkb/features/image_pyramid.h"
+#include "dkb/features/simd.h"
+#include "dkb/features/steered_brief.h"
+#include "dkb/image/image.h"
+
+namespace dkb {
+
+struct OrbOptions {
+  int count = 1000;            // features asked for, >= 1; fewer come where the image has no more corners
+  double scale = 1.2;          // size of a pyramid level over that of the next, (1, 4]
+  int levels = 8;              // pyramid levels, 1 ... 16
+  int fast_threshold = 20;     // [grey levels] corner contrast, fast_threshold_min ... 254
+  int fast_threshold_min = 7;  // [grey levels] used in cells where the first finds nothing, >= 1
+  int cell_size = 32;          // [px of the level] cells in which the threshold adapts, >= 8
+  int border = 19;             // [px of the level] free of corners at the image's edge, >= 19
+  bool subpixel = true;        // refine positions below the pixel
+  void check() const;          // throws InvalidOption
+};
+
+// Oriented FAST corners with rotated BRIEF descriptors on an image pyramid (Rublee et al., ICCV 2011), spread evenly
+// over the image and, by area, over the levels. Keeps its buffers from frame to frame; one object per thread.
+// Deterministic: the same image gives the same features, on every processor.
+class OrbExtractor {
+ public:
+  explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd());
+
+  // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 65535.
+  OrbFeatures extract(const GreyImage& image);
+  // Pyramid of the last image given to extract().
+  const ImagePyramid& pyramid() const { return pyramid_; }
+  const OrbOptions& options() const { return options_; }
+
+ private:
+  CornerRegion region(int level) const;
+  void find_corners();
+  // How many of each level's corners to keep: by area, what a level lacks goes to the others.
+  std::vector<int> quotas() const;
+
+  OrbOptions options_;
+  Simd simd_;
+  ImagePyramid pyramid_;
+  FastCornerFinder finder_;
+  CornerSpread spread_;
+  GaussianBlur blur_;
+  SteeredBrief brief_;
+  std::vector<std::vector<PixelCorner>> corners_;  // per level
+  GreyImage blurred_;
+};
+
+}  // namespace dkb
