@@ -7,7 +7,7 @@ SHELL := /bin/bash
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
 DKB_SLAM := build/apps/dkb-slam
-SOURCES = $(shell git ls-files '*.cpp' '*.h')
+SOURCES = $(shell git ls-files '*.cpp' '*.h' '*.inl')
 # ThreadSanitizer's shadow memory collides with address-space randomisation on recent kernels.
 NO_ASLR := $(shell setarch $$(uname -m) -R true 2>/dev/null && echo setarch $$(uname -m) -R)
 
@@ -37,14 +37,13 @@ test-asan: deps
 	cmake --preset asan
 	cmake --build build-asan --target unit_tests -j $(JOBS)
 	ASAN_OPTIONS=strict_string_checks=1:detect_stack_use_after_return=1 \
-	LSAN_OPTIONS=suppressions=$(CURDIR)/tests/lsan.supp:print_suppressions=0 \
 	UBSAN_OPTIONS=print_stacktrace=1 \
 	ctest --test-dir build-asan -L unit --output-on-failure --no-tests=error -j $(JOBS)
 
 test-tsan: deps
 	cmake --preset tsan
 	$(NO_ASLR) cmake --build build-tsan --target unit_tests -j $(JOBS)
-	TSAN_OPTIONS=suppressions=$(CURDIR)/tests/tsan.supp:halt_on_error=1:second_deadlock_stack=1 \
+	TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1 \
 	$(NO_ASLR) ctest --test-dir build-tsan -L unit --output-on-failure --no-tests=error -j $(JOBS)
 
 bench: deps  ## Build and run the benchmarks (DKB_DATA=folder of real sequences)
