@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "dkb/features/features.h"
+
+namespace dkb {
+
+struct MatchOptions {
+  int max_distance = 64;  // [bits] largest Hamming distance of a match, 0 ... 256
+  float ratio = 0.8f;     // best distance over second best must be below this, 0 ... 1
+  bool mutual = true;     // the match must be the best in both directions
+  void check() const;
+};
+
+struct DescriptorMatch {
+  int a = 0, b = 0;
+  int distance = 0;
+};
+
+// All descriptors of `a` against all of `b`. Ties go to the smaller index. By increasing a.
+std::vector<DescriptorMatch> match_brute_force(std::span<const Descriptor> a, std::span<const Descriptor> b,
+                                               const MatchOptions& options = {});
+
+}  // namespace dkb
