@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/solver/bundle_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+
+#include "dkb/solver/ba_layout.h"
+#include "dkb/solver/relative_pose.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using solver::kBlockSize;
+using solver::kPairStride;
+using solver::kPointStride;
+
+// Poses, and points as x y z 0 with an extra one at the end for the filling of the layout.
+struct State {
+  std::vector<Rigid3> poses;
+  std::vector<double> points;
+};
+
+class BundleAdjuster {
+ public:
+  BundleAdjuster(BaProblem& problem, const BaOptions& options)
+      : problem_(problem), options_(options), layout_(problem), cholesky_(layout_.pattern, kernels_) {
+    const size_t entries = layout_.observation_of_entry.size();
+    values_.assign(entries * kArrays, 0.0);
+    for (size_t e = 0; e < entries; ++e) {
+      if (layout_.observation_of_entry[e] < 0) continue;
+      const BaObservation& o = problem.observations[layout_.observation_of_entry[e]];
+      array(kU)[e] = o.u;
+      array(kV)[e] = o.v;
+      array(kInvSigma)[e] = o.inv_sigma;
+      array(kDepth)[e] = o.depth;
+      array(kInvDepthSigma)[e] = o.depth > 0 ? o.inv_depth_sigma : 0.0;
+    }
+    state_.poses = problem.cam_from_world;
+    state_.points.assign(4 * (problem.points.size() + 1), 0.0);
+    for (size_t p = 0; p < problem.points.size(); ++p) {
+      std::copy_n(problem.points[p].data(), 3, state_.points.data() + 4 * p);
+    }
+    const size_t n = layout_.free_cameras();
+    point_sums_.resize(static_cast<size_t>(kPointStride) * (layout_.points + 1));
+    factors_.resize(point_sums_.size());
+    pair_sums_.resize(static_cast<size_t>(kPairStride) * (layout_.pairs() + 1));
+    camera_blocks_.resize(kBlockSize * layout_.pattern.rows.size());
+    system_.resize(camera_blocks_.size());
+    gradient_.resize(6 * n);
+    camera_step_.resize(6 * n);
+    point_step_.resize(state_.points.size());
+  }
+
+  BaResult run() {
+    BaResult result;
+    result.outlier.assign(problem_.observations.size(), 0);
+    judge(result);
+    // Beyond the limit an observation may still pull, softened by the kernel; behind the camera it has no residual.
+    use(result, options_.prefilter);
+    for (size_t round = 0; round < options_.rounds.size(); ++round) {
+      robust_ = round == 0 || round + 1 < options_.rounds.size() || options_.robust_last_round;
+      const double start = cost(state_);
+      if (round == 0) result.initial_cost = start;
+      result.final_cost = descend(start, options_.rounds[round], result.iterations);
+      judge(result);
+      use(result, true);
+    }
+    problem_.cam_from_world = state_.poses;
+    for (size_t p = 0; p < problem_.points.size(); ++p) {
+      std::copy_n(state_.points.data() + 4 * p, 3, problem_.points[p].data());
+    }
+    result.outliers = static_cast<int>(std::count(result.outlier.begin(), result.outlier.end(), 1));
+    return result;
+  }
+
+ private:
+  enum Array { kU, kV, kInvSigma, kDepth, kInvDepthSigma, kUsedInvDepthSigma, kUsedWeight, kChi2, kArrays };
+  double* array(Array a) { return values_.data() + layout_.observation_of_entry.size() * a; }
+
+  solver::BaCameraInput input(int camera, const State& state) {
+    const Rigid3& pose = state.poses[camera];
+    const CameraModel& model = problem_.camera;
+    solver::BaCameraInput in{};
+    in.camera = {model.fx, model.fy, model.cx, model.cy, {}, {}, options_.depth_in_front};
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(in.camera.rotation) = pose.matrix3();
+    Eigen::Map<Eigen::Vector3d>(in.camera.translation) = pose.translation;
+    in.observations = {array(kU),         array(kV), array(kInvSigma), array(kDepth), array(kUsedInvDepthSigma),
+                       array(kUsedWeight)};
+    in.point = layout_.point_of_entry.data();
+    in.pair = layout_.pair_of_entry.data();
+    in.points = state.points.data();
+    in.begin = layout_.camera_first[camera];
+    in.end = layout_.camera_first[camera + 1];
+    in.limits = {robust_, options_.chi2_pixel, options_.chi2_depth};
+    return in;
+  }
+
+  // Marks all observations by their unweighted error at the present state.
+  void judge(BaResult& result) {
+    for (int c = 0; c < layout_.cameras; ++c) {
+      solver::BaCameraInput in = input(c, state_);
+      in.observations.inv_depth_sigma = array(kInvDepthSigma);
+      kernels_.ba_chi2(in, array(kChi2));
+    }
+    for (size_t e = 0; e < layout_.observation_of_entry.size(); ++e) {
+      const int o = layout_.observation_of_entry[e];
+      if (o < 0) continue;
+      const double limit = array(kInvDepthSigma)[e] > 0 ? options_.chi2_depth : options_.chi2_pixel;
+      result.outlier[o] = !(array(kChi2)[e] <= limit);
+    }
+  }
+
+  // Observations that take part from now on: those in front of their cameras, and no outliers if asked.
+  void use(const BaResult& result, bool without_outliers) {
+    for (size_t e = 0; e < layout_.observation_of_entry.size(); ++e) {
+      const int o = layout_.observation_of_entry[e];
+      if (o < 0) continue;
+      const bool used = std::isfinite(array(kChi2)[e]) && !(without_outliers && result.outlier[o]);
+      array(kUsedWeight)[e] = used ? problem_.observations[o].weight : 0.0;
+      array(kUsedInvDepthSigma)[e] = used ? array(kInvDepthSigma)[e] : 0.0;
+    }
+  }
+
+  double cost(const State& state) {
+    double total = 0;
+    for (int c = 0; c < layout_.cameras; ++c) total += kernels_.ba_cost(input(c, state));
+    for (const BaPosePrior& prior : problem_.priors) {
+      const Vector6d e = solver::relative_pose_error(state.poses[prior.camera], prior.cam_from_world, Rigid3());
+      total += e.dot(prior.information * e);
+    }
+    for (const BaRelativePose& r : problem_.relative_poses) {
+      const Vector6d e = solver::relative_pose_error(state.poses[r.a], state.poses[r.b], r.b_from_a);
+      total += e.dot(r.information * e);
+    }
+    return total;
+  }
+
+  using Block = Eigen::Map<Matrix6d>;
+  Block diagonal_block(int free) { return Block(camera_blocks_.data() + kBlockSize * layout_.pattern.first[free]); }
+  Eigen::Map<Vector6d> gradient_of(int free) { return Eigen::Map<Vector6d>(gradient_.data() + 6 * free); }
+
+  void linearise() {
+    std::fill(point_sums_.begin(), point_sums_.end(), 0.0);
+    std::fill(camera_blocks_.begin(), camera_blocks_.end(), 0.0);
+    double sums[solver::kPoseSums];
+    for (int c = 0; c < layout_.cameras; ++c) {
+      const int free = layout_.free_of_camera[c];
+      kernels_.ba_linearise(input(c, state_), free < 0, point_sums_.data(), pair_sums_.data(), sums);
+      if (free < 0) continue;
+      Block block = diagonal_block(free);
+      const double* h = sums;
+      for (int i = 0; i < 6; ++i) {
+        for (int j = i; j < 6; ++j) block(i, j) = block(j, i) = *h++;
+      }
+      std::copy_n(h, 6, gradient_of(free).data());
+    }
+    for (const BaPosePrior& prior : problem_.priors) {
+      const int free = layout_.free_of_camera[prior.camera];
+      if (free < 0) continue;
+      const auto r = solver::relative_pose_residual(state_.poses[prior.camera], prior.cam_from_world, Rigid3());
+      const Matrix6d weighted = r.jacobian_a.transpose() * prior.information;
+      diagonal_block(free) += weighted * r.jacobian_a;
+      gradient_of(free) += weighted * r.error;
+    }
+    for (size_t k = 0; k < problem_.relative_poses.size(); ++k)
+      linearise(problem_.relative_poses[k], layout_.relative_block[k]);
+  }
+
+  void linearise(const BaRelativePose& relative, int block) {
+    const int a = layout_.free_of_camera[relative.a], b = layout_.free_of_camera[relative.b];
+    const auto r =
+        solver::relative_pose_residual(state_.poses[relative.a], state_.poses[relative.b], relative.b_from_a);
+    const Matrix6d weighted_a = r.jacobian_a.transpose() * relative.information;
+    const Matrix6d weighted_b = r.jacobian_b.transpose() * relative.information;
+    if (a >= 0) {
+      diagonal_block(a) += weighted_a * r.jacobian_a;
+      gradient_of(a) += weighted_a * r.error;
+    }
+    if (b >= 0) {
+      diagonal_block(b) += weighted_b * r.jacobian_b;
+      gradient_of(b) += weighted_b * r.error;
+    }
+    if (block < 0) return;
+    // The lower triangle's block: its row is the later camera.
+    Block(camera_blocks_.data() + kBlockSize * static_cast<size_t>(block)) +=
+        a < b ? Matrix6d(weighted_b * r.jacobian_a) : Matrix6d(weighted_a * r.jacobian_b);
+  }
+
+  // Step of all cameras and points for a damping, and the cost that the quadratic model saves. False: not solvable.
+  bool solve(double damping, double& predicted) {
+    system_ = camera_blocks_;
+    for (int i = 0; i < layout_.free_cameras(); ++i) {
+      double* block = system_.data() + kBlockSize * static_cast<size_t>(layout_.pattern.first[i]);
+      for (int k = 0; k < 6; ++k) block[7 * k] += damping * std::max(block[7 * k], kSmallestDiagonal);
+    }
+    camera_step_ = gradient_;
+    const solver::SchurInput in{layout_.points,
+                                layout_.pair_first.data(),
+                                layout_.pair_camera.data(),
+                                layout_.block.data(),
+                                layout_.block_first.data(),
+                                point_sums_.data(),
+                                pair_sums_.data(),
+                                damping};
+    kernels_.schur(in, system_.data(), camera_step_.data(), factors_.data());
+    if (!cholesky_.factorise(system_)) return false;
+    cholesky_.solve(camera_step_);
+    predicted = 0;
+    for (int i = 0; i < layout_.free_cameras(); ++i) {
+      for (int k = 0; k < 6; ++k) {
+        double& d = camera_step_[6 * i + k];
+        d = -d;
+        const double diagonal = std::max(diagonal_block(i)(k, k), kSmallestDiagonal);
+        predicted += damping * diagonal * d * d - gradient_[6 * i + k] * d;
+      }
+    }
+    for (int p = 0; p < layout_.points; ++p) predicted += solve_point(p, damping);
+    return std::isfinite(predicted);
+  }
+
+  // Point step from the cameras' steps: -L^-T (L^-1 g + L^-1 W^T d). Returns its part of the predicted saving.
+  double solve_point(int point, double damping) {
+    const double* f = factors_.data() + static_cast<size_t>(kPointStride) * point;
+    const double* v = point_sums_.data() + static_cast<size_t>(kPointStride) * point;
+    double* step = point_step_.data() + 4 * static_cast<size_t>(point);
+    step[0] = step[1] = step[2] = 0;
+    if (f[0] == 0) return 0;
+    double t0 = 0, t1 = 0, t2 = 0;
+    for (int pair = layout_.pair_first[point]; pair < layout_.pair_first[point + 1]; ++pair) {
+      const double* w = pair_sums_.data() + static_cast<size_t>(kPairStride) * pair;
+      const double* d = camera_step_.data() + 6 * static_cast<size_t>(layout_.pair_camera[pair]);
+      for (int k = 0; k < 6; ++k) {
+        t0 += w[k] * d[k];
+        t1 += w[6 + k] * d[k];
+        t2 += w[12 + k] * d[k];
+      }
+    }
+    const double y0 = t0 * f[0], y1 = (t1 - f[1] * y0) * f[3], y2 = (t2 - f[2] * y0 - f[4] * y1) * f[5];
+    const double r0 = f[6] + y0, r1 = f[7] + y1, r2 = f[8] + y2;
+    step[2] = -(r2 * f[5]);
+    step[1] = -(r1 + f[4] * step[2]) * f[3];
+    step[0] = -(r0 + f[1] * step[1] + f[2] * step[2]) * f[0];
+    const double damp = damping * (v[0] + v[3] + v[5]);
+    double saved = 0;
+    for (int k = 0; k < 3; ++k) saved += damp * step[k] * step[k] - v[6 + k] * step[k];
+    return saved;
+  }
+
+  double descend(double present, int iterations, int& total) {
+    double damping = options_.initial_damping, growth = 2;
+    bool fresh = false;
+    for (int i = 0; i < iterations; ++i) {
+      ++total;
+      if (!fresh) linearise();
+      fresh = true;
+      double predicted = 0;
+      const bool solved = solve(damping, predicted);
+      if (solved && predicted <= 1e-3 * options_.relative_tolerance * present) break;
+      double next = 0;
+      if (solved) {
+        candidate_.poses = state_.poses;
+        candidate_.points = state_.points;
+        for (int f = 0; f < layout_.free_cameras(); ++f) {
+          Rigid3& pose = candidate_.poses[layout_.camera_of_free[f]];
+          pose = solver::perturbed(pose, Eigen::Map<const Vector6d>(camera_step_.data() + 6 * f));
+        }
+        for (size_t k = 0; k < 4 * static_cast<size_t>(layout_.points); ++k) candidate_.points[k] += point_step_[k];
+        next = cost(candidate_);
+      }
+      // Nielsen's rule for the damping (Madsen, Nielsen, Tingleff, "Methods for non-linear least squares problems").
+      if (solved && next < present) {
+        const double gain = (present - next) / predicted, z = 2 * gain - 1;
+        damping = std::max(kSmallestDamping, damping * std::max(1.0 / 3.0, 1 - z * z * z));
+        growth = 2;
+        std::swap(state_, candidate_);
+        fresh = false;
+        const bool done = present - next <= options_.relative_tolerance * present;
+        present = next;
+        if (done) break;
+      } else {
+        damping *= growth;
+        growth *= 2;
+        if (damping > kLargestDamping) break;
+      }
+    }
+    return present;
+  }
+
+  static constexpr double kSmallestDiagonal = 1e-6, kSmallestDamping = 1e-10, kLargestDamping = 1e10;
+
+  BaProblem& problem_;
+  const BaOptions& options_;
+  const solver::SolverKernels& kernels_ = solver::solver_kernels();
+  const solver::BaLayout layout_;
+  solver::BlockCholesky cholesky_;
+  bool robust_ = true;
+  State state_, candidate_;
+  std::vector<double> values_;  // observations as arrays
+  std::vector<double> point_sums_, pair_sums_, factors_;
+  std::vector<double> camera_blocks_;  // cameras' part of the system, in the layout's pattern
+  std::vector<double> system_;         // the same, damped, with the points eliminated
+  std::vector<double> gradient_;
+  std::vector<double> camera_step_, point_step_;
+};
+
+}  // namespace
+
+void BaOptions::check() const {
+  if (rounds.empty()) throw InvalidOption("rounds", "an empty list", "one number of iterations at least");
+  for (const int iterations : rounds) require_option(iterations >= 1, "rounds", iterations, ">= 1");
+  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
+  require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
+  require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
+  require_option(initial_damping > 0, "initial_damping", initial_damping, "> 0");
+  require_option(relative_tolerance >= 0, "relative_tolerance", relative_tolerance, ">= 0");
+}
+
+BaResult bundle_adjust(BaProblem& problem, const BaOptions& options) {
+  options.check();
+  return BundleAdjuster(problem, options).run();
+}
+
+}  // namespace dkb

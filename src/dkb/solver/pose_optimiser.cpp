@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/solver/pose_optimiser.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/solver/kernels.h"
+#include "dkb/solver/relative_pose.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using solver::CameraPose;
+
+// The observations as arrays, in groups of four, and the sums over them at a pose.
+class PoseProblem {
+ public:
+  PoseProblem(const CameraModel& camera, std::span<const PoseObservation> observations, const PoseOptions& options,
+              const PosePrior* prior)
+      : count_(observations.size()), padded_((count_ + 3) / 4 * 4), prior_(prior), options_(options) {
+    values_.assign(padded_ * kArrays, 0.0);
+    for (size_t i = 0; i < count_; ++i) {
+      const PoseObservation& o = observations[i];
+      array(kX)[i] = o.point_in_world.x();
+      array(kY)[i] = o.point_in_world.y();
+      array(kZ)[i] = o.point_in_world.z();
+      array(kU)[i] = o.pixel.x();
+      array(kV)[i] = o.pixel.y();
+      array(kInvSigma)[i] = 1.0 / o.pixel_sigma;
+      if (o.depth > 0) {
+        array(kDepth)[i] = o.depth;
+        array(kInvDepthSigma)[i] = 1.0 / o.depth_sigma;
+      }
+    }
+    input_.camera = {camera.fx, camera.fy, camera.cx, camera.cy, {}, {}, options.depth_in_front};
+    input_.observations = {array(kU), array(kV), array(kInvSigma), array(kDepth), nullptr, array(kWeight)};
+    input_.x = array(kX);
+    input_.y = array(kY);
+    input_.z = array(kZ);
+    input_.count = static_cast<int>(padded_);
+  }
+
+  // Observations within the limit at a pose.
+  std::vector<uint8_t> inliers(const Rigid3& pose) {
+    std::vector<uint8_t> inlier(count_);
+    compute_chi2(pose);
+    for (size_t i = 0; i < count_; ++i) inlier[i] = array(kChi2)[i] <= limit(i);
+    return inlier;
+  }
+
+  // Observations that take part from now on.
+  void use(const std::vector<uint8_t>& inlier) {
+    for (size_t i = 0; i < count_; ++i) {
+      array(kWeight)[i] = inlier[i] ? 1.0 : 0.0;
+      array(kUsedInvDepthSigma)[i] = inlier[i] ? array(kInvDepthSigma)[i] : 0.0;
+    }
+  }
+  std::vector<uint8_t> in_front(const Rigid3& pose) {
+    std::vector<uint8_t> in_front(count_);
+    compute_chi2(pose);
+    for (size_t i = 0; i < count_; ++i) in_front[i] = std::isfinite(array(kChi2)[i]);
+    return in_front;
+  }
+
+  struct Normal {
+    Matrix6d information;  // A^T M A
+    Vector6d gradient;     // half the derivative of the cost
+    double cost;
+  };
+  Normal normal_at(const Rigid3& pose, bool robust) {
+    set_pose(pose);
+    input_.observations.inv_depth_sigma = array(kUsedInvDepthSigma);
+    input_.limits = {robust, options_.chi2_pixel, options_.chi2_depth};
+    double sums[solver::kPoseSums];
+    kernels_.pose_sums(input_, sums);
+    Normal n;
+    const double* h = sums;
+    for (int i = 0; i < 6; ++i) {
+      for (int j = i; j < 6; ++j) n.information(i, j) = n.information(j, i) = *h++;
+    }
+    for (int i = 0; i < 6; ++i) n.gradient[i] = *h++;
+    n.cost = *h;
+    if (prior_ != nullptr) {
+      // Between this camera and one at the prior's pose no motion was "measured".
+      const auto r = solver::relative_pose_residual(pose, prior_->cam_from_world, Rigid3());
+      n.information += r.jacobian_a.transpose() * prior_->information * r.jacobian_a;
+      n.gradient += r.jacobian_a.transpose() * prior_->information * r.error;
+      n.cost += r.error.dot(prior_->information * r.error);
+    }
+    return n;
+  }
+
+  double mean_chi2(const std::vector<uint8_t>& inlier) const {
+    double sum = 0;
+    size_t n = 0;
+    for (size_t i = 0; i < count_; ++i) {
+      if (!inlier[i]) continue;
+      sum += array(kChi2)[i];
+      ++n;
+    }
+    return n > 0 ? sum / static_cast<double>(n) : 0.0;
+  }
+
+ private:
+  enum Array { kX, kY, kZ, kU, kV, kInvSigma, kDepth, kInvDepthSigma, kUsedInvDepthSigma, kWeight, kChi2, kArrays };
+
+  double* array(Array a) { return values_.data() + padded_ * a; }
+  const double* array(Array a) const { return values_.data() + padded_ * a; }
+  double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? options_.chi2_depth : options_.chi2_pixel; }
+  void compute_chi2(const Rigid3& pose) {
+    set_pose(pose);
+    input_.observations.inv_depth_sigma = array(kInvDepthSigma);
+    kernels_.pose_chi2(input_, array(kChi2));
+  }
+  void set_pose(const Rigid3& pose) {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(input_.camera.rotation) = pose.matrix3();
+    Eigen::Map<Eigen::Vector3d>(input_.camera.translation) = pose.translation;
+  }
+
+  const size_t count_, padded_;
+  const PosePrior* prior_;
+  const PoseOptions& options_;
+  const solver::SolverKernels& kernels_ = solver::solver_kernels();
+  std::vector<double> values_;
+  solver::PoseInput input_{};
+};
+
+// Levenberg-Marquardt from `pose` with the observations in use. Returns the number of steps tried.
+int descend(PoseProblem& problem, const PoseOptions& options, bool robust, Rigid3& pose) {
+  double damping = 1e-6;
+  PoseProblem::Normal normal = problem.normal_at(pose, robust);
+  int tried = 0;
+  while (tried < options.iterations) {
+    ++tried;
+    Matrix6d damped = normal.information;
+    // The floor keeps directions without information where they are.
+    damped.diagonal() += damping * normal.information.diagonal() + Vector6d::Constant(1e-9);
+    const Vector6d step = -damped.ldlt().solve(normal.gradient);
+    if (!step.allFinite()) break;
+    const Rigid3 candidate = solver::perturbed(pose, step);
+    const bool small =
+        step.head<3>().norm() <= options.translation_tolerance && step.tail<3>().norm() <= options.rotation_tolerance;
+    const PoseProblem::Normal next = problem.normal_at(candidate, robust);
+    if (next.cost <= normal.cost) {
+      pose = candidate;
+      normal = next;
+      damping = std::max(0.1 * damping, 1e-12);
+    } else {
+      damping = std::max(damping, 1e-6) * 10;
+    }
+    if (small) break;
+  }
+  return tried;
+}
+
+}  // namespace
+
+void PoseOptions::check() const {
+  require_option(rounds >= 1, "rounds", rounds, ">= 1");
+  require_option(iterations >= 1, "iterations", iterations, ">= 1");
+  require_option(robust_rounds >= 0, "robust_rounds", robust_rounds, ">= 0");
+  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
+  require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
+  require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
+  require_option(translation_tolerance >= 0, "translation_tolerance", translation_tolerance, ">= 0 m");
+  require_option(rotation_tolerance >= 0, "rotation_tolerance", rotation_tolerance, ">= 0 rad");
+  require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
+}
+
+PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_world_initial,
+                           std::span<const PoseObservation> observations, const PoseOptions& options,
+                           const PosePrior* prior) {
+  options.check();
+  PoseEstimate estimate;
+  estimate.cam_from_world = cam_from_world_initial;
+  PoseProblem problem(camera, observations, options, prior);
+
+  Rigid3 pose = cam_from_world_initial;
+  std::vector<uint8_t> used = problem.in_front(pose);
+  for (int round = 0; round < options.rounds; ++round) {
+    problem.use(used);
+    estimate.iterations += descend(problem, options, round < options.robust_rounds, pose);
+    estimate.inlier = problem.inliers(pose);
+    // Within the limit, which is the kernel's corner, the kernel is least squares: the same observations would give
+    // the same pose again, with the kernel or without.
+    if (estimate.inlier == used) break;
+    used = estimate.inlier;
+  }
+  problem.use(estimate.inlier);
+
+  estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
+  estimate.mean_chi2 = problem.mean_chi2(estimate.inlier);
+  const Matrix6d information = problem.normal_at(pose, false).information;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+  const bool determined = information.allFinite() && eigen.eigenvalues()[0] > 1e-12 * eigen.eigenvalues()[5];
+  if (estimate.inliers < options.min_inliers || !determined || !pose.translation.allFinite()) return estimate;
+  estimate.ok = true;
+  estimate.cam_from_world = pose;
+  estimate.covariance =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  return estimate;
+}
+
+}  // namespace dkb
