@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace dkb {
+
+// What the detector must know of an ONNX graph before it runs: its one true input (initialisers are not inputs).
+struct OnnxInput {
+  std::string name;
+  int element_type = 0;       // ONNX TensorProto.DataType; 1 = float
+  std::vector<int64_t> dims;  // -1 = left open by the graph
+};
+
+// Reads an ONNX file's protobuf wire format, as far as the graph's inputs need it, and checks that every message on the
+// way is whole. Throws InputError naming the file when the bytes are truncated, are no ONNX model, or have no or
+// several inputs. Any bytes are safe.
+OnnxInput read_onnx_input(std::string_view bytes, const std::string& name);
+
+}  // namespace dkb
