@@ -12,8 +12,8 @@ echo "== clang-format"
 git ls-files -z '*.cpp' '*.h' '*.inl' | xargs -0 clang-format --dry-run -Werror || result=1
 
 echo "== clang-tidy"
-git ls-files -z 'src/*.cpp' 'apps/*.cpp' ':!*_test.cpp' |
-  xargs -0 -P "$jobs" -n 1 clang-tidy --quiet -p "$build" 2> >(grep -v ' warnings\? generated' >&2) || result=1
+sed -nE 's/^ *"file": "([^"]*)",?$/\1/p' "$build/compile_commands.json" | grep -E '/(src|apps)/' | grep -v '_test\.cpp$' | sort -u |
+  xargs -P "$jobs" -d '\n' -n 1 clang-tidy --quiet -p "$build" 2> >(grep -v ' warnings\? generated' >&2) || result=1
 
 echo "== cppcheck"
 git ls-files 'src/*.cpp' 'apps/*.cpp' ':!*_test.cpp' |
