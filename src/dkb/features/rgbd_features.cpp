@@ -22,9 +22,11 @@ float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
       const float d = depth(cx + dx, cy + dy);
-      if (d > 0) values[n++] = d;
+      if (!(d > 0)) continue;
+      int at = n++;
+      for (; at > 0 && values[at - 1] > d; --at) values[at] = values[at - 1];  // insertion keeps them sorted
+      values[at] = d;
     }
-  std::sort(values, values + n);
   if (values[n - 1] - values[0] > edge_fraction * centre) return 0;
   return n % 2 == 1 ? values[n / 2] : 0.5f * (values[n / 2 - 1] + values[n / 2]);
 }

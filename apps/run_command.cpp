@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/paced_source.h"
+#include "dkb/dataset/rgbd_reader.h"
+#include "dkb/dataset/tum_dataset.h"
+#include "dkb/slam/slam_system.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/log.h"
+#include "dkb/util/settings.h"
+#include "run_outputs.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+struct RunArguments {
+  std::string dataset, camera, preset = "default", out;
+  std::vector<std::string> set;
+  std::string config;
+  DatasetSelection selection;
+  uint64_t seed = 1;
+  bool has_seed = false;
+  int threads = 0;
+  bool realtime = false, dump_features = false, quiet = false;
+};
+
+std::atomic<bool> interrupted{false};
+void on_interrupt(int) { interrupted = true; }
+
+// One line that renews itself on a terminal; plain lines now and then elsewhere.
+class Progress {
+ public:
+  Progress(size_t total, bool quiet) : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+  void frame(size_t done, const FrameResult* result) {
+    if (quiet_) return;
+    const double ms = watch_.ms();
+    if (done < total_ && ms - last_ms_ < (terminal_ ? 100 : 5000)) return;
+    last_ms_ = ms;
+    const double rate = ms > 0 ? 1000.0 * static_cast<double>(done) / ms : 0;
+    const double eta = rate > 0 ? static_cast<double>(total_ - done) / rate : 0;
+    std::string line = fmt::format("frame {}/{}  {:.0f} frames/s  ETA {:.0f} s", done, total_, rate, eta);
+    if (result != nullptr) line += fmt::format("  {} {} inliers", name_of(result->state), result->inliers);
+    if (terminal_)
+      fmt::print(stderr, "\r\033[K{}{}", line, done >= total_ ? "\n" : "");
+    else
+      fmt::print(stderr, "{}\n", line);
+    std::fflush(stderr);
+  }
+
+ private:
+  size_t total_;
+  bool quiet_, terminal_;
+  double last_ms_ = -1e9;
+  Stopwatch watch_;
+};
+
+fs::path default_output(const fs::path& dataset) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  localtime_r(&now, &parts);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
+  const fs::path name = dataset.filename().empty() ? dataset.parent_path().filename() : dataset.filename();
+  return fs::path("dkb-out") / (name.string() + "-" + stamp);
+}
+
+void append_features(std::string& csv, const std::string& stamp, const SlamSystem& slam) {
+  const RgbdFeatures& features = *slam.features();
+  const auto& states = slam.feature_states();
+  for (size_t f = 0; f < features.size(); ++f)
+    csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, features.keypoints[f].image_pixel.x(),
+                       features.keypoints[f].image_pixel.y(), name_of(states[f]));
+}
+
+int run(const RunArguments& args) {
+  WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+  SlamOptions options = preset(args.preset);
+  Settings settings;
+  bind_settings(settings, options);
+  if (!args.config.empty()) settings.load_yaml(args.config);
+  for (const std::string& assignment : args.set) settings.set_assignment(assignment, "--set");
+  if (args.has_seed) options.seed = args.seed;
+  options.pipeline.threaded = args.threads != 1;
+  options.pipeline.realtime = args.realtime;
+  options.check();
+
+  TumDataset dataset = open_tum_dataset(args.dataset);
+  select_pairs(args.selection, &dataset);
+  const CameraChoice camera = choose_camera(args.camera, args.dataset);
+  RgbdReaderOptions reading;
+  reading.threaded = options.pipeline.threaded || args.realtime;
+  RgbdReader reader(dataset.pairs, camera.camera, reading, &warnings);
+  const fs::path out = args.out.empty() ? default_output(args.dataset) : fs::path(args.out);
+  make_output_folder(out);
+  if (!args.quiet)
+    fmt::print("{} pairs by {}, camera {}, results in {}\n", dataset.pairs.size(), dataset.list, camera.origin, out.string());
+
+  interrupted = false;
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  SlamSystem slam(camera.camera, options);
+  RunFacts facts;
+  facts.offered = static_cast<int>(dataset.pairs.size());
+  if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
+  std::optional<PacedSource> paced;
+  if (args.realtime) paced.emplace(reader);
+  Progress progress(dataset.pairs.size(), args.quiet);
+  const Stopwatch wall;
+  bool first = true;
+  while (!interrupted) {
+    const std::optional<DatasetFrame> frame = paced ? paced->next() : reader.next();
+    if (!frame) break;
+    if (first) facts.startup_s = seconds_since_process_start();
+    first = false;
+    if (frame->image == nullptr) {
+      ++facts.skipped;
+      progress.frame(frame->index + 1, nullptr);
+      continue;
+    }
+    facts.stamps.push_back(frame->stamp);
+    const FrameResult result = slam.process(frame->image);
+    if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
+    progress.frame(frame->index + 1, &result);
+  }
+  if (paced) {
+    paced->stop();
+    facts.skipped += paced->dropped();
+  }
+  reader.stop();
+  slam.finish();
+  facts.wall_s = wall.ms() / 1000;
+  facts.config_yaml = settings.to_yaml();
+  facts.times = reader.times();
+  write_outputs(out, slam, facts);
+  warnings.finish();
+
+  const SlamStatistics s = slam.statistics();
+  if (!args.quiet)
+    fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked, facts.offered,
+               s.keyframes, s.map_points, s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+  if (interrupted) return 130;
+  if (s.tracked == 0) {
+    fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n", options.tracking.initial_points);
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+
+void register_run(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<RunArguments>();
+  CLI::App* command = app.add_subcommand("run", "Track a recorded sequence: trajectory, map and statistics");
+  command->add_option("dataset", args->dataset, "Folder in TUM layout")->required();
+  command->add_option("--camera", args->camera, "Camera file, or fr1, fr2, fr3, bonn");
+  command->add_option("--preset", args->preset, "Settings to start from: default");
+  command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
+  command->add_option("--set", args->set, "key=value, any setting of config.yaml; may be repeated");
+  command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
+  command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) { args->has_seed = true; });
+  command->add_option("--start", args->selection.start, "[s] after the first pair");
+  command->add_option("--end", args->selection.end, "[s] after the first pair");
+  command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");
+  command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
+  command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
+  command->add_flag("--dump-features", args->dump_features, "Write features.csv");
+  command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
+  command->callback([args, &exit_code] { exit_code = run(*args); });
+}
+
+}  // namespace dkb

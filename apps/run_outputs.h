@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dkb/slam/slam_system.h"
+#include "dkb/util/timing.h"
+
+namespace dkb {
+
+// Facts of a run that the system itself does not know.
+struct RunFacts {
+  std::vector<std::string> stamps;  // colour stamp of each frame given to the system, as read
+  int offered = 0, skipped = 0;     // pairs of the selection; those never given to the system
+  double startup_s = 0, wall_s = 0;
+  std::string config_yaml;
+  std::string features_csv;  // empty = not asked for
+  StageTimes times;          // decoding
+};
+
+// Seconds since this process was started, by the kernel's account.
+double seconds_since_process_start();
+
+// Writes every result of the contract into `folder`, each file atomically. Throws OutputError.
+void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, const RunFacts& facts);
+
+}  // namespace dkb

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dkb/geometry/rigid3.h"
+#include "dkb/map/map.h"
+
+namespace dkb {
+
+// What a policy may know of a tracked frame.
+struct KeyframeQuery {
+  FrameIndex frame = 0;
+  FrameIndex last_keyframe_frame = 0;       // frame of the newest keyframe
+  FrameIndex last_relocalisation_frame = -1000000;
+  KeyframeId last_keyframe = kNoKeyframe;
+  bool mapper_idle = true;                  // no keyframe outstanding in logical time
+  int tracked_points = 0;                   // inliers of the final pose
+  int tracked_close_points = 0;             // of these, with a depth below the close limit
+  int creatable_close_points = 0;           // features with such a depth that show no map point
+  int reference_points = 0;                 // points of the reference keyframe that other keyframes see as well
+  Rigid3 cam_from_world;
+  Rigid3 last_keyframe_cam_from_world;
+  // Inliers: what was matched and where.
+  const std::vector<PointId>* points = nullptr;  // per feature; kNoPoint where nothing was matched
+  const RgbdFeatures* features = nullptr;
+};
+
+enum class KeyframeRule { none, first, baseline, adaptive, floor };
+const char* name_of(KeyframeRule rule);
+
+struct KeyframeDecision {
+  bool insert = false;
+  KeyframeRule rule = KeyframeRule::none;
+  std::string explanation;  // every test with its numbers, for logs; empty unless asked for
+};
+
+// Decides whether a tracked frame becomes a keyframe.
+// Deterministic: the same frames in the same order give the same decisions.
+class KeyframePolicy {
+ public:
+  virtual ~KeyframePolicy() = default;
+  virtual KeyframeDecision decide(const KeyframeQuery& query, const Map& map) = 0;
+};
+
+// The rule published with ORB-SLAM2 (T-RO 2017) for RGB-D cameras, as restated in DKB section 3.2.
+struct BaselineKeyframeOptions {
+  int frames_between = 20;           // [frames] longest wait while mapping is busy; also the wait after a relocalisation, >= 1
+  int least_tracked = 50;            // [points] fewer tracked points make no keyframe, >= 0
+  double reference_ratio = 0.9;      // insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1
+  int few_close = 100;               // [points] fewer tracked close points ...
+  int many_creatable = 70;           // [points] ... while at least so many could be made call for a keyframe
+  void check() const;
+};
+
+class BaselineKeyframePolicy final : public KeyframePolicy {
+ public:
+  explicit BaselineKeyframePolicy(BaselineKeyframeOptions options);
+  KeyframeDecision decide(const KeyframeQuery& query, const Map& map) override;
+
+ private:
+  BaselineKeyframeOptions options_;
+};
+
+}  // namespace dkb

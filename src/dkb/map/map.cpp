@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/map/map.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace dkb {
+namespace {
+
+void add_covisible(std::vector<Covisible>& list, Covisible entry) {
+  const auto better = [](const Covisible& a, const Covisible& b) {
+    return a.shared_points != b.shared_points ? a.shared_points > b.shared_points : a.keyframe < b.keyframe;
+  };
+  list.insert(std::upper_bound(list.begin(), list.end(), entry, better), entry);
+}
+
+void drop_covisible(std::vector<Covisible>& list, KeyframeId id) {
+  std::erase_if(list, [id](const Covisible& c) { return c.keyframe == id; });
+}
+
+}  // namespace
+
+MapView Map::snapshot() {
+  auto view = std::make_shared<const Map>(*this);
+  ++epoch_;  // all that is shared now is older than the epoch, so the next write copies it
+  return view;
+}
+
+const Keyframe* Map::keyframe(KeyframeId id) const {
+  if (id < 0 || id >= keyframe_count()) return nullptr;
+  return keyframes_[static_cast<size_t>(id)].value.get();
+}
+
+const Keyframe* Map::live_keyframe(KeyframeId id) const {
+  const Keyframe* k = keyframe(id);
+  return k != nullptr && !k->culled ? k : nullptr;
+}
+
+const Map::PointSlot* Map::slot(PointId id) const {
+  if (id == kNoPoint) return nullptr;
+  const auto birth = static_cast<size_t>(birth_keyframe(id));
+  if (birth >= blocks_.size() || !blocks_[birth].value) return nullptr;
+  const PointBlock& block = *blocks_[birth].value;
+  const auto feature = static_cast<size_t>(birth_feature(id));
+  if (feature >= block.slot_of_feature.size() || block.slot_of_feature[feature] < 0) return nullptr;
+  return &block.slots[static_cast<size_t>(block.slot_of_feature[feature])];
+}
+
+const MapPoint* Map::point(PointId id) const {
+  const PointSlot* s = slot(id);
+  return s != nullptr && s->alive ? &s->point : nullptr;
+}
+
+PointId Map::resolve(PointId id) const {
+  for (const PointSlot* s = slot(id); s != nullptr; s = slot(id)) {
+    if (s->alive) return id;
+    id = s->replaced_by;
+  }
+  return kNoPoint;
+}
+
+Rigid3 Map::cam_from_world(KeyframeId id) const {
+  const Keyframe* k = keyframe(id);
+  if (k == nullptr) throw std::logic_error("map: no keyframe " + std::to_string(id));
+  Rigid3 cam_from_ancestor;
+  while (k->culled) {
+    cam_from_ancestor = cam_from_ancestor * k->cam_from_parent;
+    k = keyframe(k->parent);
+  }
+  return cam_from_ancestor * k->cam_from_world;
+}
+
+std::vector<KeyframeId> Map::live_keyframes() const {
+  std::vector<KeyframeId> ids;
+  for (const auto& k : keyframes_)
+    if (!k.value->culled) ids.push_back(k.value->id);
+  return ids;
+}
+
+std::vector<PointId> Map::live_points() const {
+  std::vector<PointId> ids;
+  ids.reserve(point_count_);
+  for (const auto& block : blocks_) {
+    if (!block.value) continue;
+    for (int16_t s : block.value->slot_of_feature)
+      if (s >= 0 && block.value->slots[static_cast<size_t>(s)].alive)
+        ids.push_back(block.value->slots[static_cast<size_t>(s)].point.id);
+  }
+  return ids;
+}
+
+Keyframe& Map::edit(KeyframeId id) {
+  Shared<Keyframe>& shared = keyframes_.at(static_cast<size_t>(id));
+  if (shared.epoch != epoch_) {
+    shared.value = std::make_shared<Keyframe>(*shared.value);
+    shared.epoch = epoch_;
+  }
+  return *shared.value;
+}
+
+Map::PointBlock& Map::edit_block(KeyframeId birth) {
+  const auto index = static_cast<size_t>(birth);
+  if (blocks_.size() <= index) blocks_.resize(index + 1);
+  Shared<PointBlock>& shared = blocks_[index];
+  if (shared.epoch != epoch_) {
+    shared.value = shared.value ? std::make_shared<PointBlock>(*shared.value) : std::make_shared<PointBlock>();
+    shared.epoch = epoch_;
+  }
+  return *shared.value;
+}
+
+MapPoint& Map::edit_point(PointId id) {
+  if (point(id) == nullptr) throw std::logic_error("map: no point " + std::to_string(id));
+  PointBlock& block = edit_block(birth_keyframe(id));
+  return block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(id))])].point;
+}
+
+void Map::add_keyframe(Keyframe keyframe) {
+  if (keyframe.id != keyframe_count()) throw std::logic_error("map: keyframe ids must follow one another");
+  const KeyframeId id = keyframe.id;
+  const std::vector<PointId> points = std::move(keyframe.points);
+  keyframe.points.assign(keyframe.features->size(), kNoPoint);
+  keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_});
+  ++live_keyframe_count_;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const PointId p = resolve(points[i]);
+    if (p != kNoPoint) observe(p, id, static_cast<int>(i));
+  }
+}
+
+void Map::add_point(MapPoint point) {
+  if (slot(point.id) != nullptr) throw std::logic_error("map: point " + std::to_string(point.id) + " was born before");
+  PointBlock& block = edit_block(birth_keyframe(point.id));
+  const auto feature = static_cast<size_t>(birth_feature(point.id));
+  if (block.slot_of_feature.size() <= feature) block.slot_of_feature.resize(feature + 1, -1);
+  block.slot_of_feature[feature] = static_cast<int16_t>(block.slots.size());
+  block.slots.push_back({std::move(point), true, kNoPoint});
+  ++point_count_;
+}
+
+void Map::observe(PointId point_id, KeyframeId keyframe_id, int feature) {
+  Keyframe& k = edit(keyframe_id);
+  PointId& entry = k.points.at(static_cast<size_t>(feature));
+  if (entry == point_id) return;
+  const MapPoint* seen = point(point_id);
+  if (seen == nullptr) return;
+  for (const Observation& o : seen->observations)
+    if (o.keyframe == keyframe_id) return;  // one feature per point and keyframe: the first stays
+  if (entry != kNoPoint) forget(entry, keyframe_id);
+  entry = point_id;
+  auto& list = edit_point(point_id).observations;
+  const Observation o{keyframe_id, feature};
+  list.insert(std::upper_bound(list.begin(), list.end(), o,
+                               [](const Observation& a, const Observation& b) { return a.keyframe < b.keyframe; }),
+              o);
+}
+
+void Map::forget(PointId point_id, KeyframeId keyframe_id) {
+  if (point(point_id) == nullptr) return;
+  MapPoint& p = edit_point(point_id);
+  const auto it = std::find_if(p.observations.begin(), p.observations.end(),
+                               [&](const Observation& o) { return o.keyframe == keyframe_id; });
+  if (it == p.observations.end()) return;
+  edit(keyframe_id).points[static_cast<size_t>(it->feature)] = kNoPoint;
+  p.observations.erase(it);
+  if (p.observations.empty()) remove_point(point_id);
+}
+
+void Map::remove_point(PointId id) {
+  if (point(id) == nullptr) return;
+  for (const Observation& o : point(id)->observations)
+    edit(o.keyframe).points[static_cast<size_t>(o.feature)] = kNoPoint;
+  PointBlock& block = edit_block(birth_keyframe(id));
+  PointSlot& s = block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(id))])];
+  s.alive = false;
+  s.point.observations = {};
+  --point_count_;
+}
+
+void Map::fuse(PointId from, PointId into) {
+  if (from == into || point(from) == nullptr || point(into) == nullptr) return;
+  const std::vector<Observation> moved = point(from)->observations;
+  const int found = point(from)->found, visible = point(from)->visible;
+  remove_point(from);
+  PointBlock& block = edit_block(birth_keyframe(from));
+  block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(from))])].replaced_by = into;
+  for (const Observation& o : moved) observe(into, o.keyframe, o.feature);
+  MapPoint& survivor = edit_point(into);
+  survivor.found += found;
+  survivor.visible += visible;
+}
+
+void Map::update_covisibility(KeyframeId id, int least_shared_points) {
+  const Keyframe* self = live_keyframe(id);
+  if (self == nullptr) return;
+  std::vector<KeyframeId> sightings;
+  for (PointId p : self->points)
+    if (const MapPoint* seen = point(p))
+      for (const Observation& o : seen->observations)
+        if (o.keyframe != id) sightings.push_back(o.keyframe);
+  std::sort(sightings.begin(), sightings.end());
+  std::vector<Covisible> found;
+  Covisible best;
+  for (size_t i = 0; i < sightings.size();) {
+    size_t j = i;
+    while (j < sightings.size() && sightings[j] == sightings[i]) ++j;
+    const Covisible c{sightings[i], static_cast<int>(j - i)};
+    if (c.shared_points > best.shared_points) best = c;
+    if (c.shared_points >= least_shared_points) found.push_back(c);
+    i = j;
+  }
+  if (found.empty() && best.keyframe != kNoKeyframe) found.push_back(best);
+  const std::vector<Covisible> before = self->covisible;
+  Keyframe& me = edit(id);
+  me.covisible.clear();
+  for (const Covisible& c : found) add_covisible(me.covisible, c);
+  const auto weight_in = [](const std::vector<Covisible>& list, KeyframeId other) {
+    for (const Covisible& c : list)
+      if (c.keyframe == other) return c.shared_points;
+    return 0;
+  };
+  for (const Covisible& c : before)
+    if (weight_in(found, c.keyframe) == 0) drop_covisible(edit(c.keyframe).covisible, id);
+  for (const Covisible& c : found) {
+    if (weight_in(keyframe(c.keyframe)->covisible, id) == c.shared_points) continue;
+    auto& list = edit(c.keyframe).covisible;
+    drop_covisible(list, id);
+    add_covisible(list, {id, c.shared_points});
+  }
+}
+
+void Map::cull_keyframe(KeyframeId id) {
+  const Keyframe* k = live_keyframe(id);
+  if (k == nullptr || k->parent == kNoKeyframe) return;  // the root stays
+  const KeyframeId parent = k->parent;
+  const Rigid3 cam_from_parent = k->cam_from_world * cam_from_world(parent).inverse();
+  const std::vector<PointId> points = k->points;
+  for (PointId p : points)
+    if (p != kNoPoint) forget(p, id);
+  for (const Covisible& c : keyframe(id)->covisible) drop_covisible(edit(c.keyframe).covisible, id);
+  for (const auto& other : keyframes_)
+    if (!other.value->culled && other.value->parent == id) edit(other.value->id).parent = parent;
+  Keyframe& me = edit(id);
+  me.culled = true;
+  me.cam_from_parent = cam_from_parent;
+  me.features.reset();
+  me.points = {};
+  me.covisible = {};
+  --live_keyframe_count_;
+}
+
+}  // namespace dkb

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "dkb/features/rgbd_features.h"
+#include "dkb/geometry/rigid3.h"
+#include "dkb/map/ids.h"
+
+namespace dkb {
+
+// One sighting of a map point.
+struct Observation {
+  KeyframeId keyframe = kNoKeyframe;
+  int32_t feature = 0;
+  bool operator==(const Observation&) const = default;
+};
+
+struct MapPoint {
+  PointId id = kNoPoint;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // [m] in the world
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // mean unit direction from the point to the cameras that see it
+  float reference_distance = 0;                        // [m] from the camera that gave the descriptor
+  float reference_scale = 1;                           // pyramid scale of the feature that gave the descriptor
+  Descriptor descriptor{};
+  Rgb colour;
+  int found = 1, visible = 1;             // frames that matched it, frames that should have
+  KeyframeId born_at = kNoKeyframe;       // newest keyframe when the point was made
+  std::vector<Observation> observations;  // by increasing keyframe id
+};
+
+struct Covisible {
+  KeyframeId keyframe = kNoKeyframe;
+  int shared_points = 0;
+};
+
+struct Keyframe {
+  KeyframeId id = kNoKeyframe;
+  FrameIndex frame = 0;
+  double timestamp = 0;                          // [s]
+  std::shared_ptr<const RgbdFeatures> features;  // immutable; empty once culled
+  Rigid3 cam_from_world;
+  std::vector<PointId> points;                   // per feature; kNoPoint where it shows none
+  std::vector<Covisible> covisible;              // by decreasing shared_points, then increasing id
+  KeyframeId parent = kNoKeyframe;               // spanning tree; the first keyframe has none
+  Rigid3 cam_from_parent;                        // frozen when culled: the pose then follows the parent
+  bool culled = false;
+};
+
+// Keyframes, map points and who sees what. A value with structural sharing: a copy shares all that neither side has
+// changed since (copy on write per keyframe and per block of points), so a snapshot costs what changed.
+//
+// One owner writes; everybody else reads snapshots. Nothing here locks.
+class Map {
+ public:
+  // Immutable view of the map as it is now. Later writes copy what they touch.
+  std::shared_ptr<const Map> snapshot();
+
+  // --- reading. Ids that are unknown, or point to what was removed, give null.
+  KeyframeId keyframe_count() const { return static_cast<KeyframeId>(keyframes_.size()); }  // culled ones included
+  const Keyframe* keyframe(KeyframeId id) const;                                            // also culled ones
+  const Keyframe* live_keyframe(KeyframeId id) const;
+  const MapPoint* point(PointId id) const;
+  // Follows fusions to the point that survives; kNoPoint when it was removed.
+  PointId resolve(PointId id) const;
+  // Pose of any keyframe ever made; culled ones ride on their parents.
+  Rigid3 cam_from_world(KeyframeId id) const;
+  std::vector<KeyframeId> live_keyframes() const;  // increasing
+  std::vector<PointId> live_points() const;        // increasing
+  size_t point_count() const { return point_count_; }
+  int live_keyframe_count() const { return live_keyframe_count_; }
+
+  // --- writing
+  void add_keyframe(Keyframe keyframe);  // its id must be keyframe_count(); its points' observations are added too
+  void add_point(MapPoint point);        // named by birth; observations must be empty, see observe()
+  void observe(PointId point, KeyframeId keyframe, int feature);
+  void forget(PointId point, KeyframeId keyframe);  // a point left with no observation is removed
+  void remove_point(PointId point);
+  void fuse(PointId from, PointId into);  // observations move; `from` forwards to `into`
+  void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
+  MapPoint& edit_point(PointId id);  // must exist
+  // Recomputes the covisibility of `id` and mirrors the edges in its neighbours.
+  void update_covisibility(KeyframeId id, int least_shared_points);
+  // Removes a keyframe's observations; it and its children hang on its parent from now on.
+  void cull_keyframe(KeyframeId id);
+  void set_parent(KeyframeId id, KeyframeId parent) { edit(id).parent = parent; }
+
+ private:
+  struct PointSlot {
+    MapPoint point;
+    bool alive = false;
+    PointId replaced_by = kNoPoint;
+  };
+  struct PointBlock {                     // the points born at one keyframe
+    std::vector<int16_t> slot_of_feature;  // -1 = none
+    std::vector<PointSlot> slots;
+  };
+  // Shared while its epoch is older than the map's, ours to write when equal.
+  template <class T>
+  struct Shared {
+    std::shared_ptr<T> value;
+    uint64_t epoch = 0;
+  };
+
+  Keyframe& edit(KeyframeId id);
+  PointBlock& edit_block(KeyframeId birth);
+  const PointSlot* slot(PointId id) const;
+
+  uint64_t epoch_ = 1;
+  std::vector<Shared<Keyframe>> keyframes_;
+  std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
+  size_t point_count_ = 0;
+  int live_keyframe_count_ = 0;
+};
+
+using MapView = std::shared_ptr<const Map>;
+
+}  // namespace dkb

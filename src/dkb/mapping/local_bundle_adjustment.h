@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/map.h"
+#include "dkb/solver/bundle_adjustment.h"
+#include "dkb/solver/geometric_weights.h"
+
+namespace dkb {
+
+struct LocalBaOptions {
+  int free_keyframes = 12;     // the newest keyframe and its best covisible ones, >= 1
+  int fixed_keyframes = 20;    // others that see their points, those with most first, >= 1
+  int iterations_first = 4;    // [steps] before outliers are told apart, >= 1
+  int iterations_second = 6;   // [steps] after, >= 1
+  bool weighted = true;        // geometric weights of DKB section 3.3 (switch BA of the paper's ablation)
+  GeometricWeightOptions weights;
+  void check() const;
+};
+
+struct LocalBaReport {
+  int cameras = 0, fixed = 0, points = 0, observations = 0, outliers = 0, iterations = 0;
+  double initial_cost = 0, final_cost = 0;
+  std::vector<PointId> moved_points;  // increasing
+};
+
+// Adjusts the neighbourhood of a keyframe (DKB eqs. 42-48) and writes the result into the map; observations that end as
+// outliers are forgotten. The oldest keyframe of the map never moves.
+LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
+                                      double scale_factor, const LocalBaOptions& options);
+
+}  // namespace dkb

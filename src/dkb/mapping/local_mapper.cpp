@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/mapping/local_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/tracking/candidates.h"
+#include "dkb/tracking/local_map.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+void MappingOptions::check() const {
+  require_option(least_shared_points >= 1, "least_shared_points", least_shared_points, "at least 1");
+  require_option(least_found_ratio >= 0 && least_found_ratio <= 1, "least_found_ratio", least_found_ratio, "0 ... 1");
+  require_option(probation_keyframes >= 1, "probation_keyframes", probation_keyframes, "at least 1");
+  require_option(least_observers >= 2, "least_observers", least_observers, "at least 2");
+  require_option(redundant_share >= 0 && redundant_share <= 1, "redundant_share", redundant_share, "0 ... 1");
+  require_option(redundant_observers >= 1, "redundant_observers", redundant_observers, "at least 1");
+  require_option(fusion_keyframes >= 0, "fusion_keyframes", fusion_keyframes, "at least 0");
+  require_option(fusion_radius > 0, "fusion_radius", fusion_radius, "greater than 0 px");
+  creation.check();
+  ba.check();
+}
+
+LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+                         const MappingOptions& options)
+    : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), options_(options) {
+  options_.check();
+}
+
+MapView LocalMapper::process(const KeyframePacket& packet) {
+  const Stopwatch whole;
+  apply_sightings(packet);
+  insert(packet);
+  cull_points(packet.id);
+  const auto triangulated = triangulate_new_points(map_, packet.id, camera_, noise_, scale_factor_, options_.creation);
+  young_.insert(young_.end(), triangulated.begin(), triangulated.end());
+  report_.points_created += static_cast<int>(triangulated.size());
+  refresh(triangulated);
+  fuse_neighbours(packet.id);
+  map_.update_covisibility(packet.id, options_.least_shared_points);
+  if (map_.live_keyframe_count() > 1) {
+    const Stopwatch ba;
+    const LocalBaReport adjusted =
+        local_bundle_adjustment(map_, packet.id, camera_, noise_, scale_factor_, options_.ba);
+    times_.add("local_ba", ba.ms());
+    refresh(adjusted.moved_points);
+    cull_keyframes(packet.id);
+  }
+  times_.add("mapping", whole.ms());
+  return map_.snapshot();
+}
+
+void LocalMapper::apply_sightings(const KeyframePacket& packet) {
+  for (const PointSighting& s : packet.sightings) {
+    const PointId id = map_.resolve(s.point);
+    if (id == kNoPoint) continue;
+    MapPoint& p = map_.edit_point(id);
+    p.visible += s.visible;
+    p.found += s.found;
+  }
+}
+
+void LocalMapper::insert(const KeyframePacket& packet) {
+  Keyframe k;
+  k.id = packet.id;
+  k.frame = packet.frame;
+  k.timestamp = packet.timestamp;
+  k.features = packet.features;
+  k.cam_from_world = packet.reference == kNoKeyframe ? packet.cam_from_reference
+                                                     : packet.cam_from_reference * map_.cam_from_world(packet.reference);
+  k.points = packet.points;
+  const Rigid3 world_from_cam = k.cam_from_world.inverse();
+  map_.add_keyframe(std::move(k));
+  std::vector<PointId> born;
+  for (const ProvisionalPoint& n : packet.new_points) {
+    MapPoint p;
+    p.id = n.id;
+    p.position = world_from_cam * n.point_in_keyframe;
+    p.born_at = packet.id;
+    p.colour = packet.features->keypoints[static_cast<size_t>(n.feature)].colour;
+    map_.add_point(std::move(p));
+    map_.observe(n.id, packet.id, n.feature);
+    born.push_back(n.id);
+  }
+  report_.points_created += static_cast<int>(born.size());
+  young_.insert(young_.end(), born.begin(), born.end());
+  std::vector<PointId> seen;
+  for (PointId p : map_.keyframe(packet.id)->points)
+    if (p != kNoPoint) seen.push_back(p);
+  refresh(seen);
+  map_.update_covisibility(packet.id, options_.least_shared_points);
+  const auto& covisible = map_.keyframe(packet.id)->covisible;
+  if (!covisible.empty())
+    map_.set_parent(packet.id, covisible.front().keyframe);
+  else if (packet.reference != kNoKeyframe)
+    map_.set_parent(packet.id, packet.reference);
+}
+
+void LocalMapper::cull_points(KeyframeId newest) {
+  std::vector<PointId> still_young;
+  for (PointId id : young_) {
+    const MapPoint* p = map_.point(id);
+    if (p == nullptr) continue;
+    const int age = newest - p->born_at;
+    const bool rarely_found = p->found < options_.least_found_ratio * p->visible;
+    const bool rarely_seen =
+        age >= options_.probation_keyframes && static_cast<int>(p->observations.size()) < options_.least_observers;
+    if (rarely_found || rarely_seen) {
+      map_.remove_point(id);
+      ++report_.points_culled;
+    } else if (age < options_.probation_keyframes) {
+      still_young.push_back(id);
+    }
+  }
+  young_ = std::move(still_young);
+}
+
+int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& points) {
+  std::vector<Candidate> candidates;
+  for (PointId id : points) {
+    const MapPoint* p = map_.point(id);
+    if (p == nullptr) continue;
+    const bool seen = std::any_of(p->observations.begin(), p->observations.end(),
+                                  [&](const Observation& o) { return o.keyframe == keyframe; });
+    if (!seen) candidates.push_back(candidate_of(*p));
+  }
+  const Keyframe& k = *map_.keyframe(keyframe);
+  ProjectionMatchOptions match;
+  match.radius = static_cast<float>(options_.fusion_radius);
+  match.max_distance = 50;
+  match.ratio = 1.0f;
+  const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_, match,
+                                           nullptr, nullptr);
+  int fused = 0;
+  const auto features = k.features;
+  for (const ProjectionMatch& m : matches) {
+    const PointId id = candidates[static_cast<size_t>(m.candidate)].id;
+    const MapPoint* p = map_.point(id);
+    if (p == nullptr) continue;
+    const Keypoint& kp = features->keypoints[static_cast<size_t>(m.feature)];
+    const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
+    const Eigen::Vector3d in_cam = cam_from_world * p->position;
+    const double sigma = noise_.pixel_sigma * std::pow(scale_factor_, kp.octave);
+    if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() > 5.991 * sigma * sigma) continue;
+    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > 3 * noise_.depth_sigma(kp.depth)) continue;
+    const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];
+    if (there == kNoPoint) {
+      map_.observe(id, keyframe, m.feature);
+    } else if (there != id) {
+      // The better observed point survives; the older one in a tie.
+      const MapPoint& other = *map_.point(there);
+      if (other.observations.size() > p->observations.size() || (other.observations.size() == p->observations.size() && there < id))
+        map_.fuse(id, there);
+      else
+        map_.fuse(there, id);
+      ++fused;
+    }
+  }
+  return fused;
+}
+
+void LocalMapper::fuse_neighbours(KeyframeId id) {
+  std::vector<KeyframeId> neighbours;
+  for (const Covisible& c : map_.keyframe(id)->covisible)
+    if (static_cast<int>(neighbours.size()) < options_.fusion_keyframes) neighbours.push_back(c.keyframe);
+  const auto points_of = [&](KeyframeId k) {
+    std::vector<PointId> points;
+    for (PointId p : map_.keyframe(k)->points)
+      if (p != kNoPoint) points.push_back(p);
+    return points;
+  };
+  std::vector<PointId> all;
+  for (KeyframeId n : neighbours) {
+    report_.points_fused += fuse_into(n, points_of(id));
+    const auto theirs = points_of(n);
+    all.insert(all.end(), theirs.begin(), theirs.end());
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  report_.points_fused += fuse_into(id, all);
+  refresh(points_of(id));
+}
+
+void LocalMapper::cull_keyframes(KeyframeId newest) {
+  const std::vector<Covisible> neighbours = map_.keyframe(newest)->covisible;
+  for (const Covisible& c : neighbours) {
+    const Keyframe* k = map_.live_keyframe(c.keyframe);
+    if (k == nullptr || k->parent == kNoKeyframe) continue;
+    int points = 0, redundant = 0;
+    for (size_t f = 0; f < k->points.size(); ++f) {
+      const MapPoint* p = map_.point(k->points[f]);
+      if (p == nullptr) continue;
+      ++points;
+      if (static_cast<int>(p->observations.size()) <= options_.redundant_observers) continue;
+      const int octave = k->features->keypoints[f].octave;
+      int as_fine = 0;
+      for (const Observation& o : p->observations)
+        as_fine += o.keyframe != c.keyframe &&
+                   map_.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)].octave <= octave + 1;
+      redundant += as_fine >= options_.redundant_observers;
+    }
+    if (points > 0 && redundant > options_.redundant_share * points) {
+      map_.cull_keyframe(c.keyframe);
+      ++report_.keyframes_culled;
+    }
+  }
+}
+
+void LocalMapper::refresh(const std::vector<PointId>& points) {
+  for (PointId id : points)
+    if (map_.point(id) != nullptr) refresh_point(map_, id, scale_factor_);
+}
+
+void refresh_point(Map& map, PointId id, double scale_factor) {
+  const MapPoint& old = *map.point(id);
+  std::vector<const Descriptor*> descriptors;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Observation& o : old.observations) {
+    const Keyframe& k = *map.keyframe(o.keyframe);
+    descriptors.push_back(&k.features->descriptors[static_cast<size_t>(o.feature)]);
+    sum += (centre_in_world(k.cam_from_world) - old.position).normalized();
+  }
+  if (descriptors.empty()) return;
+  // The descriptor with the least median distance to the others stands for all.
+  size_t chosen = 0;
+  if (descriptors.size() > 2) {
+    int least = 257;
+    std::vector<int> distances(descriptors.size());
+    for (size_t i = 0; i < descriptors.size(); ++i) {
+      for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
+      std::nth_element(distances.begin(), distances.begin() + static_cast<long>(distances.size() / 2), distances.end());
+      if (distances[distances.size() / 2] < least) {
+        least = distances[distances.size() / 2];
+        chosen = i;
+      }
+    }
+  }
+  const Observation source = old.observations[chosen];
+  const Keyframe& k = *map.keyframe(source.keyframe);
+  const Descriptor descriptor = *descriptors[chosen];
+  const float distance = static_cast<float>((centre_in_world(k.cam_from_world) - old.position).norm());
+  const float scale = static_cast<float>(std::pow(scale_factor, k.features->keypoints[static_cast<size_t>(source.feature)].octave));
+  MapPoint& p = map.edit_point(id);
+  p.normal = sum.normalized().cast<float>();
+  p.descriptor = descriptor;
+  p.reference_distance = distance;
+  p.reference_scale = scale;
+}
+
+}  // namespace dkb

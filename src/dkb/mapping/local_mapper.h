@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/map.h"
+#include "dkb/mapping/local_bundle_adjustment.h"
+#include "dkb/mapping/point_creation.h"
+#include "dkb/tracking/frame.h"
+#include "dkb/util/timing.h"
+
+namespace dkb {
+
+struct MappingOptions {
+  int least_shared_points = 15;        // [points] shared points that make two keyframes covisible, >= 1
+  double least_found_ratio = 0.25;     // found / visible below which a young point is dropped, 0 ... 1
+  int probation_keyframes = 3;         // [keyframes] after its birth that a point is on probation, >= 1
+  int least_observers = 3;             // keyframes that must see a point by the end of its probation, >= 2
+  double redundant_share = 0.9;        // a keyframe is culled when this share of its points ..., 0 ... 1
+  int redundant_observers = 3;         // ... is seen by so many others at the same scale or finer, >= 1
+  int fusion_keyframes = 10;           // covisible keyframes whose points are fused with a new keyframe's, >= 0
+  double fusion_radius = 3.0;          // [px] at the finest level, > 0
+  PointCreationOptions creation;
+  LocalBaOptions ba;
+  void check() const;
+};
+
+struct MappingReport {
+  int points_created = 0, points_culled = 0, points_fused = 0, keyframes_culled = 0;
+};
+
+// Turns keyframe packets into map: inserts, culls, creates, fuses, adjusts (DKB sections 3, 3.3). The only writer of the map.
+// Deterministic: the same packets in the same order give the same map.
+class LocalMapper {
+ public:
+  LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, const MappingOptions& options);
+
+  // Works a keyframe in and returns the map as it is then.
+  MapView process(const KeyframePacket& packet);
+
+  const Map& map() const { return map_; }
+  const MappingReport& report() const { return report_; }
+  const StageTimes& times() const { return times_; }
+
+ private:
+  void insert(const KeyframePacket& packet);
+  void apply_sightings(const KeyframePacket& packet);
+  void cull_points(KeyframeId newest);
+  void fuse_neighbours(KeyframeId id);
+  int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points);
+  void cull_keyframes(KeyframeId newest);
+  void refresh(const std::vector<PointId>& points);
+
+  CameraModel camera_;
+  SensorNoise noise_;
+  double scale_factor_;
+  int levels_;
+  MappingOptions options_;
+  Map map_;
+  std::vector<PointId> young_;  // points on probation
+  MappingReport report_;
+  StageTimes times_;
+};
+
+// Recomputes normal, representative descriptor and scale of a point from its observations.
+void refresh_point(Map& map, PointId id, double scale_factor);
+
+}  // namespace dkb

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/mapping/point_creation.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// Point nearest to two rays, from the least squares of both; nothing when they are parallel or it lies behind.
+std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a, const Eigen::Vector3d& centre_b,
+                                    const Eigen::Vector3d& ray_b) {
+  const double ab = ray_a.dot(ray_b);
+  const double denominator = 1.0 - ab * ab;
+  if (denominator < 1e-9) return std::nullopt;
+  const Eigen::Vector3d base = centre_b - centre_a;
+  const double s = (base.dot(ray_a) - ab * base.dot(ray_b)) / denominator;
+  const double t = (ab * base.dot(ray_a) - base.dot(ray_b)) / denominator;
+  if (s <= 0 || t <= 0) return std::nullopt;
+  return 0.5 * (centre_a + s * ray_a + centre_b + t * ray_b);
+}
+
+}  // namespace
+
+void PointCreationOptions::check() const {
+  require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
+  require_option(least_parallax_deg > 0, "least_parallax_deg", least_parallax_deg, "greater than 0 degrees");
+  require_option(max_distance >= 0 && max_distance <= 256, "max_distance", max_distance, "0 ... 256 bits");
+  require_option(chi2_epipolar > 0, "chi2_epipolar", chi2_epipolar, "greater than 0");
+  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "greater than 0");
+}
+
+std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
+                                            double scale_factor, const PointCreationOptions& options) {
+  std::vector<PointId> made;
+  const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
+  const double most_cosine = std::cos(options.least_parallax_deg * M_PI / 180);
+  for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
+    const Keyframe& a = *map.keyframe(newest);
+    const Keyframe& b = *map.keyframe(neighbours[n].keyframe);
+    const Rigid3 world_from_a = a.cam_from_world.inverse(), world_from_b = b.cam_from_world.inverse();
+    const Rigid3 b_from_a = b.cam_from_world * world_from_a;
+    if (b_from_a.translation.norm() < 0.02) continue;  // [m] nothing can be triangulated over so short a base
+    const Eigen::Matrix3d rotation_b_from_a = b_from_a.matrix3();
+    const Eigen::Matrix3d essential = skew(b_from_a.translation) * rotation_b_from_a;
+    struct Found {
+      int feature_a, feature_b, distance;
+      Eigen::Vector3d point;
+    };
+    std::vector<Found> found;
+    for (size_t fa = 0; fa < a.points.size(); ++fa) {
+      if (a.points[fa] != kNoPoint) continue;
+      const Keypoint& ka = a.features->keypoints[fa];
+      if (ka.depth > 0) continue;  // what has depth was made from depth, or left out for a reason
+      const Eigen::Vector3d ray_a = camera.unproject(ka.pixel.cast<double>(), 1.0);
+      const Eigen::Vector3d line = essential * ray_a;  // in normalised coordinates of b
+      const Eigen::Vector3d line_px(line.x() / camera.fx, line.y() / camera.fy,
+                                    line.z() - line.x() * camera.cx / camera.fx - line.y() * camera.cy / camera.fy);
+      const double norm2 = line_px.head<2>().squaredNorm();
+      if (norm2 < 1e-18) continue;
+      int best = options.max_distance + 1, best_b = -1;
+      for (size_t fb = 0; fb < b.points.size(); ++fb) {
+        if (b.points[fb] != kNoPoint) continue;
+        const Keypoint& kb = b.features->keypoints[fb];
+        const double sigma = noise.pixel_sigma * std::pow(scale_factor, kb.octave);
+        const double e = line_px.x() * kb.pixel.x() + line_px.y() * kb.pixel.y() + line_px.z();
+        if (e * e > options.chi2_epipolar * sigma * sigma * norm2) continue;
+        const int d = hamming_distance(a.features->descriptors[fa], b.features->descriptors[fb]);
+        if (d < best) {
+          best = d;
+          best_b = static_cast<int>(fb);
+        }
+      }
+      if (best_b < 0) continue;
+      const Keypoint& kb = b.features->keypoints[static_cast<size_t>(best_b)];
+      const Eigen::Vector3d world_ray_a = (world_from_a.rotation * ray_a).normalized();
+      const Eigen::Vector3d world_ray_b = (world_from_b.rotation * camera.unproject(kb.pixel.cast<double>(), 1.0)).normalized();
+      if (world_ray_a.dot(world_ray_b) > most_cosine) continue;
+      const auto point = meet(world_from_a.translation, world_ray_a, world_from_b.translation, world_ray_b);
+      if (!point) continue;
+      const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
+        const Eigen::Vector3d in_cam = cam_from_world * *point;
+        if (in_cam.z() < 0.1) return false;
+        const double sigma = noise.pixel_sigma * std::pow(scale_factor, k.octave);
+        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma) return false;
+        return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < 3 * noise.depth_sigma(k.depth);
+      };
+      if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;
+      found.push_back({static_cast<int>(fa), best_b, best, *point});
+    }
+    // One new point per feature of b: the best match takes it.
+    std::stable_sort(found.begin(), found.end(), [](const Found& x, const Found& y) { return x.distance < y.distance; });
+    const KeyframeId id_b = neighbours[n].keyframe;
+    for (const Found& f : found) {
+      if (map.keyframe(id_b)->points[static_cast<size_t>(f.feature_b)] != kNoPoint) continue;
+      MapPoint p;
+      p.id = make_point_id(newest, f.feature_a);
+      p.position = f.point;
+      p.born_at = newest;
+      p.colour = map.keyframe(newest)->features->keypoints[static_cast<size_t>(f.feature_a)].colour;
+      const PointId id = p.id;
+      map.add_point(std::move(p));
+      map.observe(id, newest, f.feature_a);
+      map.observe(id, id_b, f.feature_b);
+      made.push_back(id);
+    }
+  }
+  std::sort(made.begin(), made.end());
+  return made;
+}
+
+}  // namespace dkb

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "dkb/features/orb_extractor.h"
+#include "dkb/features/rgbd_features.h"
+#include "dkb/geometry/rigid3.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/keyframes/keyframe_policy.h"
+#include "dkb/mapping/local_mapper.h"
+#include "dkb/tracking/tracker.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+
+// How the stages run. None of it changes a dataset run's result, except mapper_latency.
+struct PipelineOptions {
+  bool threaded = true;      // mapping on its own thread; false: the same bytes from one thread
+  bool realtime = false;     // never wait for mapping; take its results when they are there
+  int mapper_latency = 2;    // [frames] after which a keyframe's mapping becomes visible to tracking, >= 1
+  int mapper_queue = 4;      // [keyframes] outstanding at most in a real-time run, >= 1
+  void check() const;
+};
+
+struct SlamOptions {
+  OrbOptions features;
+  DepthOptions depth;
+  SensorNoise noise;
+  TrackingOptions tracking;
+  BaselineKeyframeOptions baseline_keyframes;
+  MappingOptions mapping;
+  PipelineOptions pipeline;
+  uint64_t seed = 1;         // reaches every source of randomness
+  Rigid3 base_from_cam;      // mount: the world is the robot's base at the first tracked frame
+
+  void check() const;
+};
+
+// The built-in presets: "default". Throws InputError naming the nearest one.
+SlamOptions preset(const std::string& name);
+
+// Binds every field to its dotted key, e.g. "tracking.close_depth".
+void bind_settings(Settings& settings, SlamOptions& options);
+
+}  // namespace dkb

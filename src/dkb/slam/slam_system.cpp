@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/slam_system.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "dkb/slam/mapping_stage.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+const char* name_of(FeatureState state) {
+  switch (state) {
+    case FeatureState::used: return "used";
+    case FeatureState::outlier: return "outlier";
+    case FeatureState::dynamic: return "dynamic";
+    case FeatureState::unused: break;
+  }
+  return "unused";
+}
+
+class SlamSystem::Impl {
+ public:
+  Impl(const CameraModel& camera, const SlamOptions& options)
+      : camera_(camera), options_(options), undistort_(camera), extractor_(options.features) {
+    camera_.check();
+    options_.check();
+    start();
+  }
+
+  FrameResult process(const RgbdImage& image);
+  void finish();
+  void start();
+
+  CameraModel camera_;
+  SlamOptions options_;
+  UndistortionTable undistort_;
+  OrbExtractor extractor_;
+  std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<KeyframePolicy> policy_;
+  std::unique_ptr<MappingStage> mapping_;
+
+  // A frame of the trajectory hangs on a keyframe, since the world may still move.
+  struct Record {
+    FrameIndex frame;
+    double timestamp;
+    KeyframeId reference;
+    Rigid3 cam_from_reference;
+    Rigid3 world_from_cam_online;
+  };
+  std::vector<Record> records_;
+  FrameIndex next_frame_ = 0;
+  double last_timestamp_ = 0;
+  KeyframeId next_keyframe_ = 0;
+  FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
+  Rigid3 world_from_odom_;
+  bool localise_only_ = false;
+  std::shared_ptr<const RgbdFeatures> features_;
+  std::vector<FeatureState> feature_states_;
+  SlamStatistics statistics_;
+  StageTimes times_;
+
+ private:
+  void take_map(bool wait);
+  std::shared_ptr<const RgbdFeatures> extract(const RgbdImage& image);
+  KeyframeDecision decide(const TrackOutcome& outcome) const;
+  void insert_keyframe(TrackedFrame& frame);
+};
+
+void SlamSystem::Impl::start() {
+  mapping_.reset();
+  const OrbOptions& orb = options_.features;
+  tracker_ = std::make_unique<Tracker>(camera_, options_.noise, orb.scale, orb.levels, options_.tracking, options_.seed);
+  policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
+  mapping_ = std::make_unique<MappingStage>(LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping),
+                                            options_.pipeline.threaded);
+  records_.clear();
+  next_frame_ = 0;
+  next_keyframe_ = 0;
+  world_from_odom_ = {};
+  last_keyframe_frame_ = 0;
+  last_relocalisation_frame_ = -1000000;
+  features_.reset();
+  feature_states_.clear();
+  statistics_ = {};
+  times_ = {};
+}
+
+void SlamSystem::Impl::take_map(bool wait) {
+  const auto view = mapping_->take_due(next_frame_, wait);
+  if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
+}
+
+std::shared_ptr<const RgbdFeatures> SlamSystem::Impl::extract(const RgbdImage& image) {
+  const Stopwatch watch;
+  const OrbFeatures orb = extractor_.extract(image.grey);
+  const Rigid3 colour_from_depth = tracker_->expected_motion(image.timestamp - image.depth_timestamp);
+  auto features = std::make_shared<const RgbdFeatures>(
+      make_rgbd_features(orb, image, camera_, undistort_, colour_from_depth, options_.depth));
+  times_.add("features", watch.ms());
+  return features;
+}
+
+KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
+  const TrackedFrame& frame = outcome.frame;
+  if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, ""};
+  if (localise_only_) return {};
+  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue) return {};
+  KeyframeQuery q;
+  q.frame = frame.index;
+  q.last_keyframe_frame = last_keyframe_frame_;
+  q.last_relocalisation_frame = last_relocalisation_frame_;
+  q.last_keyframe = next_keyframe_ - 1;
+  q.mapper_idle = mapping_->outstanding() == 0;
+  q.tracked_points = frame.inliers;
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    const float z = frame.features->keypoints[f].depth;
+    if (!(z > 0) || z > options_.tracking.close_depth) continue;
+    if (frame.points[f] != kNoPoint)
+      ++q.tracked_close_points;
+    else
+      ++q.creatable_close_points;
+  }
+  q.reference_points = tracker_->reference_point_count(frame.reference, next_keyframe_ > 2 ? 3 : 2);
+  q.cam_from_world = frame.cam_from_world;
+  q.last_keyframe_cam_from_world = tracker_->keyframe_pose(q.last_keyframe);
+  q.points = &frame.points;
+  q.features = frame.features.get();
+  return policy_->decide(q, tracker_->view());
+}
+
+void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
+  const KeyframeId id = next_keyframe_++;
+  KeyframePacket packet = tracker_->make_keyframe(id, frame, {});
+  for (const ProvisionalPoint& p : packet.new_points) feature_states_[static_cast<size_t>(p.feature)] = FeatureState::used;
+  mapping_->push(std::move(packet), frame.index + options_.pipeline.mapper_latency);
+  last_keyframe_frame_ = frame.index;
+  frame.reference = id;
+  frame.cam_from_reference = {};
+  ++statistics_.keyframes_inserted;
+}
+
+// One frame, as in DKB section 3: features, pose, keyframe decision; mapping happens beside it.
+FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
+  if (image.grey.width() != camera_.width || image.grey.height() != camera_.height ||
+      image.depth.width() != camera_.width || image.depth.height() != camera_.height)
+    throw InputError("frame " + std::to_string(next_frame_) + ": its images are not of the camera's size, " +
+                     std::to_string(camera_.width) + " x " + std::to_string(camera_.height));
+  if (next_frame_ > 0 && !(image.timestamp > last_timestamp_))
+    throw InputError("frame " + std::to_string(next_frame_) + ": its stamp is not after the one before it");
+  last_timestamp_ = image.timestamp;
+
+  FrameResult result;
+  const Stopwatch waiting;
+  take_map(!options_.pipeline.realtime);
+  result.wait_ms = waiting.ms();
+  times_.add("wait_mapper", result.wait_ms);
+
+  const Stopwatch tracking;
+  features_ = extract(image);
+  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_, {});
+  TrackedFrame& frame = outcome.frame;
+  if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
+  feature_states_.assign(features_->size(), FeatureState::unused);
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    if (frame.points[f] != kNoPoint) feature_states_[f] = FeatureState::used;
+    if (frame.outlier[f]) feature_states_[f] = FeatureState::outlier;
+  }
+
+  result.frame = next_frame_++;
+  result.timestamp = image.timestamp;
+  result.state = outcome.state;
+  ++statistics_.frames;
+  if (result.tracked()) {
+    if (outcome.state == TrackingState::relocalised) {
+      last_relocalisation_frame_ = frame.index;
+      ++statistics_.relocalisations;
+    }
+    const Stopwatch deciding;
+    const KeyframeDecision decision = decide(outcome);
+    times_.add("keyframe_decision", deciding.ms());
+    if (decision.insert) {
+      ++statistics_.keyframe_rules[name_of(decision.rule)];
+      insert_keyframe(frame);
+    }
+    result.keyframe = decision.insert;
+    result.world_from_cam = frame.cam_from_world.inverse();
+    result.world_from_odom = world_from_odom_;
+    result.odom_from_cam = world_from_odom_.inverse() * result.world_from_cam;
+    result.covariance = frame.covariance;
+    result.inliers = frame.inliers;
+    result.reference = frame.reference;
+    records_.push_back({frame.index, frame.timestamp, frame.reference, frame.cam_from_reference, result.world_from_cam});
+    ++statistics_.tracked;
+  } else if (outcome.state == TrackingState::lost) {
+    ++statistics_.lost;
+  }
+  result.tracking_ms = tracking.ms();
+  times_.add("tracking", result.tracking_ms);
+  return result;
+}
+
+void SlamSystem::Impl::finish() {
+  const auto view = mapping_->drain();
+  if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
+}
+
+SlamSystem::SlamSystem(const CameraModel& camera, const SlamOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
+SlamSystem::~SlamSystem() = default;
+
+FrameResult SlamSystem::process(std::shared_ptr<const RgbdImage> image) { return impl_->process(*image); }
+
+FrameResult SlamSystem::process(double timestamp, const uint8_t* colour, int channels, const uint16_t* depth) {
+  if (channels != 1 && channels != 3) throw InputError("frame: colour images have 1 or 3 channels");
+  const CameraModel& camera = impl_->camera_;
+  auto image = std::make_shared<RgbdImage>();
+  image->timestamp = image->depth_timestamp = timestamp;
+  image->depth = DepthImage(camera.width, camera.height);
+  const size_t pixels = image->depth.size();
+  if (channels == 3) {
+    image->colour = ColourImage(camera.width, camera.height);
+    for (size_t i = 0; i < pixels; ++i) image->colour.data()[i] = {colour[3 * i], colour[3 * i + 1], colour[3 * i + 2]};
+    image->grey = grey_from_colour(image->colour);
+  } else {
+    image->grey = GreyImage(camera.width, camera.height);
+    std::copy(colour, colour + pixels, image->grey.data());
+  }
+  const float metres = static_cast<float>(1.0 / camera.depth_factor);
+  for (size_t i = 0; i < pixels; ++i) image->depth.data()[i] = metres * static_cast<float>(depth[i]);
+  return impl_->process(*image);
+}
+
+void SlamSystem::finish() { impl_->finish(); }
+void SlamSystem::reset() { impl_->start(); }
+void SlamSystem::set_localise_only(bool on) { impl_->localise_only_ = on; }
+
+std::vector<TrajectoryFrame> SlamSystem::trajectory() const {
+  std::vector<TrajectoryFrame> result;
+  for (const auto& r : impl_->records_)
+    result.push_back({r.frame, r.timestamp, (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse()});
+  return result;
+}
+
+std::vector<TrajectoryFrame> SlamSystem::online_trajectory() const {
+  std::vector<TrajectoryFrame> result;
+  for (const auto& r : impl_->records_) result.push_back({r.frame, r.timestamp, r.world_from_cam_online});
+  return result;
+}
+
+std::vector<TrajectoryFrame> SlamSystem::keyframes() const {
+  std::vector<TrajectoryFrame> result;
+  const Map& map = impl_->tracker_->view();
+  for (KeyframeId id : map.live_keyframes()) {
+    const Keyframe& k = *map.keyframe(id);
+    result.push_back({k.frame, k.timestamp, k.cam_from_world.inverse()});
+  }
+  return result;
+}
+
+MapView SlamSystem::map() const { return impl_->tracker_->shared_view(); }
+const std::vector<FeatureState>& SlamSystem::feature_states() const { return impl_->feature_states_; }
+const RgbdFeatures* SlamSystem::features() const { return impl_->features_.get(); }
+const CameraModel& SlamSystem::camera() const { return impl_->camera_; }
+const SlamOptions& SlamSystem::options() const { return impl_->options_; }
+
+SlamStatistics SlamSystem::statistics() const {
+  SlamStatistics s = impl_->statistics_;
+  const Map& map = impl_->tracker_->view();
+  s.keyframes = map.live_keyframe_count();
+  s.map_points = map.point_count();
+  StageTimes times = impl_->times_;
+  if (impl_->mapping_->outstanding() == 0) {  // the mapper is idle, nothing writes what we read
+    s.mapping = impl_->mapping_->mapper().report();
+    times.merge(impl_->mapping_->mapper().times());
+  }
+  s.stages = times.summaries();
+  return s;
+}
+
+}  // namespace dkb

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/candidates.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dkb {
+namespace {
+
+constexpr float kPi = 3.14159265f;
+
+float angle_between(float a, float b) {
+  const float d = std::fabs(a - b);
+  return d > kPi ? 2 * kPi - d : d;
+}
+
+}  // namespace
+
+std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
+                                                 const CameraModel& camera, const Rigid3& cam_from_world, double scale_factor,
+                                                 int levels, const ProjectionMatchOptions& options,
+                                                 const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
+  const Eigen::Matrix3f rotation = cam_from_world.matrix3().cast<float>();
+  const Eigen::Vector3f translation = cam_from_world.translation.cast<float>();
+  const Eigen::Vector3f centre = centre_in_world(cam_from_world).cast<float>();
+  const float fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const float cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  const float width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
+  std::array<float, 32> scales{};
+  for (int l = 0; l < 32; ++l) scales[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l));
+  std::array<float, 32> boundary{};  // level l is the nearest while the scale is below boundary[l]
+  for (int l = 0; l < 32; ++l) boundary[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l + 0.5));
+  const float nearest_scale = 1.0f / static_cast<float>(std::pow(scale_factor, 1.5));
+  const float farthest_scale = static_cast<float>(std::pow(scale_factor, levels + 0.5));
+
+  std::vector<ProjectionMatch> best_of_feature(features.size());
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& c = candidates[i];
+    const Eigen::Vector3f world = c.position.cast<float>();
+    const Eigen::Vector3f p = rotation * world + translation;
+    if (p.z() < 0.05f) continue;
+    const float inv_z = 1.0f / p.z();
+    const float u = fx * p.x() * inv_z + cx, v = fy * p.y() * inv_z + cy;
+    if (!(u >= 0 && v >= 0 && u < width && v < height)) continue;
+    const Eigen::Vector3f ray = centre - world;
+    const float distance = ray.norm();
+    const float scale = c.reference_scale * c.reference_distance / distance;
+    if (scale < nearest_scale || scale > farthest_scale) continue;
+    if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < options.min_view_cosine * distance) continue;
+    if (visible != nullptr) (*visible)[i] = 1;
+    int level = 0;
+    while (level < levels - 1 && scale > boundary[static_cast<size_t>(level)]) ++level;
+    const float radius = options.radius * scales[static_cast<size_t>(level)];
+    int best = 256, second = 256, best_feature = -1, best_level = -1, second_level = -1;
+    features.grid.for_each_near(u, v, radius, [&](int f) {
+      const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
+      if (k.octave < level - 1 || k.octave > level + 1) return;
+      if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;
+      const int d = hamming_distance(c.descriptor, features.descriptors[static_cast<size_t>(f)]);
+      if (d < best) {
+        second = best;
+        second_level = best_level;
+        best = d;
+        best_level = k.octave;
+        best_feature = f;
+      } else if (d < second) {
+        second = d;
+        second_level = k.octave;
+      }
+    });
+    if (best_feature < 0 || best > options.max_distance) continue;
+    if (second_level == best_level && static_cast<float>(best) > options.ratio * static_cast<float>(second)) continue;
+    if (c.angle >= 0 && angle_between(c.angle, features.keypoints[static_cast<size_t>(best_feature)].angle) > 0.6f) continue;
+    ProjectionMatch& match = best_of_feature[static_cast<size_t>(best_feature)];
+    if (best < match.distance) match = {best_feature, static_cast<int>(i), best};
+  }
+  std::vector<ProjectionMatch> result;
+  for (const ProjectionMatch& m : best_of_feature)
+    if (m.feature >= 0) result.push_back(m);
+  return result;
+}
+
+}  // namespace dkb

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/local_map.h"
+
+#include <algorithm>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+std::vector<Covisible> votes_of(const std::vector<PointId>& points, const Map& map) {
+  std::vector<int> votes(static_cast<size_t>(map.keyframe_count()), 0);
+  for (PointId id : points)
+    if (const MapPoint* p = map.point(id))
+      for (const Observation& o : p->observations) ++votes[static_cast<size_t>(o.keyframe)];
+  std::vector<Covisible> ranked;
+  for (size_t k = 0; k < votes.size(); ++k)
+    if (votes[k] > 0) ranked.push_back({static_cast<KeyframeId>(k), votes[k]});
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const Covisible& a, const Covisible& b) { return a.shared_points > b.shared_points; });
+  return ranked;
+}
+
+}  // namespace
+
+void LocalMapOptions::check() const {
+  require_option(voted_keyframes >= 1, "voted_keyframes", voted_keyframes, "at least 1");
+  require_option(neighbours_of_each >= 0, "neighbours_of_each", neighbours_of_each, "at least 0");
+  require_option(keyframes >= 1, "keyframes", keyframes, "at least 1");
+}
+
+KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& map) {
+  const auto ranked = votes_of(points, map);
+  return ranked.empty() ? kNoKeyframe : ranked.front().keyframe;
+}
+
+Candidate candidate_of(const MapPoint& point) {
+  return {point.id, point.position, point.normal, point.reference_distance, point.reference_scale, -1.0f, point.descriptor};
+}
+
+std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map, const LocalMapOptions& options) {
+  const auto ranked = votes_of(points, map);
+  std::vector<KeyframeId> keyframes;
+  const auto add = [&](KeyframeId id) {
+    if (static_cast<int>(keyframes.size()) < options.keyframes &&
+        std::find(keyframes.begin(), keyframes.end(), id) == keyframes.end())
+      keyframes.push_back(id);
+  };
+  const size_t voted = std::min(ranked.size(), static_cast<size_t>(options.voted_keyframes));
+  for (size_t i = 0; i < voted; ++i) add(ranked[i].keyframe);
+  for (size_t i = 0; i < voted; ++i) {
+    const auto& neighbours = map.keyframe(ranked[i].keyframe)->covisible;
+    for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours_of_each)); ++n)
+      add(neighbours[n].keyframe);
+  }
+  std::vector<PointId> ids;
+  for (KeyframeId k : keyframes)
+    for (PointId p : map.keyframe(k)->points)
+      if (p != kNoPoint) ids.push_back(p);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<Candidate> candidates;
+  candidates.reserve(ids.size());
+  for (PointId id : ids)
+    if (const MapPoint* p = map.point(id)) candidates.push_back(candidate_of(*p));
+  return candidates;
+}
+
+}  // namespace dkb

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/features/matching.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+void TrackingOptions::check() const {
+  require_option(initial_points >= 10, "initial_points", initial_points, "at least 10");
+  require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
+  require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
+  require_option(least_inliers_found_again >= 6, "least_inliers_found_again", least_inliers_found_again, "at least 6");
+  require_option(close_depth > 0, "close_depth", close_depth, "greater than 0 m");
+  require_option(least_new_points >= 0, "least_new_points", least_new_points, "at least 0");
+  require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
+  require_option(radius_wide > 0, "radius_wide", radius_wide, "greater than 0 px");
+  require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
+  require_option(refresh_frames >= 1, "refresh_frames", refresh_frames, "at least 1");
+  require_option(recovery_keyframes >= 1, "recovery_keyframes", recovery_keyframes, "at least 1");
+  local_map.check();
+}
+
+const char* name_of(TrackingState state) {
+  switch (state) {
+    case TrackingState::initialising: return "initialising";
+    case TrackingState::tracking: return "tracking";
+    case TrackingState::lost: return "lost";
+    case TrackingState::relocalised: return "relocalised";
+  }
+  return "?";
+}
+
+Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+                 const TrackingOptions& options, uint64_t seed)
+    : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), options_(options), seed_(seed),
+      view_(std::make_shared<const Map>()) {
+  options_.check();
+  noise_.check();
+}
+
+Rigid3 Tracker::keyframe_pose(KeyframeId id) const {
+  if (view_->keyframe(id) != nullptr) return view_->cam_from_world(id);
+  for (const PendingKeyframe& p : pending_)
+    if (p.id == id)
+      return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * keyframe_pose(p.reference);
+  return {};
+}
+
+Rigid3 Tracker::take_view(MapView view) {
+  view_ = std::move(view);
+  candidates_made_ = -1;
+  std::erase_if(pending_, [&](const PendingKeyframe& p) { return view_->keyframe(p.id) != nullptr; });
+  std::erase_if(provisional_, [&](const auto& p) { return view_->keyframe(p.second.keyframe) != nullptr; });
+  if (!last_) return {};
+  const Rigid3 moved = last_->cam_from_reference * keyframe_pose(last_->reference);
+  const Rigid3 new_world_from_old = moved.inverse() * last_->cam_from_world;
+  last_->cam_from_world = moved;
+  for (PointId& p : last_->points)
+    if (p != kNoPoint && !provisional_.contains(p)) p = view_->resolve(p);
+  return new_world_from_old;
+}
+
+Rigid3 Tracker::expected_motion(double seconds) const {
+  if (!velocity_) return {};
+  return rigid3_from_tangent(*velocity_ * seconds);
+}
+
+std::optional<Eigen::Vector3d> Tracker::position(PointId id) const {
+  if (const MapPoint* p = view_->point(id)) return p->position;
+  const auto it = provisional_.find(id);
+  if (it == provisional_.end()) return std::nullopt;
+  return keyframe_pose(it->second.keyframe).inverse() * it->second.point_in_keyframe;
+}
+
+int Tracker::reference_point_count(KeyframeId reference, int observers) const {
+  const Keyframe* k = view_->live_keyframe(reference);
+  int count = 0;
+  if (k == nullptr) {
+    for (const auto& [id, p] : provisional_) count += p.keyframe == reference;
+    return count;
+  }
+  for (PointId id : k->points)
+    if (const MapPoint* p = view_->point(id)) count += static_cast<int>(p->observations.size()) >= observers;
+  return count;
+}
+
+void Tracker::reset_motion() {
+  velocity_.reset();
+  last_.reset();
+  state_ = view_->keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
+}
+
+PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<std::pair<int, Eigen::Vector3d>>& pairs,
+                             const RgbdFeatures& features) const {
+  std::vector<PoseObservation> observations;
+  observations.reserve(pairs.size());
+  for (const auto& [feature, point] : pairs) {
+    const Keypoint& k = features.keypoints[static_cast<size_t>(feature)];
+    PoseObservation o;
+    o.point_in_world = point;
+    o.pixel = k.pixel.cast<double>();
+    o.pixel_sigma = noise_.pixel_sigma * std::pow(scale_factor_, k.octave);
+    o.depth = k.depth;
+    if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
+    observations.push_back(o);
+  }
+  return optimise_pose(camera_, initial, observations);
+}
+
+std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
+                                                const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const {
+  std::vector<Candidate> candidates;
+  const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
+  for (size_t f = 0; f < last_->points.size(); ++f) {
+    const PointId id = last_->points[f];
+    if (id == kNoPoint) continue;
+    const auto at = position(id);
+    if (!at) continue;
+    const Keypoint& k = last_->features->keypoints[f];
+    candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
+                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle, last_->features->descriptors[f]});
+  }
+  ProjectionMatchOptions match;
+  match.radius = static_cast<float>(radius);
+  match.ratio = 0.9f;
+  const auto matches =
+      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, &blocked, nullptr);
+  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  std::vector<std::pair<int, Eigen::Vector3d>> pairs;
+  for (const auto& m : matches) pairs.emplace_back(m.feature, candidates[static_cast<size_t>(m.candidate)].position);
+  const PoseEstimate pose = refine(predicted, pairs, features);
+  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i])
+      points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
+  return pose.cam_from_world;
+}
+
+std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
+                                              const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const {
+  std::vector<Descriptor> descriptors;
+  std::vector<PointId> ids;
+  std::vector<Eigen::Vector3d> positions;
+  for (size_t f = 0; f < keyframe.points.size(); ++f)
+    if (const MapPoint* p = view_->point(keyframe.points[f])) {
+      descriptors.push_back(keyframe.features->descriptors[f]);
+      ids.push_back(p->id);
+      positions.push_back(p->position);
+    }
+  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
+  std::erase_if(matches, [&](const DescriptorMatch& m) { return blocked[static_cast<size_t>(m.b)] != 0; });
+  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  std::vector<PoseObservation> observations;
+  for (const DescriptorMatch& m : matches) {
+    const Keypoint& k = features.keypoints[static_cast<size_t>(m.b)];
+    PoseObservation o;
+    o.point_in_world = positions[static_cast<size_t>(m.a)];
+    o.pixel = k.pixel.cast<double>();
+    o.pixel_sigma = noise_.pixel_sigma * std::pow(scale_factor_, k.octave);
+    o.depth = k.depth;
+    if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
+    observations.push_back(o);
+  }
+  RansacOptions ransac;
+  ransac.seed = seed_ + static_cast<uint64_t>(keyframe.id);
+  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
+  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = ids[static_cast<size_t>(matches[i].a)];
+  return pose.pose;
+}
+
+void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
+  if (candidates_made_ >= 0 && index - candidates_made_ < options_.refresh_frames) return;
+  candidates_ = local_map_candidates(points, *view_, options_.local_map);
+  candidates_made_ = index;
+}
+
+bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, const std::vector<uint8_t>& blocked,
+                              std::vector<PointId>& points, TrackedFrame& frame) {
+  refresh_candidates(points, frame.index);
+  const RgbdFeatures& features = *frame.features;
+  std::vector<uint8_t> taken = blocked;
+  std::vector<PointId> matched;
+  for (size_t f = 0; f < points.size(); ++f)
+    if (points[f] != kNoPoint) {
+      taken[f] = 1;
+      matched.push_back(points[f]);
+    }
+  std::sort(matched.begin(), matched.end());
+  std::vector<Candidate> candidates;
+  candidates.reserve(candidates_.size() + provisional_.size());
+  const auto is_matched = [&](PointId id) { return std::binary_search(matched.begin(), matched.end(), id); };
+  for (const Candidate& c : candidates_)
+    if (!is_matched(c.id)) candidates.push_back(c);
+  for (const auto& [id, p] : provisional_) {
+    if (is_matched(id)) continue;
+    Candidate c;
+    c.id = id;
+    c.position = *position(id);
+    c.normal.setZero();
+    c.reference_distance = static_cast<float>(p.point_in_keyframe.norm());
+    c.reference_scale = p.scale;
+    c.descriptor = p.descriptor;
+    candidates.push_back(c);
+  }
+  ProjectionMatchOptions match;
+  match.radius = static_cast<float>(radius);
+  std::vector<uint8_t> visible(candidates.size(), 0);
+  const auto matches =
+      match_by_projection(candidates, features, camera_, initial, scale_factor_, levels_, match, &taken, &visible);
+  for (const auto& m : matches) points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
+
+  std::vector<std::pair<int, Eigen::Vector3d>> pairs;
+  for (size_t f = 0; f < points.size(); ++f)
+    if (points[f] != kNoPoint) pairs.emplace_back(static_cast<int>(f), *position(points[f]));
+  const PoseEstimate pose = refine(initial, pairs, features);
+  if (!pose.ok || pose.inliers < least_inliers) return false;
+
+  for (size_t i = 0; i < candidates.size(); ++i)
+    if (visible[i]) ++sightings_[candidates[i].id].visible;
+  for (PointId id : matched) ++sightings_[id].visible;
+  frame.points.assign(points.size(), kNoPoint);
+  frame.outlier.assign(points.size(), 0);
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const auto f = static_cast<size_t>(pairs[i].first);
+    if (pose.inlier[i]) {
+      frame.points[f] = points[f];
+      ++sightings_[points[f]].found;
+    } else {
+      frame.outlier[f] = 1;
+    }
+  }
+  frame.cam_from_world = pose.cam_from_world;
+  frame.covariance = pose.covariance;
+  frame.inliers = pose.inliers;
+  return true;
+}
+
+void Tracker::finish(TrackedFrame& frame) {
+  KeyframeId reference = keyframe_sharing_most(frame.points, *view_);
+  // A keyframe that is still being mapped is the reference while most matches are its provisional points.
+  std::map<KeyframeId, int> pending_votes;
+  int lasting = 0;
+  for (PointId p : frame.points) {
+    if (p == kNoPoint) continue;
+    const auto it = provisional_.find(p);
+    if (it != provisional_.end())
+      ++pending_votes[it->second.keyframe];
+    else
+      ++lasting;
+  }
+  for (const auto& [keyframe, votes] : pending_votes)
+    if (reference == kNoKeyframe || votes > lasting) reference = keyframe;
+  frame.reference = reference;
+  frame.cam_from_reference = frame.cam_from_world * keyframe_pose(reference).inverse();
+}
+
+TrackOutcome Tracker::track(FrameIndex index, double timestamp, std::shared_ptr<const RgbdFeatures> features,
+                            const std::vector<uint8_t>& usable) {
+  TrackOutcome outcome;
+  TrackedFrame& frame = outcome.frame;
+  frame.index = index;
+  frame.timestamp = timestamp;
+  frame.features = std::move(features);
+  const size_t n = frame.features->size();
+  frame.points.assign(n, kNoPoint);
+  frame.outlier.assign(n, 0);
+  std::vector<uint8_t> blocked(n, 0);
+  for (size_t f = 0; f < usable.size(); ++f) blocked[f] = usable[f] == 0;
+
+  if (state_ == TrackingState::initialising) {
+    int with_depth = 0;
+    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0 && !blocked[f];
+    if (with_depth < options_.initial_points) return outcome;
+    outcome.wants_first_keyframe = true;
+    outcome.state = state_ = TrackingState::tracking;
+    frame.inliers = with_depth;
+    last_ = frame;
+    return outcome;
+  }
+
+  std::vector<PointId> points(n, kNoPoint);
+  bool tracked = false;
+  if (state_ != TrackingState::lost && last_) {
+    const double dt = timestamp - last_->timestamp;
+    std::optional<Rigid3> pose =
+        track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, *frame.features, blocked, points);
+    if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, *frame.features, blocked, points);
+    if (!pose)
+      if (const Keyframe* k = view_->live_keyframe(last_->reference)) pose = match_keyframe(*k, *frame.features, blocked, points);
+    tracked = pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, blocked, points, frame);
+  }
+  bool found_again = false;
+  if (!tracked) {
+    const auto keyframes = view_->live_keyframes();
+    const size_t tries = std::min(keyframes.size(), static_cast<size_t>(options_.recovery_keyframes));
+    for (size_t i = 0; i < tries && !tracked; ++i) {
+      std::fill(points.begin(), points.end(), kNoPoint);
+      const auto pose = match_keyframe(*view_->keyframe(keyframes[keyframes.size() - 1 - i]), *frame.features, blocked, points);
+      if (!pose) continue;
+      candidates_made_ = -1;
+      tracked = track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, blocked, points, frame);
+      found_again = tracked;
+    }
+  }
+  if (!tracked) {
+    outcome.state = state_ = TrackingState::lost;
+    velocity_.reset();
+    return outcome;
+  }
+  finish(frame);
+  if (found_again || !last_ || timestamp <= last_->timestamp) {
+    velocity_.reset();
+  } else {
+    const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
+    Vector6d tangent;
+    tangent << step.translation, vector_from_rotation(step.rotation);
+    velocity_ = tangent / (timestamp - last_->timestamp);
+  }
+  outcome.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
+  state_ = TrackingState::tracking;
+  last_ = frame;
+  return outcome;
+}
+
+KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame, const std::vector<uint8_t>& usable) {
+  KeyframePacket packet;
+  packet.id = id;
+  packet.frame = frame.index;
+  packet.timestamp = frame.timestamp;
+  packet.features = frame.features;
+  packet.reference = frame.reference;
+  packet.cam_from_reference = frame.reference == kNoKeyframe ? frame.cam_from_world : frame.cam_from_reference;
+  packet.points = frame.points;
+
+  std::vector<std::pair<float, int>> by_depth;
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    const float z = frame.features->keypoints[f].depth;
+    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f] && (usable.empty() || usable[f]))
+      by_depth.emplace_back(z, static_cast<int>(f));
+  }
+  std::sort(by_depth.begin(), by_depth.end());
+  for (const auto& [z, f] : by_depth) {
+    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.least_new_points) break;
+    const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
+    ProvisionalPoint p;
+    p.id = make_point_id(id, f);
+    p.keyframe = id;
+    p.feature = f;
+    p.point_in_keyframe = camera_.unproject(k.pixel.cast<double>(), z);
+    p.scale = static_cast<float>(std::pow(scale_factor_, k.octave));
+    p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
+    packet.new_points.push_back(p);
+  }
+  for (auto& [point, sighting] : sightings_) {
+    sighting.point = point;
+    packet.sightings.push_back(sighting);
+  }
+  sightings_.clear();
+
+  pending_.push_back({id, packet.reference, packet.cam_from_reference});
+  for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
+  if (last_ && last_->index == frame.index) {
+    for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
+    last_->reference = id;  // from here on the frame hangs on its own keyframe
+    last_->cam_from_reference = {};
+  }
+  return packet;
+}
+
+}  // namespace dkb

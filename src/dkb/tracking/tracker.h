@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/map.h"
+#include "dkb/solver/absolute_pose.h"
+#include "dkb/solver/pose_optimiser.h"
+#include "dkb/tracking/candidates.h"
+#include "dkb/tracking/frame.h"
+#include "dkb/tracking/local_map.h"
+
+namespace dkb {
+
+struct TrackingOptions {
+  int initial_points = 100;          // features with depth that the first frame of a map needs, >= 10
+  int least_matches = 20;            // matches with the last frame that make a pose worth trying, >= 6
+  int least_inliers = 20;            // inliers of the final pose; fewer: lost, >= 6
+  int least_inliers_found_again = 30;  // the same when coming back from a loss, >= 6
+  double close_depth = 4.0;          // [m] depths below make map points at once, > 0
+  int least_new_points = 100;        // nearest depths that make points at a keyframe whatever close_depth says, >= 0
+  double radius_last_frame = 10.0;   // [px] search around the motion model's prediction, > 0
+  double radius_wide = 30.0;         // [px] second try, > 0
+  double radius_local_map = 4.0;     // [px] search for local map points under the first pose, > 0
+  int refresh_frames = 5;            // [frames] the choice of local map points is renewed at least so often, >= 1
+  int recovery_keyframes = 8;        // newest keyframes that a lost tracker tries, >= 1
+  LocalMapOptions local_map;
+  void check() const;
+};
+
+enum class TrackingState { initialising, tracking, lost, relocalised };
+const char* name_of(TrackingState state);
+
+struct TrackOutcome {
+  TrackingState state = TrackingState::initialising;
+  TrackedFrame frame;           // pose valid when tracking or relocalised
+  bool wants_first_keyframe = false;  // the frame starts the map
+};
+
+// Frame to pose, against an immutable view of the map and the tracker's own provisional points.
+// Deterministic: the same frames and views in the same order give the same poses.
+class Tracker {
+ public:
+  Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, const TrackingOptions& options,
+          uint64_t seed);
+
+  // A newer view: the last pose is re-expressed through its reference keyframe. Returns how the world moved under the
+  // camera: new_world_from_old_world.
+  Rigid3 take_view(MapView view);
+  const Map& view() const { return *view_; }
+  const MapView& shared_view() const { return view_; }
+
+  // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
+  Rigid3 expected_motion(double seconds) const;
+
+  // `usable` (when not empty): per feature, 0 = must not be matched (it may move).
+  TrackOutcome track(FrameIndex index, double timestamp, std::shared_ptr<const RgbdFeatures> features,
+                     const std::vector<uint8_t>& usable);
+
+  // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
+  KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame, const std::vector<uint8_t>& usable);
+
+  // Pose of a keyframe, also of one that mapping has not published yet.
+  Rigid3 keyframe_pose(KeyframeId id) const;
+  // Points of the reference keyframe that at least `observers` keyframes see.
+  int reference_point_count(KeyframeId reference, int observers) const;
+  // Position of a point that tracking may match, in the world; nothing when it is gone.
+  std::optional<Eigen::Vector3d> position(PointId id) const;
+  // Forgets velocity and the last frame, so that the next frame is found anew in the map.
+  void reset_motion();
+
+ private:
+  PoseEstimate refine(const Rigid3& initial, const std::vector<std::pair<int, Eigen::Vector3d>>& pairs,
+                      const RgbdFeatures& features) const;
+  std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
+                                         const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const;
+  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
+                                       const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const;
+  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, const std::vector<uint8_t>& blocked,
+                       std::vector<PointId>& points, TrackedFrame& frame);
+  void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
+  void finish(TrackedFrame& frame);
+
+  CameraModel camera_;
+  SensorNoise noise_;
+  double scale_factor_;
+  int levels_;
+  TrackingOptions options_;
+  uint64_t seed_;
+
+  MapView view_;
+  struct PendingKeyframe {
+    KeyframeId id, reference;
+    Rigid3 cam_from_reference;
+  };
+  std::vector<PendingKeyframe> pending_;            // keyframes not in the view yet, by id
+  std::map<PointId, ProvisionalPoint> provisional_;
+  std::map<PointId, PointSighting> sightings_;
+
+  TrackingState state_ = TrackingState::initialising;
+  std::optional<TrackedFrame> last_;                // last frame with a pose
+  std::optional<Vector6d> velocity_;                // [m/s, rad/s] tangent of now_cam_from_before_cam
+  std::vector<Candidate> candidates_;               // from the view
+  FrameIndex candidates_made_ = -1;                 // frame of the last refresh; -1 = the view is newer
+};
+
+}  // namespace dkb
