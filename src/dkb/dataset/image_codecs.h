@@ -41,7 +41,7 @@ Picture read_picture(const std::filesystem::path& path);
 GreyImage read_grey(const std::filesystem::path& path);
 
 // Depth [m], 0 = no data. 16-bit grey PNG: value / camera.depth_factor. 32-bit float (TIFF with one channel and without
-// compression, LZW or deflate; PFM; NumPy .npy): metres. Values outside camera.depth_min ... depth_max and values that
+// compression; PFM; NumPy .npy): metres. Values outside camera.depth_min ... depth_max and values that
 // are not finite become 0. Any other type throws InputError.
 DepthImage decode_depth(std::string_view bytes, const std::string& name, const CameraModel& camera);
 DepthImage read_depth(const std::filesystem::path& path, const CameraModel& camera);

@@ -72,7 +72,7 @@ class RgbdReader {
   std::vector<std::unique_ptr<Decoded>> probed_;  // by index; emptied as they are delivered
   BoundedQueue<DatasetFrame> queue_;
   std::atomic<bool> stopped_{false};
-  size_t next_index_ = 0;  // of the thread that decodes
+  size_t next_index_ = 0;  // without a thread
   mutable std::mutex times_mutex_;
   StageTimes times_;
   std::thread thread_;

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/trajectory_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "dkb/dataset/text_rows.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+
+Trajectory read_trajectory(const std::filesystem::path& path) {
+  return parse_trajectory(read_file(path), path.string());
+}
+
+Trajectory parse_trajectory(const std::string& text, const std::string& name) {
+  Trajectory trajectory;
+  for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
+    if (columns.size() < 8)
+      throw InputError(place + ": " + std::to_string(columns.size()) +
+                       " of 8 columns; a row must be `timestamp tx ty tz qx qy qz qw`");
+    static constexpr const char* kNames[] = {"timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+    double v[8];
+    for (size_t i = 0; i < 8; ++i) v[i] = read_number(columns[i], place, kNames[i]);
+    const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
+    const double norm = q.norm();
+    if (!(norm > 1e-9) || norm > 1e9) throw InputError(place + ": the quaternion is not of length 1");
+    const Eigen::Quaterniond unit(q.w() / norm, q.x() / norm, q.y() / norm, q.z() / norm);
+    trajectory.push_back({v[0], std::string(columns[0]), Rigid3(unit, {v[1], v[2], v[3]})});
+  });
+  std::stable_sort(trajectory.begin(), trajectory.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; });
+  return trajectory;
+}
+
+std::string trajectory_to_text(const Trajectory& trajectory) {
+  std::string out = "# timestamp tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : trajectory) {
+    const Eigen::Vector3d& t = pose.world_from_cam.translation;
+    Eigen::Vector4d q = pose.world_from_cam.rotation.coeffs();  // x, y, z, w
+    if (q.w() < 0) q = -q;
+    out += pose.stamp.empty() ? fmt::format("{:.6f}", pose.timestamp) : pose.stamp;
+    out += fmt::format(" {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
+                       q.w());
+  }
+  return out;
+}
+
+void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory) {
+  write_file_atomically(path, trajectory_to_text(trajectory));
+}
+
+}  // namespace dkb

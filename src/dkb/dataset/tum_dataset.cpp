@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/tum_dataset.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/dataset/text_rows.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
+constexpr double kStampRounding = 5e-7;
+
+void require_columns(const std::vector<std::string_view>& columns, size_t wanted, const char* form,
+                     const std::string& place) {
+  if (columns.size() < wanted)
+    throw InputError(place + ": " + std::to_string(columns.size()) + " of " + std::to_string(wanted) +
+                     " columns; a row must be `" + form + "`");
+}
+
+// Checks that each stamp lies after the one of the row before.
+class RisingStamps {
+ public:
+  void add(double timestamp, const std::string& stamp, const std::string& place) {
+    if (!before_.empty() && timestamp == last_)
+      throw InputError(place + ": timestamp " + stamp + " is given twice; remove one of the rows");
+    if (!before_.empty() && timestamp < last_)
+      throw InputError(place + ": timestamp " + stamp + " is not after the line before it (" + before_ +
+                       "); sort the file by time");
+    last_ = timestamp, before_ = stamp;
+  }
+
+ private:
+  double last_ = 0;
+  std::string before_;
+};
+
+}  // namespace
+
+void AssociationOptions::check() const {
+  require_option(std::isfinite(max_difference) && max_difference > 0, "association.max_difference", max_difference,
+                 "greater than 0 s");
+}
+
+void DatasetSelection::check() const {
+  require_option(std::isfinite(start) && start >= 0, "start", start, "at least 0 s");
+  require_option(end >= start, "end", end, "at least start");
+  if (max_frames) require_option(*max_frames >= 1, "max-frames", *max_frames, "at least 1");
+}
+
+std::vector<ListRow> parse_image_list(const std::string& text, const std::string& name) {
+  std::vector<ListRow> rows;
+  RisingStamps rising;
+  for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
+    const double timestamp = read_number(columns[0], place, "timestamp");
+    require_columns(columns, 2, "timestamp filename", place);
+    rows.push_back({timestamp, std::string(columns[0]), std::string(columns[1])});
+    rising.add(timestamp, rows.back().stamp, place);
+  });
+  if (rows.empty()) throw InputError(name + ": holds no row `timestamp filename`");
+  return rows;
+}
+
+std::vector<DatasetPair> parse_associations(const std::string& text, const std::string& name, const fs::path& folder) {
+  std::vector<DatasetPair> pairs;
+  RisingStamps rising;
+  for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
+    DatasetPair pair;
+    pair.timestamp = read_number(columns[0], place, "timestamp");
+    require_columns(columns, 4, "rgb_timestamp rgb_file depth_timestamp depth_file", place);
+    pair.depth_timestamp = read_number(columns[2], place, "depth timestamp");
+    pair.stamp = columns[0], pair.depth_stamp = columns[2];
+    pair.colour_path = folder / columns[1], pair.depth_path = folder / columns[3];
+    rising.add(pair.timestamp, pair.stamp, place);
+    pairs.push_back(std::move(pair));
+  });
+  if (pairs.empty()) throw InputError(name + ": holds no row `rgb_timestamp rgb_file depth_timestamp depth_file`");
+  return pairs;
+}
+
+std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
+                                                 const AssociationOptions& options) {
+  struct Candidate {
+    double difference;
+    size_t i, j;
+  };
+  const double limit = options.max_difference + kStampRounding;
+  std::vector<Candidate> candidates;
+  for (size_t i = 0, first = 0; i < a.size(); ++i) {  // both rise, so the window of near stamps only moves forward
+    while (first < b.size() && b[first] < a[i] - limit) ++first;
+    for (size_t j = first; j < b.size() && b[j] <= a[i] + limit; ++j)
+      candidates.push_back({std::abs(a[i] - b[j]), i, j});
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& x, const Candidate& y) { return x.difference < y.difference; });
+  std::vector<bool> a_used(a.size()), b_used(b.size());
+  std::vector<std::pair<size_t, size_t>> result;
+  for (const Candidate& c : candidates) {
+    if (a_used[c.i] || b_used[c.j]) continue;
+    a_used[c.i] = b_used[c.j] = true;
+    result.emplace_back(c.i, c.j);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& options) {
+  options.check();
+  std::error_code ec;
+  if (!fs::exists(folder, ec)) throw InputError(folder.string() + ": no such folder");
+  if (!fs::is_directory(folder, ec))
+    throw InputError(folder.string() + ": is not a folder; give the folder that holds associations.txt or rgb.txt");
+
+  TumDataset dataset;
+  dataset.folder = folder;
+  const fs::path associations = folder / "associations.txt", rgb = folder / "rgb.txt", depth = folder / "depth.txt";
+  if (fs::exists(associations, ec)) {
+    dataset.list = "associations.txt";
+    dataset.pairs = parse_associations(read_file(associations), associations.string(), folder);
+    return dataset;
+  }
+  for (const fs::path& list : {rgb, depth})
+    if (!fs::exists(list, ec))
+      throw InputError(list.string() + ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt");
+  dataset.list = "rgb.txt and depth.txt";
+  const std::vector<ListRow> colour_rows = parse_image_list(read_file(rgb), rgb.string());
+  const std::vector<ListRow> depth_rows = parse_image_list(read_file(depth), depth.string());
+  std::vector<double> colour_stamps, depth_stamps;
+  for (const ListRow& row : colour_rows) colour_stamps.push_back(row.timestamp);
+  for (const ListRow& row : depth_rows) depth_stamps.push_back(row.timestamp);
+  for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
+    const ListRow &c = colour_rows[i], &d = depth_rows[j];
+    dataset.pairs.push_back({c.timestamp, d.timestamp, c.stamp, d.stamp, folder / c.path, folder / d.path});
+  }
+  if (dataset.pairs.empty())
+    throw InputError(rgb.string() + ": no colour image has a depth image of depth.txt within " +
+                     std::to_string(options.max_difference).substr(0, 5) +
+                     " s; the two lists must be of one recording and one clock");
+  return dataset;
+}
+
+void select_pairs(const DatasetSelection& selection, TumDataset* dataset) {
+  selection.check();
+  auto& pairs = dataset->pairs;
+  if (pairs.empty()) return;
+  const double origin = pairs.front().timestamp, length = pairs.back().timestamp - origin;
+  std::erase_if(pairs, [&](const DatasetPair& pair) {
+    const double t = pair.timestamp - origin;
+    return t < selection.start - kStampRounding || t > selection.end + kStampRounding;
+  });
+  if (pairs.empty())
+    throw InputError(dataset->folder.string() + ": no pair lies between --start and --end; the sequence lasts " +
+                     std::to_string(length) + " s");
+  if (selection.max_frames && static_cast<uint64_t>(*selection.max_frames) < pairs.size())
+    pairs.resize(static_cast<size_t>(*selection.max_frames));
+}
+
+}  // namespace dkb
