@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval_command.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "dkb/dataset/trajectory_file.h"
+#include "dkb/evaluation/evaluation_report.h"
+#include "dkb/evaluation/trajectory_error.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+struct EvalArguments {
+  std::string truth, estimate, rpe_delta = "1f", json, plot;
+  EvaluationOptions options;
+};
+
+Trajectory read_poses(const std::string& path) {
+  Trajectory trajectory = read_trajectory(path);
+  if (trajectory.empty()) throw InputError(path + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
+  return trajectory;
+}
+
+Evaluation evaluate_files(const EvalArguments& arguments) {
+  EvaluationOptions options = arguments.options;
+  options.rpe_delta = parse_rpe_delta(arguments.rpe_delta);
+  const Trajectory truth = read_poses(arguments.truth), estimate = read_poses(arguments.estimate);
+  try {
+    return evaluate(truth, estimate, options);
+  } catch (const InvalidOption&) {
+    throw;
+  } catch (const InputError& e) {
+    throw InputError(arguments.estimate + ": " + e.what());
+  }
+}
+
+void run_eval(const EvalArguments& arguments) {
+  if (!arguments.plot.empty() && fs::path(arguments.plot).extension() != ".svg")
+    throw InputError(arguments.plot + ": plots are SVG pictures; give a name that ends in .svg");
+  const Evaluation evaluation = evaluate_files(arguments);
+  if (!arguments.json.empty()) write_file_atomically(arguments.json, evaluation_json(evaluation));
+  if (!arguments.plot.empty()) {
+    PlotNames names;
+    names.title = fs::path(arguments.estimate).filename().string();
+    write_file_atomically(arguments.plot, evaluation_svg(evaluation, names));
+  }
+  std::fputs(evaluation_table(evaluation).c_str(), stdout);
+}
+
+}  // namespace
+
+void register_eval(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<EvalArguments>();
+  CLI::App* command =
+      app.add_subcommand("eval", "Score a trajectory against the truth: APE and RPE, as evo defines them");
+  command->add_option("GROUNDTRUTH", arguments->truth, "true trajectory (TUM format)")->required();
+  command->add_option("ESTIMATE", arguments->estimate, "estimated trajectory (TUM format)")->required();
+  command->add_option("--max-diff", arguments->options.max_difference, "[s] between matched stamps")
+      ->capture_default_str();
+  command
+      ->add_option("--rpe-delta", arguments->rpe_delta,
+                   "N{f|m|s}: stretch of the relative error in frames, metres or seconds")
+      ->capture_default_str();
+  command->add_flag("--scale", arguments->options.with_scale, "align by a similarity (monocular estimates)");
+  command->add_option("--json", arguments->json, "write the figures to this file");
+  command->add_option("--plot", arguments->plot, "draw paths and errors into this file (.svg)");
+  command->callback([arguments, &exit_code] {
+    run_eval(*arguments);
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/evaluation/evaluation_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace dkb {
+namespace {
+
+std::string table_row(const char* name, const char* unit, const ErrorStatistics& s, int decimals) {
+  if (s.count == 0) return fmt::format("{:<17}{:>4}   no pair of poses is that far apart\n", name, unit);
+  return fmt::format("{:<17}{:>4} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f}\n", name, unit,
+                     s.rmse, decimals, s.mean, decimals, s.median, decimals, s.std, decimals, s.min, decimals, s.max,
+                     decimals);
+}
+
+nlohmann::ordered_json statistics_json(const ErrorStatistics& s) {
+  const auto value = [&](double x) { return s.count == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(x); };
+  return {{"rmse", value(s.rmse)}, {"mean", value(s.mean)}, {"median", value(s.median)},
+          {"std", value(s.std)},   {"min", value(s.min)},   {"max", value(s.max)}};
+}
+
+nlohmann::ordered_json errors_json(const PoseErrors& e) {
+  return {{"translation_m", statistics_json(e.translation)}, {"rotation_deg", statistics_json(e.rotation)}};
+}
+
+}  // namespace
+
+std::string evaluation_table(const Evaluation& e) {
+  const std::string scale =
+      e.options.with_scale ? fmt::format(", scale {:.6f}", e.truth_from_estimate.scale) : std::string();
+  std::string out =
+      fmt::format("{} poses matched ({} estimated, {} true, stamps within {} s{})\n", e.ape.translation_m.size(),
+                  e.estimated_poses, e.truth_poses, e.options.max_difference, scale);
+  out += fmt::format("{:<21} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median", "std", "min",
+                     "max");
+  out += table_row("APE translation", "m", e.ape.translation, 6);
+  out += table_row("APE rotation", "deg", e.ape.rotation, 4);
+  const std::string rpe = "RPE " + to_string(e.options.rpe_delta);
+  out += table_row((rpe + " transl.").c_str(), "m", e.rpe.translation, 6);
+  out += table_row((rpe + " rotation").c_str(), "deg", e.rpe.rotation, 4);
+  return out;
+}
+
+std::string evaluation_json(const Evaluation& e) {
+  nlohmann::ordered_json json;
+  json["matched"] = e.ape.translation_m.size();
+  json["estimated"] = e.estimated_poses;
+  json["scale"] = e.truth_from_estimate.scale;
+  json["ape"] = errors_json(e.ape);
+  json["rpe"] = errors_json(e.rpe);
+  json["rpe"]["delta"] = to_string(e.options.rpe_delta);
+  json["rpe"]["pairs"] = e.rpe_pairs.size();
+  return json.dump(2) + "\n";
+}
+
+}  // namespace dkb
