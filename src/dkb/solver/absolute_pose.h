@@ -30,7 +30,7 @@ struct RansacPose {
   int iterations = 0;
 };
 
-// Poses of a calibrated camera from three points (perspective-3-point, distances by Grunert's quartic): up to 4.
+// Poses of a calibrated camera from three points (perspective-3-point; source in p3p.cpp): up to 4, in front of it.
 // `rays` are unit vectors in the camera. Nothing for degenerate input (collinear points).
 std::vector<Rigid3> solve_p3p(const Eigen::Vector3d (&points_in_world)[3], const Eigen::Vector3d (&rays)[3]);
 
