@@ -78,15 +78,18 @@ class DetectionThread {
     int64_t due = 0;
     DueDetections value;
     std::optional<std::string> error;
+    double ms = 0;
   };
   void work();
   Result run(const Job& job);
+  void finish(Result result);
 
   const std::unique_ptr<Detector> detector_;
   const DetectionSchedule schedule_;
 
   // Tracking's own.
   std::optional<int64_t> next_frame_;  // earliest frame to push; none before the first
+  int64_t first_frame_ = 0;
   bool failed_ = false;
   std::optional<std::string> error_;
   StageTimes wait_times_;
@@ -99,6 +102,8 @@ class DetectionThread {
   std::deque<int64_t> outstanding_;  // due frames of images pushed and not yet answered
   std::deque<Result> results_;
   StageTimes detection_times_;
+  bool first_done_ = false;  // the first image is answered
+  bool broken_ = false;      // the detector threw, though the error may not be due yet
   bool stopping_ = false;
   std::thread thread_;
 };

@@ -11,6 +11,8 @@
 
 namespace dkb {
 
+class OnnxNetwork;
+
 // People, and what they carry, ride, lead or push, by their COCO names. Furniture is left out, since nearly always it
 // stands still; a chair that is pushed is found by motion.
 inline constexpr const char* kMovableClasses =
@@ -48,14 +50,12 @@ class OnnxDetector final : public Detector {
   YoloHead head() const { return head_.kind; }
 
  private:
-  class Network;
-
   OnnxOptions options_;
   int input_width_ = 0, input_height_ = 0;
   HeadLayout head_;
   std::vector<std::string> labels_;
   std::vector<bool> movable_;  // per class
-  std::unique_ptr<Network> network_;
+  std::unique_ptr<OnnxNetwork> network_;
   std::vector<float> blob_;
 };
 
@@ -63,6 +63,6 @@ class OnnxDetector final : public Detector {
 bool onnx_available();
 
 // The names of the 80 COCO classes in the order all YOLO families use.
-const std::vector<std::string>& coco_labels();
+std::vector<std::string> coco_labels();
 
 }  // namespace dkb

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/boxes_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kSameStamp = 0.002;  // [s]
+constexpr std::string_view kSpace = " \t\r\v\f";
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> columns;
+  for (;;) {
+    const size_t first = line.find_first_not_of(kSpace);
+    if (first == std::string_view::npos) return columns;
+    line.remove_prefix(first);
+    columns.push_back(line.substr(0, line.find_first_of(kSpace)));
+    line.remove_prefix(columns.back().size());
+  }
+}
+
+std::string excerpt(std::string_view text) {
+  std::string out(text.substr(0, 40));
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return text.size() > 40 ? out + "..." : out;
+}
+
+double number(std::string_view text, const std::string& place, const char* what) {
+  double value = 0;
+  if (!parse_number(text, &value)) throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a number");
+  if (!(std::abs(value) < 1e12))
+    throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a finite number in range");
+  return value;
+}
+
+struct Row {
+  double timestamp = 0;
+  Detection detection;
+};
+
+Row parse_row(const std::vector<std::string_view>& columns, const std::string& place, int width, int height) {
+  if (columns.size() < 6)
+    throw InputError(place + ": " + std::to_string(columns.size()) +
+                     " of 6 columns; a row must be `rgb_timestamp class x y w h [score]`");
+  Row row;
+  row.timestamp = number(columns[0], place, "timestamp");
+  row.detection.class_name = std::string(columns[1]);
+  const double x = number(columns[2], place, "x"), y = number(columns[3], place, "y");
+  const double w = number(columns[4], place, "w"), h = number(columns[5], place, "h");
+  if (columns.size() > 6) row.detection.score = static_cast<float>(number(columns[6], place, "score"));
+  if (!(w > 0) || !(h > 0))
+    throw InputError(place + fmt::format(": the box is {} x {} px; its size must be positive", w, h));
+  const Box box{static_cast<float>(x), static_cast<float>(y), static_cast<float>(w), static_cast<float>(h)};
+  row.detection.box = clip(box, width, height);
+  if (!(row.detection.box.w > 0) || !(row.detection.box.h > 0))
+    throw InputError(place + fmt::format(": the box at ({}, {}) of {} x {} px lies wholly outside the {} x {} image; "
+                                         "x and y are its top-left corner in pixels",
+                                         x, y, w, h, width, height));
+  return row;
+}
+
+}  // namespace
+
+BoxesByTime parse_boxes(std::string_view text, const std::string& name, int width, int height) {
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  std::vector<Row> rows;
+  for (size_t line_number = 1; !text.empty(); ++line_number) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    const std::vector<std::string_view> columns = split(line);
+    if (columns.empty() || columns.front().front() == '#') continue;
+    rows.push_back(parse_row(columns, name + ":" + std::to_string(line_number), width, height));
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.timestamp < b.timestamp; });
+  BoxesByTime boxes;
+  for (Row& row : rows) {
+    if (boxes.empty() || boxes.back().timestamp != row.timestamp) boxes.push_back({row.timestamp, {}, {}});
+    boxes.back().boxes.push_back(std::move(row.detection));
+  }
+  return boxes;
+}
+
+BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height) {
+  return parse_boxes(read_file(path), path.string(), width, height);
+}
+
+std::string boxes_to_text(const BoxesByTime& boxes) {
+  std::string out = "# rgb_timestamp class x y w h score\n";
+  for (const Detections& at : boxes)
+    for (const Detection& d : at.boxes) {
+      std::string class_name = d.class_name.empty() ? "object" : d.class_name;
+      std::replace_if(
+          class_name.begin(), class_name.end(), [](unsigned char c) { return c <= 0x20; }, '_');
+      out += fmt::format("{:.6f} {} {:.2f} {:.2f} {:.2f} {:.2f} {:.3f}\n", at.timestamp, class_name, d.box.x, d.box.y,
+                         d.box.w, d.box.h, d.score);
+    }
+  return out;
+}
+
+FileDetector::FileDetector(const std::filesystem::path& path, int width, int height)
+    : boxes_(read_boxes(path, width, height)) {}
+
+Detections FileDetector::detect(const RgbdImage& image) {
+  const auto after = std::lower_bound(boxes_.begin(), boxes_.end(), image.timestamp,
+                                      [](const Detections& d, double stamp) { return d.timestamp < stamp; });
+  const Detections* nearest = nullptr;
+  double distance = kSameStamp;
+  for (auto it = after == boxes_.begin() ? after : after - 1; it != boxes_.end() && it <= after; ++it)
+    if (std::abs(it->timestamp - image.timestamp) <= distance) {
+      nearest = &*it;
+      distance = std::abs(it->timestamp - image.timestamp);
+    }
+  Detections found;
+  if (nearest != nullptr) found = *nearest;
+  found.timestamp = image.timestamp;
+  return found;
+}
+
+}  // namespace dkb

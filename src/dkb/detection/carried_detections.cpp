@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/carried_detections.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// The element at `share` (0 ... 1) of the sorted values; 0.5 is the (upper) median.
+float quantile(std::vector<float>& values, double share) {
+  const size_t k = std::min(values.size() - 1, static_cast<size_t>(share * static_cast<double>(values.size())));
+  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(k), values.end());
+  return values[k];
+}
+
+// How one coordinate moves: to = centre + scale * (from - centre) + shift, where the shift lies within low ... high.
+struct AxisMotion {
+  float centre = 0, scale = 1, low = 0, middle = 0, high = 0;
+
+  float at(float value, float shift) const { return centre + scale * (value - centre) + shift; }
+};
+
+using Points = std::vector<const PointMotion*>;
+
+template <class From, class To>
+AxisMotion axis_motion(const Points& points, float centre, float scale, From from, To to) {
+  AxisMotion motion{centre, scale, 0, 0, 0};
+  std::vector<float> shifts;
+  for (const PointMotion* p : points) shifts.push_back(to(*p) - motion.at(from(*p), 0));
+  motion.low = quantile(shifts, 0.25);
+  motion.middle = quantile(shifts, 0.5);
+  motion.high = quantile(shifts, 0.75);
+  return motion;
+}
+
+// Median ratio of the points' distances to their (median) centre, after and before.
+float scale_change(const Points& points, float limit) {
+  std::vector<float> fx, fy, tx, ty;
+  for (const PointMotion* p : points) {
+    fx.push_back(p->from_x);
+    fy.push_back(p->from_y);
+    tx.push_back(p->to_x);
+    ty.push_back(p->to_y);
+  }
+  const float cfx = quantile(fx, 0.5), cfy = quantile(fy, 0.5), ctx = quantile(tx, 0.5), cty = quantile(ty, 0.5);
+  constexpr float kNear = 4;  // [px] shorter distances tell more of noise than of scale
+  std::vector<float> ratios;
+  for (const PointMotion* p : points) {
+    const float before = std::hypot(p->from_x - cfx, p->from_y - cfy);
+    if (before >= kNear) ratios.push_back(std::hypot(p->to_x - ctx, p->to_y - cty) / before);
+  }
+  return ratios.size() < 3 ? 1.0f : std::clamp(quantile(ratios, 0.5), 1 / limit, limit);
+}
+
+bool finite(const PointMotion& p) {
+  return std::isfinite(p.from_x) && std::isfinite(p.from_y) && std::isfinite(p.to_x) && std::isfinite(p.to_y);
+}
+
+// Points of each box: its own (no smaller box holds them), or all inside it where these are too few.
+std::vector<Points> points_of(const std::vector<Detection>& boxes, std::span<const PointMotion> motions,
+                              int min_points) {
+  std::vector<Points> own(boxes.size()), inside(boxes.size());
+  for (const PointMotion& p : motions) {
+    if (!finite(p)) continue;
+    size_t smallest = boxes.size();
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      if (!boxes[i].box.contains(p.from_x, p.from_y)) continue;
+      inside[i].push_back(&p);
+      if (smallest == boxes.size() || boxes[i].box.area() < boxes[smallest].box.area()) smallest = i;
+    }
+    if (smallest < boxes.size()) own[smallest].push_back(&p);
+  }
+  for (size_t i = 0; i < boxes.size(); ++i)
+    if (own[i].size() < static_cast<size_t>(min_points)) own[i] = std::move(inside[i]);
+  return own;
+}
+
+// Takes the mask's pixels inside `from` to where they move.
+void move_mask(const GreyImage& mask, const Box& from, const AxisMotion& x_motion, const AxisMotion& y_motion,
+               GreyImage* out) {
+  const auto source = [](const AxisMotion& m, int value) {
+    return static_cast<int>(std::lround(m.centre + (static_cast<float>(value) - m.middle - m.centre) / m.scale));
+  };
+  const auto first = [](const AxisMotion& m, float value) {
+    return std::max(0, static_cast<int>(std::floor(m.at(value, m.middle))) - 1);
+  };
+  const auto last = [](const AxisMotion& m, float value, int size) {
+    return std::min(size - 1, static_cast<int>(std::ceil(m.at(value, m.middle))) + 1);
+  };
+  for (int y = first(y_motion, from.y); y <= last(y_motion, from.y + from.h, mask.height()); ++y) {
+    const int sy = source(y_motion, y);
+    for (int x = first(x_motion, from.x); x <= last(x_motion, from.x + from.w, mask.width()); ++x) {
+      const int sx = source(x_motion, x);
+      if (mask.contains(sx, sy) && mask(sx, sy) != 0 && from.contains(static_cast<float>(sx), static_cast<float>(sy)))
+        (*out)(x, y) = 255;
+    }
+  }
+}
+
+}  // namespace
+
+void CarryOptions::check() const {
+  require_option(min_points >= 1, "min_points", min_points, ">= 1");
+  require_option(max_scale_step >= 1, "max_scale_step", max_scale_step, ">= 1");
+  require_option(growth_px >= 0, "growth_px", growth_px, ">= 0");
+  require_option(blind_growth >= 0, "blind_growth", blind_growth, ">= 0");
+}
+
+Detections carry(const Detections& from, std::span<const PointMotion> motions, int frames, int width, int height,
+                 const CarryOptions& options) {
+  if (frames <= 0) return from;
+  const std::vector<Points> points = points_of(from.boxes, motions, options.min_points);
+  const auto steps = static_cast<float>(frames);
+  const float scale_limit = std::pow(options.max_scale_step, steps);
+  Detections to;
+  to.timestamp = from.timestamp;
+  to.mask = from.mask;
+  if (!to.mask.empty())
+    for (const Detection& d : from.boxes)
+      for (int y = 0; y < to.mask.height(); ++y)
+        for (int x = 0; x < to.mask.width(); ++x)
+          if (d.box.contains(static_cast<float>(x), static_cast<float>(y))) to.mask(x, y) = 0;
+  for (size_t i = 0; i < from.boxes.size(); ++i) {
+    const Detection& d = from.boxes[i];
+    const float cx = d.box.x + d.box.w / 2, cy = d.box.y + d.box.h / 2;
+    AxisMotion x_motion{cx, 1, 0, 0, 0}, y_motion{cy, 1, 0, 0, 0};
+    float growth = options.growth_px * steps;
+    if (points[i].size() < static_cast<size_t>(options.min_points)) {
+      growth += options.blind_growth * steps * std::max(d.box.w, d.box.h);
+    } else {
+      const float scale = scale_change(points[i], scale_limit);
+      x_motion = axis_motion(
+          points[i], cx, scale, [](const PointMotion& p) { return p.from_x; },
+          [](const PointMotion& p) { return p.to_x; });
+      y_motion = axis_motion(
+          points[i], cy, scale, [](const PointMotion& p) { return p.from_y; },
+          [](const PointMotion& p) { return p.to_y; });
+    }
+    const float left = x_motion.at(d.box.x, x_motion.low) - growth;
+    const float top = y_motion.at(d.box.y, y_motion.low) - growth;
+    const float right = x_motion.at(d.box.x + d.box.w, x_motion.high) + growth;
+    const float bottom = y_motion.at(d.box.y + d.box.h, y_motion.high) + growth;
+    const Box box = clip({left, top, right - left, bottom - top}, width, height);
+    if (box.w > 0 && box.h > 0) to.boxes.push_back({d.class_name, box, d.score});
+    if (!to.mask.empty()) move_mask(from.mask, d.box, x_motion, y_motion, &to.mask);
+  }
+  return to;
+}
+
+}  // namespace dkb

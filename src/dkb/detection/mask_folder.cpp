@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/mask_folder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kSameStamp = 0.002;  // [s]
+
+// Pixels first ... last of one row; `parent` links the runs of a region to its first one.
+struct Run {
+  int y = 0, first = 0, last = 0, parent = 0;
+};
+
+int root_of(std::vector<Run>& runs, int i) {
+  while (runs[i].parent != i) i = runs[i].parent = runs[runs[i].parent].parent;
+  return i;
+}
+
+void join(std::vector<Run>& runs, int a, int b) {
+  a = root_of(runs, a);
+  b = root_of(runs, b);
+  runs[std::max(a, b)].parent = std::min(a, b);
+}
+
+std::vector<Run> connected_runs(const GreyImage& mask) {
+  std::vector<Run> runs;
+  int above = 0;  // first run of the row before
+  for (int y = 0; y < mask.height(); ++y) {
+    const uint8_t* row = mask.row(y);
+    const int begin = static_cast<int>(runs.size());
+    for (int x = 0; x < mask.width(); ++x) {
+      if (row[x] < 128) continue;
+      const int first = x;
+      while (x + 1 < mask.width() && row[x + 1] >= 128) ++x;
+      const int self = static_cast<int>(runs.size());
+      runs.push_back({y, first, x, self});
+      for (int i = above; i < begin; ++i)
+        if (runs[i].first <= x + 1 && runs[i].last >= first - 1) join(runs, i, self);
+    }
+    above = begin;
+  }
+  return runs;
+}
+
+}  // namespace
+
+std::vector<Box> region_boxes(const GreyImage& mask, int min_pixels) {
+  struct Region {
+    int left, right, top, bottom, pixels;
+  };
+  std::vector<Run> runs = connected_runs(mask);
+  std::vector<Region> regions(runs.size(), Region{0, 0, 0, 0, 0});  // at the root's place
+  for (size_t i = 0; i < runs.size(); ++i) {
+    const Run& run = runs[i];
+    Region& region = regions[static_cast<size_t>(root_of(runs, static_cast<int>(i)))];
+    if (region.pixels == 0) region = {run.first, run.last, run.y, run.y, 0};
+    region.left = std::min(region.left, run.first);
+    region.right = std::max(region.right, run.last);
+    region.bottom = run.y;
+    region.pixels += run.last - run.first + 1;
+  }
+  std::erase_if(regions, [&](const Region& r) { return r.pixels == 0 || r.pixels < min_pixels; });
+  std::stable_sort(regions.begin(), regions.end(),
+                   [](const Region& a, const Region& b) { return a.pixels > b.pixels; });
+  std::vector<Box> boxes;
+  for (const Region& r : regions)
+    boxes.push_back({static_cast<float>(r.left), static_cast<float>(r.top), static_cast<float>(r.right - r.left + 1),
+                     static_cast<float>(r.bottom - r.top + 1)});
+  return boxes;
+}
+
+MaskFolder::MaskFolder(const fs::path& folder, Reader reader, const std::vector<double>& stamps, int width, int height)
+    : reader_(std::move(reader)), width_(width), height_(height) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw InputError(folder.string() + ": is no folder; give the folder of STAMP.png masks");
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    double stamp = 0;
+    if (it->path().extension() == ".png" && parse_number(it->path().stem().string(), &stamp) && std::isfinite(stamp))
+      files_.emplace_back(stamp, it->path());
+  }
+  if (error) throw InputError(folder.string() + ": cannot be read (" + error.message() + ")");
+  if (files_.empty())
+    throw InputError(folder.string() + ": holds no mask; masks are named STAMP.png by the colour image's stamp");
+  std::sort(files_.begin(), files_.end());
+  std::vector<double> sorted = stamps;
+  std::sort(sorted.begin(), sorted.end());
+  const fs::path* first = nullptr;
+  for (size_t i = 0; i < sorted.size() && first == nullptr; ++i) first = find(sorted[i]);
+  if (first == nullptr)
+    throw InputError(folder.string() + ": none of its " + std::to_string(files_.size()) +
+                     " masks has the stamp of a colour image (" + files_.front().second.filename().string() +
+                     " is the first); name them as in rgb.txt");
+  read(*first);
+}
+
+const fs::path* MaskFolder::find(double stamp) const {
+  const auto after =
+      std::lower_bound(files_.begin(), files_.end(), stamp, [](const auto& f, double s) { return f.first < s; });
+  const fs::path* nearest = nullptr;
+  double distance = kSameStamp;
+  for (auto it = after == files_.begin() ? after : after - 1; it != files_.end() && it <= after; ++it)
+    if (std::abs(it->first - stamp) <= distance) {
+      nearest = &it->second;
+      distance = std::abs(it->first - stamp);
+    }
+  return nearest;
+}
+
+GreyImage MaskFolder::read(const fs::path& path) const {
+  GreyImage mask = reader_(path);
+  if (mask.width() != width_ || mask.height() != height_)
+    throw InputError(path.string() + ": the mask is " + std::to_string(mask.width()) + " x " +
+                     std::to_string(mask.height()) + " px, the images are " + std::to_string(width_) + " x " +
+                     std::to_string(height_));
+  for (size_t i = 0; i < mask.size(); ++i) mask.data()[i] = mask.data()[i] >= 128 ? 255 : 0;
+  return mask;
+}
+
+Detections MaskFolder::detect(const RgbdImage& image) {
+  Detections found;
+  found.timestamp = image.timestamp;
+  if (const fs::path* path = find(image.timestamp)) {
+    found.mask = read(*path);
+    for (const Box& box : region_boxes(found.mask, min_region)) found.boxes.push_back({"mover", box, 1.0f});
+  }
+  return found;
+}
+
+}  // namespace dkb

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/onnx_network.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kModule = "libdkb_onnx.so";
+
+// The folder of the program or shared library that this code was linked into.
+fs::path own_folder() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<const void*>(&own_folder), &info) == 0 || info.dli_fname == nullptr) return {};
+  const fs::path name = info.dli_fname;  // for a program as it was called, so without a folder when found by PATH
+  std::error_code error;
+  const fs::path self = fs::canonical(name.has_parent_path() ? name : fs::path("/proc/self/exe"), error);
+  return error ? fs::path() : self.parent_path();
+}
+
+// Beside an installed program first; then the build tree, and where this build installs to.
+const DkbOnnxApi* load_module() {
+  std::vector<fs::path> folders;
+  if (const fs::path own = own_folder(); !own.empty())
+    folders = {own, (own / ".." / DKB_MODULE_LIBDIR).lexically_normal()};
+  folders.emplace_back(DKB_MODULE_BUILD_DIR);
+  folders.emplace_back(DKB_MODULE_INSTALL_DIR);
+  for (const fs::path& folder : folders) {
+    // Never closed: OpenCV's threads and statics outlive any network.
+    void* module = folder.empty() ? nullptr : dlopen((folder / kModule).c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (module == nullptr) continue;
+    if (void* symbol = dlsym(module, "dkb_onnx_api_1")) return reinterpret_cast<const DkbOnnxApi* (*)()>(symbol)();
+  }
+  return nullptr;
+}
+
+// OpenCV's message in one line: where it names a layer, that first.
+std::string explain(const std::string& message) {
+  std::string text;
+  for (const char c : message) text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  if (const size_t error = text.find("error: "); error != std::string::npos) text = text.substr(error + 7);
+  if (const size_t code = text.find(") "); text.starts_with("(-") && code != std::string::npos)
+    text = text.substr(code + 2);
+  while (!text.empty() && text.back() == ' ') text.pop_back();
+  return text.size() > 300 ? text.substr(0, 300) + "..." : text;
+}
+
+}  // namespace
+
+bool OnnxNetwork::available() {
+  return load_module() != nullptr;
+}
+
+OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::move(name)), api_(load_module()) {
+  if (api_ == nullptr)
+    throw InputError(name_ + ": this build cannot run ONNX models (" + kModule +
+                     " is not installed beside it); build with OpenCV's dnn module, or use --detector motion");
+  std::array<char, 2048> error{};
+  network_ = api_->open(bytes.data(), bytes.size(), error.data(), error.size());
+  if (network_ == nullptr)
+    throw InputError(name_ + ": OpenCV cannot parse the graph: " + explain(error.data()) +
+                     "; export with opset 12, static shapes and without built-in NMS");
+}
+
+OnnxNetwork::~OnnxNetwork() {
+  api_->close(network_);
+}
+
+std::vector<OnnxNetwork::Output> OnnxNetwork::forward(const std::vector<float>& blob, int width, int height) {
+  std::array<char, 2048> error{};
+  std::array<DkbOnnxTensor, 8> tensors{};
+  const int count = api_->forward(network_, blob.data(), width, height, tensors.data(),
+                                  static_cast<int>(tensors.size()), error.data(), error.size());
+  if (count < 0)
+    throw InputError(name_ + ": OpenCV cannot run the graph at " + std::to_string(width) + " x " +
+                     std::to_string(height) + " px: " + explain(error.data()) +
+                     "; export with opset 12, static shapes and without built-in NMS");
+  std::vector<Output> outputs;
+  for (int i = 0; i < std::min<int>(count, static_cast<int>(tensors.size())); ++i) {
+    const DkbOnnxTensor& tensor = tensors[static_cast<size_t>(i)];
+    size_t size = 1;
+    for (int d = 0; d < tensor.rank; ++d) size *= static_cast<size_t>(tensor.dims[d]);
+    outputs.push_back({{tensor.dims, tensor.dims + tensor.rank}, {tensor.data, size}});
+  }
+  return outputs;
+}
+
+}  // namespace dkb
