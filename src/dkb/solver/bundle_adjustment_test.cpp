@@ -47,5 +47,225 @@ TEST(BundleAdjustment, ReachesTheMinimumThatCeresReaches) {
   }
 }
 
+TEST(BundleAdjustment, WeightsCountAsCeresScalesTheLoss) {  // DKB eq. 48, without depth
+  TestWorld world({.depth_share = 0, .outlier_share = 0.03, .seed = 9});
+  for (BaObservation& o : world.problem.observations) o.weight = o.point % 3 == 0 ? 1.5 : 1.0;
+  BaProblem ours = world.problem, theirs = world.problem;
+  const BaResult result = bundle_adjust(ours, to_convergence());
+  const CeresBa oracle = ceres_bundle_adjust(theirs, {});
+  EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
+  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+}
+
+TEST(BundleAdjustment, ManyCamerasTakeTheSparseWayToTheSameMinimum) {
+  TestWorld world({.cameras = 70, .fixed = 1, .points = 900, .step = 0.2, .visibility = 0.5, .seed = 12});
+  BaProblem ours = world.problem, theirs = world.problem;
+  const BaResult result = bundle_adjust(ours, to_convergence());
+  const CeresBa oracle = ceres_bundle_adjust(theirs, {.solver = ceres::SPARSE_SCHUR});
+  EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
+  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+}
+
+TEST(BundleAdjustment, RecoversTheWorldWithoutNoise) {
+  TestWorld world({.pixel_noise = 0, .depth_noise = 1e-9, .seed = 3});
+  for (BaObservation& o : world.problem.observations) o.inv_depth_sigma = 100;
+  const BaResult result = bundle_adjust(world.problem, to_convergence());
+  EXPECT_LT(result.final_cost, 1e-8);
+  EXPECT_EQ(result.outliers, 0);
+  EXPECT_LT(largest_pose_difference(world.problem.cam_from_world, world.cam_from_world), 1e-7);
+  for (size_t p = 0; p < world.points.size(); ++p) {
+    if (!std::count_if(world.problem.observations.begin(), world.problem.observations.end(),
+                       [&](const BaObservation& o) { return o.point == static_cast<int>(p) && o.depth > 0; })) {
+      continue;
+    }
+    EXPECT_LT((world.problem.points[p] - world.points[p]).norm(), 1e-5);
+  }
+}
+
+TEST(BundleAdjustment, LeavesFixedCamerasAlone) {
+  TestWorld world({.seed = 4});
+  const BaProblem before = world.problem;
+  bundle_adjust(world.problem);
+  for (size_t c = 0; c < before.fixed.size(); ++c) {
+    const bool same = before.cam_from_world[c].translation == world.problem.cam_from_world[c].translation;
+    EXPECT_EQ(same, before.fixed[c] == 1);
+  }
+}
+
+TEST(BundleAdjustment, FindsTheOutliers) {
+  TestWorld world({.outlier_share = 0.1, .seed = 5});
+  const BaResult result = bundle_adjust(world.problem);
+  int missed = 0, wrongly = 0, outliers = 0;
+  for (size_t i = 0; i < world.outlier.size(); ++i) {
+    outliers += world.outlier[i];
+    missed += world.outlier[i] && !result.outlier[i];
+    wrongly += !world.outlier[i] && result.outlier[i];
+  }
+  EXPECT_LT(missed, 0.01 * outliers);
+  EXPECT_LT(wrongly, 0.05 * (world.outlier.size() - outliers));
+  EXPECT_EQ(result.outliers, std::count(result.outlier.begin(), result.outlier.end(), 1));
+  EXPECT_LT(largest_pose_difference(world.problem.cam_from_world, world.cam_from_world), 0.01);
+}
+
+TEST(BundleAdjustment, RemovingOutliersIsLeastSquaresOfTheRestOnceNoneAreLeft) {
+  TestWorld world({.outlier_share = 0.1, .seed = 6});
+  BaOptions options = to_convergence();
+  options.rounds = {20, 20, 20, 60};
+  options.robust_last_round = false;
+  BaProblem ours = world.problem;
+  const BaResult result = bundle_adjust(ours, options);
+  BaProblem theirs = ours;
+  ceres_bundle_adjust(theirs, {.robust = false}, result.outlier);
+  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+}
+
+TEST(BundleAdjustment, PrefilterKeepsWhatIsBeyondTheLimitOut) {  // DKB section 3.3
+  TestWorld world({.outlier_share = 0.1, .pose_error = 0.001, .point_error = 0.001, .seed = 6});
+  BaOptions options = to_convergence();
+  BaProblem with = world.problem;
+  options.prefilter = true;
+  const BaResult filtered = bundle_adjust(with, options);
+  options.prefilter = false;
+  BaProblem without = world.problem;
+  const BaResult all = bundle_adjust(without, options);
+  EXPECT_LT(filtered.initial_cost, 0.5 * all.initial_cost);
+  EXPECT_LE(filtered.initial_cost, 7.815 * static_cast<double>(world.problem.observations.size()));
+}
+
+TEST(BundleAdjustment, RepeatedObservationsCountTwice) {
+  TestWorld world({.cameras = 5, .fixed = 2, .points = 60, .seed = 8});
+  BaProblem twice = world.problem, doubled = world.problem;
+  twice.observations.insert(twice.observations.end(), world.problem.observations.begin(),
+                            world.problem.observations.end());
+  for (BaObservation& o : doubled.observations) {
+    o.inv_sigma *= std::sqrt(2.0);
+    o.inv_depth_sigma *= std::sqrt(2.0);
+  }
+  BaOptions options = to_convergence();
+  options.chi2_pixel = options.chi2_depth = 1e9;  // least squares
+  const BaResult a = bundle_adjust(twice, options), b = bundle_adjust(doubled, options);
+  EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * b.final_cost);
+  EXPECT_LT(largest_pose_difference(twice.cam_from_world, doubled.cam_from_world), 1e-8);
+}
+
+TEST(BundleAdjustment, APriorHoldsWhatObservationsDoNot) {
+  // No camera is fixed and nothing measures the world's place: the prior alone does.
+  TestWorld world(
+      {.cameras = 4, .fixed = 0, .points = 200, .pixel_noise = 0, .depth_noise = 1e-9, .pose_error = 0.01, .seed = 2});
+  for (BaObservation& o : world.problem.observations) o.inv_depth_sigma = 100;
+  world.problem.priors.push_back({1, world.cam_from_world[1], 1e4 * Matrix6d::Identity()});
+  const BaResult result = bundle_adjust(world.problem, to_convergence());
+  EXPECT_LT(result.final_cost, 1e-6);
+  EXPECT_LT(largest_pose_difference(world.problem.cam_from_world, world.cam_from_world), 1e-5);
+}
+
+TEST(BundleAdjustment, ARelativePoseLeadsACameraWithoutObservations) {
+  TestWorld world({.cameras = 5, .fixed = 2, .points = 200, .seed = 2});
+  BaProblem& problem = world.problem;
+  const int extra = static_cast<int>(problem.cam_from_world.size());
+  problem.cam_from_world.push_back(Rigid3());
+  problem.fixed.push_back(0);
+  const Rigid3 extra_from_4(rotation_from_vector({0.1, 0.2, -0.1}), {0.3, 0.1, 0.2});
+  problem.relative_poses.push_back({4, extra, extra_from_4, 100 * Matrix6d::Identity()});
+  const BaResult result = bundle_adjust(problem, to_convergence());
+  expect_finite(problem, result);
+  const Rigid3 expected = extra_from_4 * problem.cam_from_world[4];
+  EXPECT_LT(largest_pose_difference({problem.cam_from_world[extra]}, {expected}), 1e-6);
+  // The same from the other end.
+  problem.relative_poses[0] = {extra, 4, extra_from_4.inverse(), 100 * Matrix6d::Identity()};
+  problem.cam_from_world[extra] = Rigid3();
+  bundle_adjust(problem, to_convergence());
+  EXPECT_LT(largest_pose_difference({problem.cam_from_world[extra]}, {extra_from_4 * problem.cam_from_world[4]}), 1e-6);
+}
+
+TEST(BundleAdjustment, APointOnOneRayMovesOnlyAcrossIt) {
+  BaProblem problem;
+  problem.cam_from_world = {Rigid3()};
+  problem.fixed = {1};
+  problem.points = {{0.2, 0.1, 2.0}, {0.0, 0.0, 1.0}};
+  BaObservation o;
+  const Eigen::Vector2d pixel = problem.camera.project({0.21, 0.1, 2.0});
+  o.u = pixel.x(), o.v = pixel.y();
+  problem.observations = {o};
+  const BaResult result = bundle_adjust(problem);
+  EXPECT_LT(result.final_cost, 1e-6);
+  EXPECT_LT((problem.points[0] - Eigen::Vector3d(0.2, 0.1, 2.0)).norm(), 0.0101);
+  EXPECT_EQ(problem.points[1], Eigen::Vector3d(0, 0, 1));  // nobody sees it
+}
+
+TEST(BundleAdjustment, ObservationsBehindTheirCameraAreOutliersAndDoNoHarm) {
+  TestWorld world({.seed = 3});
+  BaProblem with = world.problem;
+  for (int k = 0; k < 40; ++k) {
+    BaObservation o = with.observations[17 * k];
+    const Rigid3& pose = with.cam_from_world[o.camera];
+    o.point = static_cast<int>(with.points.size());
+    with.points.push_back(pose.inverse() * Eigen::Vector3d(0.2, 0.1, k % 2 ? 0.0 : -1.0));
+    with.observations.push_back(o);
+  }
+  BaProblem without = world.problem;
+  const BaResult a = bundle_adjust(with), b = bundle_adjust(without);
+  expect_finite(with, a);
+  EXPECT_LT(largest_pose_difference(with.cam_from_world, without.cam_from_world), 1e-9);
+  EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * b.final_cost);
+  for (size_t i = world.problem.observations.size(); i < with.observations.size(); ++i) EXPECT_TRUE(a.outlier[i]);
+}
+
+TEST(BundleAdjustment, DegenerateProblemsStayFinite) {
+  BaProblem empty;
+  EXPECT_EQ(bundle_adjust(empty).final_cost, 0);
+
+  TestWorld world({.cameras = 3, .fixed = 0, .points = 30, .depth_share = 0, .seed = 3});
+  BaProblem free = world.problem;  // nothing fixed, no scale: seven directions without information
+  const BaResult result = bundle_adjust(free);
+  expect_finite(free, result);
+  EXPECT_LE(result.final_cost, result.initial_cost);
+
+  BaProblem unobserved = world.problem;
+  unobserved.observations.clear();
+  expect_finite(unobserved, bundle_adjust(unobserved));
+
+  BaProblem all_fixed = world.problem;
+  all_fixed.fixed.assign(3, 1);
+  expect_finite(all_fixed, bundle_adjust(all_fixed));
+
+  BaProblem single = world.problem;  // each point along one ray
+  std::erase_if(single.observations, [](const BaObservation& o) { return o.camera != 0; });
+  expect_finite(single, bundle_adjust(single));
+
+  BaProblem one_place = world.problem;  // all points in one place
+  for (Eigen::Vector3d& point : one_place.points) point = {0, 0, 2};
+  expect_finite(one_place, bundle_adjust(one_place));
+}
+
+TEST(BundleAdjustment, TheSameInputGivesTheSameBits) {
+  const TestWorld world({.outlier_share = 0.05, .seed = 8});
+  BaProblem a = world.problem, b = world.problem;
+  const BaResult first = bundle_adjust(a), second = bundle_adjust(b);
+  EXPECT_EQ(first.final_cost, second.final_cost);
+  EXPECT_EQ(first.outlier, second.outlier);
+  EXPECT_EQ(a.points, b.points);
+  for (size_t c = 0; c < a.cam_from_world.size(); ++c) {
+    EXPECT_EQ(a.cam_from_world[c].translation, b.cam_from_world[c].translation);
+    EXPECT_EQ(a.cam_from_world[c].rotation.coeffs(), b.cam_from_world[c].rotation.coeffs());
+  }
+}
+
+TEST(BundleAdjustment, RefusesIndicesThatDoNotFit) {
+  TestWorld world({.cameras = 2, .points = 10});
+  BaProblem problem = world.problem;
+  problem.observations[0].point = 10;
+  EXPECT_THROW(bundle_adjust(problem), InputError);
+  problem = world.problem;
+  problem.observations[0].camera = -1;
+  EXPECT_THROW(bundle_adjust(problem), InputError);
+  problem = world.problem;
+  problem.fixed.pop_back();
+  EXPECT_THROW(bundle_adjust(problem), InputError);
+  BaOptions options;
+  options.rounds = {};
+  EXPECT_THROW(bundle_adjust(problem, options), InvalidOption);
+}
+
 }  // namespace
 }  // namespace dkb

@@ -53,6 +53,7 @@ struct CeresBaOptions {
   int iterations = 50;
   double relative_tolerance = 1e-12;
   bool robust = true;
+  bool fixed_points = false;
   double chi2_pixel = 5.991, chi2_depth = 7.815;
   ceres::LinearSolverType solver = ceres::DENSE_SCHUR;
 };
@@ -90,6 +91,11 @@ inline CeresBa ceres_bundle_adjust(BaProblem& problem, const CeresBaOptions& opt
   for (size_t c = 0; c < poses.size(); ++c) {
     if (problem.fixed[c] && ceres_problem.HasParameterBlock(poses[c].data())) {
       ceres_problem.SetParameterBlockConstant(poses[c].data());
+    }
+  }
+  if (options.fixed_points) {
+    for (Eigen::Vector3d& point : problem.points) {
+      if (ceres_problem.HasParameterBlock(point.data())) ceres_problem.SetParameterBlockConstant(point.data());
     }
   }
   ceres::Solver::Options solver;

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/solver/geometric_weights.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/solver/test_world.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// Six centres on the axes at distance a: covariance diag(a^2, a^2, a^2) / 3.
+const std::vector<Eigen::Vector3d> kOctahedron = {{0.3, 0, 0},  {-0.3, 0, 0}, {0, 0.3, 0},
+                                                  {0, -0.3, 0}, {0, 0, 0.3},  {0, 0, -0.3}};
+
+TEST(GeometricWeights, LambdaIsTheSmallestEigenvalueOfTheCentres) {  // DKB eqs. 45, 46
+  const std::vector<int> observers = {0, 1, 2, 3, 4, 5, 0, 1, 2, 3}, first = {0, 6, 10};
+  const GeometricWeights w = classify_points(kOctahedron, observers, first);
+  EXPECT_NEAR(w.lambda3[0], 0.09 / 3, 1e-15);
+  EXPECT_NEAR(w.lambda3[1], 0, 1e-15);  // four centres in a plane
+}
+
+TEST(GeometricWeights, ThresholdIsMeanPlusDeviationAndEdgesAreBeyondIt) {  // DKB eq. 47
+  // lambda3 = 0.03 once and 0 nine times: mean 0.003, deviation sqrt(0.0009 / 10 - 0.000009) = 0.009.
+  std::vector<int> observers = {0, 1, 2, 3, 4, 5}, first = {0, 6};
+  for (int k = 0; k < 9; ++k) {
+    observers.insert(observers.end(), {0, 1, 2, 3});
+    first.push_back(static_cast<int>(observers.size()));
+  }
+  const GeometricWeights w = classify_points(kOctahedron, observers, first, {.edge_weight = 1.4});
+  EXPECT_NEAR(w.theta_planar, 0.012, 1e-12);
+  EXPECT_EQ(w.shape[0], PointShape::edge);
+  EXPECT_EQ(w.edges, 1);
+  EXPECT_EQ(w.weight(0), 1.4);
+  EXPECT_EQ(w.weight(1), 1.0);
+}
+
+TEST(GeometricWeights, DegenerateClassesArePlanar) {
+  // Fewer than four observers, and a threshold below 1e-8 m^2.
+  EXPECT_EQ(classify_points(kOctahedron, std::vector<int>{0, 2, 4}, std::vector<int>{0, 3}).edges, 0);
+  std::vector<Eigen::Vector3d> tight = kOctahedron;
+  for (Eigen::Vector3d& c : tight) c *= 1e-4;
+  std::vector<int> observers = {0, 1, 2, 3, 4, 5}, first = {0, 6, 6, 6, 6};
+  EXPECT_EQ(classify_points(kOctahedron, observers, first).edges, 1);
+  EXPECT_EQ(classify_points(tight, observers, first).edges, 0);
+  // Equal values: none is beyond mean + 0.
+  EXPECT_EQ(classify_points(kOctahedron, observers, std::vector<int>{0, 6}).edges, 0);
+  EXPECT_EQ(classify_points(kOctahedron, {}, std::vector<int>{0}).edges, 0);
+}
+
+TEST(GeometricWeights, RefusesListsThatDoNotFit) {
+  EXPECT_THROW(classify_points(kOctahedron, std::vector<int>{0, 6}, std::vector<int>{0, 2}), InputError);
+  EXPECT_THROW(classify_points(kOctahedron, std::vector<int>{0, 1}, std::vector<int>{0, 3}), InputError);
+  EXPECT_THROW(classify_points(kOctahedron, {}, std::vector<int>{0}, {.edge_weight = 0}), InvalidOption);
+}
+
+TEST(GeometricWeights, AreWrittenToAllObservationsOfAPoint) {  // DKB eq. 48
+  TestWorld world({.cameras = 10, .points = 300, .visibility = 0.6, .seed = 3});
+  // A second observation by the same keyframe is no second observer.
+  world.problem.observations.push_back(world.problem.observations.front());
+  const GeometricWeights w = set_geometric_weights(world.problem);
+  EXPECT_GT(w.edges, 0);
+  EXPECT_LT(w.edges, 150);
+  for (const BaObservation& o : world.problem.observations) {
+    EXPECT_EQ(o.weight, w.shape[o.point] == PointShape::edge ? 1.5 : 1.0);
+  }
+}
+
+TEST(GeometricWeights, AdaptiveWeightIsTheRatioOfTheVariances) {
+  TestWorld world({.cameras = 14,
+                   .points = 1500,
+                   .pixel_noise = 0,
+                   .depth_noise = 0.01,
+                   .visibility = 0.5,
+                   .pose_error = 0,
+                   .point_error = 0,
+                   .seed = 3});
+  GeometricWeightOptions options{.adaptive = true, .adaptive_max = 4};
+  const GeometricWeights shapes = set_geometric_weights(world.problem, options);
+  ASSERT_GT(shapes.edges, 100);
+  Random random(5);
+  // Noise of edge points is half that of planar ones: variance ratio 4 in measured, 0.7 sigma so that few are cut off.
+  // The true state's residuals have lost no degrees of freedom, but the estimate takes them off both classes alike.
+  for (BaObservation& o : world.problem.observations) {
+    const double sigma = (shapes.shape[o.point] == PointShape::edge ? 0.35 : 0.7) / o.inv_sigma;
+    o.u += sigma * random.normal();
+    o.v += sigma * random.normal();
+  }
+  options.adaptive_redundancy = 1e-3;
+  EXPECT_NEAR(set_geometric_weights(world.problem, options).edge_weight, 3.95, 0.35);
+  options.adaptive_max = 2;
+  EXPECT_EQ(set_geometric_weights(world.problem, options).edge_weight, 2);
+  options.adaptive_redundancy = 1e9;  // nothing is believed
+  EXPECT_NEAR(set_geometric_weights(world.problem, options).edge_weight, 1, 1e-3);
+}
+
+}  // namespace
+}  // namespace dkb
