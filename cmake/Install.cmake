@@ -42,11 +42,8 @@ endif()
 
 install(TARGETS dkb_all dkb_compile_options ${rooms} EXPORT dkb_slamTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT dkb_slamTargets NAMESPACE dkb_slam:: DESTINATION ${package_dir})
-foreach(room ${rooms})
-  string(REGEX REPLACE "^dkb_" "" folder ${room})
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/dkb/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/dkb
-    FILES_MATCHING PATTERN "*.h" PATTERN "*_test*" EXCLUDE)
-endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/dkb DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  FILES_MATCHING PATTERN "*.h" PATTERN "*.inl" PATTERN "*_test*" EXCLUDE PATTERN "test_*" EXCLUDE PATTERN "*oracle*" EXCLUDE)
 if(TARGET dkb-slam)
   install(TARGETS dkb-slam RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()

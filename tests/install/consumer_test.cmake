@@ -25,8 +25,14 @@ foreach(file ${package_files})
 endforeach()
 file(RENAME ${WORK_DIR}/installed ${WORK_DIR}/moved)
 
+# Every installed header compiles outside the project.
+file(GLOB_RECURSE headers RELATIVE ${WORK_DIR}/moved/include ${WORK_DIR}/moved/include/*.h)
+list(TRANSFORM headers REPLACE "(.+)" "#include <\\1>\n")
+list(JOIN headers "" includes)
+file(WRITE ${WORK_DIR}/all_headers.cpp "${includes}")
+
 run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${WORK_DIR}/consumer -G ${GENERATOR} -D CMAKE_BUILD_TYPE=${CONFIG}
   -D CMAKE_CXX_COMPILER=${CXX_COMPILER} -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
-  -D CMAKE_PREFIX_PATH=${WORK_DIR}/moved)
+  -D CMAKE_PREFIX_PATH=${WORK_DIR}/moved -D ALL_HEADERS=${WORK_DIR}/all_headers.cpp)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/consumer --config ${CONFIG})
 run(${WORK_DIR}/consumer/consumer)
