@@ -5,7 +5,7 @@
 
 namespace dkb {
 
-using FrameIndex = int;     // counts the frames that a system was given, from 0
+using FrameIndex = int;      // counts the frames that a system was given, from 0
 using KeyframeId = int32_t;  // counts keyframes in order of insertion, from 0; never used again
 inline constexpr KeyframeId kNoKeyframe = -1;
 
@@ -19,7 +19,11 @@ inline constexpr PointId kNoPoint = 0xffffffffu;
 constexpr PointId make_point_id(KeyframeId birth, int feature) {
   return (static_cast<PointId>(birth) << kPointFeatureBits) | static_cast<PointId>(feature);
 }
-constexpr KeyframeId birth_keyframe(PointId id) { return static_cast<KeyframeId>(id >> kPointFeatureBits); }
-constexpr int birth_feature(PointId id) { return static_cast<int>(id & (kMaxFeaturesPerFrame - 1)); }
+constexpr KeyframeId birth_keyframe(PointId id) {
+  return static_cast<KeyframeId>(id >> kPointFeatureBits);
+}
+constexpr int birth_feature(PointId id) {
+  return static_cast<int>(id & (kMaxFeaturesPerFrame - 1));
+}
 
 }  // namespace dkb

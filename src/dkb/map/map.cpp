@@ -20,10 +20,8 @@ void drop_covisible(std::vector<Covisible>& list, KeyframeId id) {
 
 }  // namespace
 
-MapView Map::snapshot() {
-  auto view = std::make_shared<const Map>(*this);
-  ++epoch_;  // all that is shared now is older than the epoch, so the next write copies it
-  return view;
+MapView Map::snapshot() const {
+  return std::make_shared<const Map>(*this);
 }
 
 const Keyframe* Map::keyframe(KeyframeId id) const {
@@ -89,11 +87,24 @@ std::vector<PointId> Map::live_points() const {
   return ids;
 }
 
+std::vector<RemovedPoint> Map::removed_points() const {
+  std::vector<RemovedPoint> removed;
+  for (const auto& block : blocks_) {
+    if (!block.value) continue;
+    for (int16_t s : block.value->slot_of_feature) {
+      if (s < 0) continue;
+      const PointSlot& gone = block.value->slots[static_cast<size_t>(s)];
+      if (!gone.alive) removed.push_back({gone.point.id, gone.replaced_by});
+    }
+  }
+  return removed;
+}
+
 Keyframe& Map::edit(KeyframeId id) {
   Shared<Keyframe>& shared = keyframes_.at(static_cast<size_t>(id));
-  if (shared.epoch != epoch_) {
+  if (shared.epoch != epoch_.value()) {
     shared.value = std::make_shared<Keyframe>(*shared.value);
-    shared.epoch = epoch_;
+    shared.epoch = epoch_.value();
   }
   return *shared.value;
 }
@@ -102,9 +113,9 @@ Map::PointBlock& Map::edit_block(KeyframeId birth) {
   const auto index = static_cast<size_t>(birth);
   if (blocks_.size() <= index) blocks_.resize(index + 1);
   Shared<PointBlock>& shared = blocks_[index];
-  if (shared.epoch != epoch_) {
+  if (shared.epoch != epoch_.value()) {
     shared.value = shared.value ? std::make_shared<PointBlock>(*shared.value) : std::make_shared<PointBlock>();
-    shared.epoch = epoch_;
+    shared.epoch = epoch_.value();
   }
   return *shared.value;
 }
@@ -120,7 +131,7 @@ void Map::add_keyframe(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   const std::vector<PointId> points = std::move(keyframe.points);
   keyframe.points.assign(keyframe.features->size(), kNoPoint);
-  keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_});
+  keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_.value()});
   ++live_keyframe_count_;
   for (size_t i = 0; i < points.size(); ++i) {
     const PointId p = resolve(points[i]);
@@ -129,13 +140,19 @@ void Map::add_keyframe(Keyframe keyframe) {
 }
 
 void Map::add_point(MapPoint point) {
-  if (slot(point.id) != nullptr) throw std::logic_error("map: point " + std::to_string(point.id) + " was born before");
-  PointBlock& block = edit_block(birth_keyframe(point.id));
-  const auto feature = static_cast<size_t>(birth_feature(point.id));
+  const PointId id = point.id;
+  if (id == kNoPoint) throw std::logic_error("map: a point without an id");
+  if (slot(id) != nullptr) throw std::logic_error("map: point " + std::to_string(id) + " was born before");
+  add_slot(id, {std::move(point), true, kNoPoint});
+  ++point_count_;
+}
+
+void Map::add_slot(PointId id, PointSlot slot) {
+  PointBlock& block = edit_block(birth_keyframe(id));
+  const auto feature = static_cast<size_t>(birth_feature(id));
   if (block.slot_of_feature.size() <= feature) block.slot_of_feature.resize(feature + 1, -1);
   block.slot_of_feature[feature] = static_cast<int16_t>(block.slots.size());
-  block.slots.push_back({std::move(point), true, kNoPoint});
-  ++point_count_;
+  block.slots.push_back(std::move(slot));
 }
 
 void Map::observe(PointId point_id, KeyframeId keyframe_id, int feature) {
@@ -227,6 +244,14 @@ void Map::update_covisibility(KeyframeId id, int least_shared_points) {
     drop_covisible(list, id);
     add_covisible(list, {id, c.shared_points});
   }
+}
+
+void Map::set_parent(KeyframeId id, KeyframeId parent) {
+  while (keyframe(parent) != nullptr && keyframe(parent)->culled) parent = keyframe(parent)->parent;
+  for (const Keyframe* k = keyframe(parent); k != nullptr; k = keyframe(k->parent))
+    if (k->id == id)
+      throw std::logic_error("map: keyframe " + std::to_string(id) + " cannot hang on its own descendant");
+  edit(id).parent = parent;
 }
 
 void Map::cull_keyframe(KeyframeId id) {

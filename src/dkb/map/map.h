@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -42,11 +43,18 @@ struct Keyframe {
   double timestamp = 0;                          // [s]
   std::shared_ptr<const RgbdFeatures> features;  // immutable; empty once culled
   Rigid3 cam_from_world;
-  std::vector<PointId> points;                   // per feature; kNoPoint where it shows none
-  std::vector<Covisible> covisible;              // by decreasing shared_points, then increasing id
-  KeyframeId parent = kNoKeyframe;               // spanning tree; the first keyframe has none
-  Rigid3 cam_from_parent;                        // frozen when culled: the pose then follows the parent
+  std::vector<PointId> points;       // per feature; kNoPoint where it shows none
+  std::vector<Covisible> covisible;  // by decreasing shared_points, then increasing id
+  KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
+  Rigid3 cam_from_parent;            // frozen when culled: the pose then follows the parent
   bool culled = false;
+};
+
+// A point that is no more.
+struct RemovedPoint {
+  PointId id = kNoPoint;
+  PointId replaced_by = kNoPoint;  // the point that it was fused into, which may itself be gone by now
+  bool operator==(const RemovedPoint&) const = default;
 };
 
 // Keyframes, map points and who sees what. A value with structural sharing: a copy shares all that neither side has
@@ -56,7 +64,12 @@ struct Keyframe {
 class Map {
  public:
   // Immutable view of the map as it is now. Later writes copy what they touch.
-  std::shared_ptr<const Map> snapshot();
+  std::shared_ptr<const Map> snapshot() const;
+
+  // A map from its parts, as a map file holds them: keyframes 0, 1, ... with their points and covisibility; live and
+  // removed points by increasing id. Observations are made from the keyframes' points. Throws InputError saying which
+  // part contradicts which, when the parts could not be those of a map.
+  static Map restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, std::vector<RemovedPoint> removed);
 
   // --- reading. Ids that are unknown, or point to what was removed, give null.
   KeyframeId keyframe_count() const { return static_cast<KeyframeId>(keyframes_.size()); }  // culled ones included
@@ -67,8 +80,9 @@ class Map {
   PointId resolve(PointId id) const;
   // Pose of any keyframe ever made; culled ones ride on their parents.
   Rigid3 cam_from_world(KeyframeId id) const;
-  std::vector<KeyframeId> live_keyframes() const;  // increasing
-  std::vector<PointId> live_points() const;        // increasing
+  std::vector<KeyframeId> live_keyframes() const;    // increasing
+  std::vector<PointId> live_points() const;          // increasing
+  std::vector<RemovedPoint> removed_points() const;  // by increasing id
   size_t point_count() const { return point_count_; }
   int live_keyframe_count() const { return live_keyframe_count_; }
 
@@ -85,7 +99,9 @@ class Map {
   void update_covisibility(KeyframeId id, int least_shared_points);
   // Removes a keyframe's observations; it and its children hang on its parent from now on.
   void cull_keyframe(KeyframeId id);
-  void set_parent(KeyframeId id, KeyframeId parent) { edit(id).parent = parent; }
+  // Hangs `id` on `parent`, or on the nearest ancestor of it that is live. Throws std::logic_error when `parent` hangs
+  // on `id` itself.
+  void set_parent(KeyframeId id, KeyframeId parent);
 
  private:
   struct PointSlot {
@@ -93,10 +109,32 @@ class Map {
     bool alive = false;
     PointId replaced_by = kNoPoint;
   };
-  struct PointBlock {                     // the points born at one keyframe
+  struct PointBlock {                      // the points born at one keyframe
     std::vector<int16_t> slot_of_feature;  // -1 = none
     std::vector<PointSlot> slots;
   };
+  // Counts the copies that were made of a map. Both sides of a copy are newer than all they share, so whoever writes
+  // first takes a copy of its own. Atomic because several threads may copy the same (immutable) view.
+  class Epoch {
+   public:
+    Epoch() = default;
+    Epoch(const Epoch& other) : value_(other.advance()) {}
+    Epoch(Epoch&& other) noexcept : value_(other.value_.load(std::memory_order_relaxed)) {}
+    Epoch& operator=(const Epoch& other) {
+      value_.store(other.advance(), std::memory_order_relaxed);
+      return *this;
+    }
+    Epoch& operator=(Epoch&& other) noexcept {
+      value_.store(other.value_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+      return *this;
+    }
+    uint64_t value() const { return value_.load(std::memory_order_relaxed); }
+
+   private:
+    uint64_t advance() const { return value_.fetch_add(1, std::memory_order_relaxed) + 1; }
+    mutable std::atomic<uint64_t> value_{1};
+  };
+
   // Shared while its epoch is older than the map's, ours to write when equal.
   template <class T>
   struct Shared {
@@ -107,8 +145,11 @@ class Map {
   Keyframe& edit(KeyframeId id);
   PointBlock& edit_block(KeyframeId birth);
   const PointSlot* slot(PointId id) const;
+  void add_slot(PointId id, PointSlot slot);
+  void check_keyframes() const;
+  void check_forwarding() const;
 
-  uint64_t epoch_ = 1;
+  Epoch epoch_;
   std::vector<Shared<Keyframe>> keyframes_;
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
   size_t point_count_ = 0;

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Format 1. All numbers are little-endian; a varint has 7 bits per byte, low ones first; zigzag is a signed varint;
+// floats are IEEE 754, bit for bit; "packed" is the entropy coding of entropy_coder.h.
+//
+//   file     "DKBMAP\r\n", format u32, sections u32, CRC-32C u32 of these 16 bytes, then the sections in this order:
+//   section  tag (4 letters), length u64 of the content, CRC-32C u32 of tag, length and content, content
+//
+//   HEAD  camera: width, height u32; fx fy cx cy k1 k2 p1 p2 k3 depth_factor fps depth_min depth_max f64
+//         pyramid: scale_factor f64, levels u32
+//   KEYF  count varint, then per keyframe: culled u8, frame i32, timestamp f64, parent i32,
+//         cam_from_world 7 x f64 (quaternion x y z w, translation);
+//         culled: cam_from_parent 7 x f64; live: features varint, covisible varint, per covisible: keyframe varint,
+//         shared varint
+//   DESC  the descriptors of all features of the live keyframes in turn: 4 x u64 each
+//   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats; per live keyframe u8:
+//         1 = the pixels follow from the image pixels by the camera's UndistortionTable; pixel x, y packed floats of
+//         the others; depth, angle, response packed floats; octave packed, as difference to the feature before; colour
+//         g, r - g, b - g packed; point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and
+//         packed; birth features u16 of those that see one (minus the own index where the age is 0), low and high bytes
+//         packed
+//   POIN  live: count varint; id varint minus the one before; position 3 x f64; packed: normal x, y, z and
+//         reference distance, scale floats, colour as above; length u64 and packed: per point found zigzag, visible
+//         zigzag, born_at - birth zigzag, number of the first observation with the same descriptor counted from 1, 0 =
+//         none: then the descriptor follows: 4 x u64 removed: count varint; per point id varint minus the one before, 0
+//         or 1 + zigzag (replaced_by - id)
+//
+// Observations are not stored: they are the keyframes' points turned round.
+#include "dkb/map/map_file.h"
+
+#include "dkb/map/byte_stream.h"
+#include "dkb/map/map_sections.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+
+// The line end shows a transfer that "converted" the file.
+constexpr std::string_view kMagic("DKBMAP\r\n", 8);
+constexpr uint32_t kFormat = 1;
+constexpr size_t kPreamble = 20;
+constexpr const char* kRemedy = "; take it from a backup or make the map anew";
+
+std::string section_header(std::string_view tag, size_t length) {
+  ByteWriter header;
+  header.raw(tag);
+  header.u64(length);
+  return header.bytes();
+}
+
+std::array<std::string_view, 5> split(std::string_view bytes) {
+  if (bytes.substr(0, kMagic.size()) != kMagic) {
+    if (bytes.substr(0, 6) == kMagic.substr(0, 6))
+      throw InputError("its line ends were converted on the way; copy it in binary mode");
+    throw InputError("is no map of dkb-slam; give a map.dkb");
+  }
+  if (bytes.size() < kPreamble) throw InputError("ends within its first bytes" + std::string(kRemedy));
+  ByteReader preamble(bytes.substr(kMagic.size(), kPreamble - kMagic.size()), "the file's head");
+  const uint32_t format = preamble.u32(), count = preamble.u32();
+  if (preamble.u32() != crc32c(bytes.substr(0, 16)))
+    throw InputError("the head of the file is damaged" + std::string(kRemedy));
+  if (format != kFormat)
+    throw InputError("is of map format " + std::to_string(format) + ", this program reads format " +
+                     std::to_string(kFormat) + "; use the version of dkb-slam that wrote it");
+  if (count != MapSections::kTags.size())
+    throw InputError("has " + std::to_string(count) + " sections instead of 5" + kRemedy);
+
+  std::array<std::string_view, 5> sections;
+  ByteReader in(bytes.substr(kPreamble), "the file");
+  for (size_t i = 0; i < sections.size(); ++i) {
+    const std::string tag(MapSections::kTags[i]);
+    if (in.left() < 16) throw InputError("ends before section " + tag + kRemedy);
+    const std::string_view header = in.raw(12);
+    const uint32_t crc = in.u32();
+    if (header.substr(0, 4) != tag) throw InputError("has no section " + tag + " where it should be" + kRemedy);
+    const uint64_t length = ByteReader(header.substr(4), tag).u64();
+    if (length > in.left()) throw InputError("ends within section " + tag + kRemedy);
+    sections[i] = in.raw(static_cast<size_t>(length));
+    if (crc32c(sections[i], crc32c(header)) != crc)
+      throw InputError("the checksum of section " + tag + " is wrong: the file is damaged" + kRemedy);
+  }
+  if (in.left() > 0) throw InputError("has " + std::to_string(in.left()) + " bytes too many at its end" + kRemedy);
+  return sections;
+}
+
+}  // namespace
+
+void MapFileContext::check() const {
+  camera.check();
+  require_option(scale_factor > 1 && scale_factor <= 4, "scale_factor", scale_factor, "above 1 and at most 4");
+  require_option(levels >= 1 && levels <= 32, "levels", levels, "1 ... 32");
+}
+
+std::string encode_map(const Map& map, const MapFileContext& context) {
+  context.check();
+  const MapSections sections = write_sections(map, context);
+  ByteWriter preamble;
+  preamble.raw(kMagic);
+  preamble.u32(kFormat);
+  preamble.u32(static_cast<uint32_t>(sections.bytes.size()));
+  preamble.u32(crc32c(preamble.bytes()));
+  std::string file = preamble.bytes();
+  size_t size = file.size();
+  for (const std::string& s : sections.bytes) size += 16 + s.size();
+  file.reserve(size);
+  for (size_t i = 0; i < sections.bytes.size(); ++i) {
+    const std::string& content = sections.bytes[i];
+    const std::string header = section_header(MapSections::kTags[i], content.size());
+    ByteWriter crc;
+    crc.u32(crc32c(content, crc32c(header)));
+    file += header;
+    file += crc.bytes();
+    file += content;
+  }
+  return file;
+}
+
+MapFile decode_map(std::string_view bytes, const std::string& name) {
+  std::array<std::string_view, 5> sections;
+  try {
+    sections = split(bytes);
+  } catch (const InputError& e) {
+    throw InputError(name + ": " + e.what());
+  }
+  try {
+    return read_sections(sections);
+  } catch (const InputError& e) {
+    throw InputError(name + ": the checksums are right but the content is not: " + e.what() + kRemedy);
+  }
+}
+
+void save_map(const std::filesystem::path& path, const Map& map, const MapFileContext& context) {
+  write_file_atomically(path, encode_map(map, context));
+}
+
+MapFile load_map(const std::filesystem::path& path) {
+  return decode_map(read_file(path), path.string());
+}
+
+}  // namespace dkb

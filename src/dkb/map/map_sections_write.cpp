@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "dkb/map/byte_stream.h"
+#include "dkb/map/entropy_coder.h"
+#include "dkb/map/map_sections.h"
+
+namespace dkb {
+namespace {
+
+// Far beyond any image, near enough to be turned into an integer.
+constexpr float kFarthestPixel = 1e6f;
+
+bool sound(const Rigid3& pose) {
+  return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
+         std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
+}
+
+bool sound(const Eigen::Vector2f& pixel) {
+  return std::abs(pixel.x()) <= kFarthestPixel && std::abs(pixel.y()) <= kFarthestPixel;  // false for NaN
+}
+
+bool same_bits(const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
+  return std::bit_cast<uint32_t>(a.x()) == std::bit_cast<uint32_t>(b.x()) &&
+         std::bit_cast<uint32_t>(a.y()) == std::bit_cast<uint32_t>(b.y());
+}
+
+void write_pose(ByteWriter& out, const Rigid3& pose) {
+  for (int i = 0; i < 4; ++i) out.f64(pose.rotation.coeffs()[i]);
+  for (int i = 0; i < 3; ++i) out.f64(pose.translation[i]);
+}
+
+void write_descriptor(ByteWriter& out, const Descriptor& d) {
+  for (uint64_t word : d) out.u64(word);
+}
+
+void write_sized_packed(ByteWriter& out, const std::string& bytes) {
+  out.u64(bytes.size());
+  write_packed(out, bytes);
+}
+
+// The three channels are much alike, so two of them are stored as differences.
+class ColourColumns {
+ public:
+  void add(Rgb c) {
+    g_.push_back(static_cast<char>(c.g));
+    r_.push_back(static_cast<char>(c.r - c.g));
+    b_.push_back(static_cast<char>(c.b - c.g));
+  }
+  void write(ByteWriter& out) const {
+    write_packed(out, g_);
+    write_packed(out, r_);
+    write_packed(out, b_);
+  }
+
+ private:
+  std::string g_, r_, b_;
+};
+
+std::string head_section(const MapFileContext& context) {
+  ByteWriter out;
+  const CameraModel& c = context.camera;
+  out.u32(static_cast<uint32_t>(c.width));
+  out.u32(static_cast<uint32_t>(c.height));
+  for (double v :
+       {c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.depth_factor, c.fps, c.depth_min, c.depth_max})
+    out.f64(v);
+  out.f64(context.scale_factor);
+  out.u32(static_cast<uint32_t>(context.levels));
+  return out.bytes();
+}
+
+std::string keyframe_section(const Map& map) {
+  ByteWriter out;
+  out.varint(static_cast<uint64_t>(map.keyframe_count()));
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
+    const Keyframe& k = *map.keyframe(id);
+    out.u8(k.culled);
+    out.i32(k.frame);
+    out.f64(k.timestamp);
+    out.i32(k.parent);
+    write_pose(out, k.cam_from_world);
+    if (k.culled) {
+      write_pose(out, k.cam_from_parent);
+      continue;
+    }
+    out.varint(k.features->size());
+    out.varint(k.covisible.size());
+    for (const Covisible& c : k.covisible) {
+      out.varint(static_cast<uint64_t>(c.keyframe));
+      out.varint(static_cast<uint64_t>(c.shared_points));
+    }
+  }
+  return out.bytes();
+}
+
+std::string descriptor_section(const Map& map) {
+  ByteWriter out;
+  for (KeyframeId id : map.live_keyframes())
+    for (const Descriptor& d : map.keyframe(id)->features->descriptors) write_descriptor(out, d);
+  return out.bytes();
+}
+
+void write_points_seen(ByteWriter& out, const Map& map) {
+  ByteWriter ages;
+  std::string low, high;
+  for (KeyframeId id : map.live_keyframes()) {
+    const Keyframe& k = *map.keyframe(id);
+    for (size_t f = 0; f < k.points.size(); ++f) {
+      if (k.points[f] == kNoPoint) {
+        ages.varint(0);
+        continue;
+      }
+      const int64_t age = static_cast<int64_t>(id) - birth_keyframe(k.points[f]);
+      ages.varint(1 + (static_cast<uint64_t>(age) << 1 ^ static_cast<uint64_t>(age >> 63)));
+      const auto feature = static_cast<uint16_t>(static_cast<size_t>(birth_feature(k.points[f])) - (age == 0 ? f : 0));
+      low.push_back(static_cast<char>(feature));
+      high.push_back(static_cast<char>(feature >> 8));
+    }
+  }
+  write_sized_packed(out, ages.bytes());
+  write_packed(out, low);
+  write_packed(out, high);
+}
+
+std::string feature_section(const Map& map, const MapFileContext& context) {
+  const UndistortionTable undistort(context.camera);
+  std::vector<float> image_x, image_y, x, y, depth, angle, response;
+  std::string follows, octave;
+  ColourColumns colour;
+  uint8_t octave_before = 0;
+  for (KeyframeId id : map.live_keyframes()) {
+    const auto& keypoints = map.keyframe(id)->features->keypoints;
+    bool pixels_follow = true;
+    for (const Keypoint& k : keypoints) {
+      image_x.push_back(k.image_pixel.x());
+      image_y.push_back(k.image_pixel.y());
+      depth.push_back(k.depth);
+      angle.push_back(k.angle);
+      response.push_back(k.response);
+      octave.push_back(static_cast<char>(k.octave - octave_before));
+      octave_before = k.octave;
+      colour.add(k.colour);
+      pixels_follow = pixels_follow && same_bits(k.pixel, undistort(k.image_pixel.x(), k.image_pixel.y()));
+    }
+    follows.push_back(pixels_follow ? 1 : 0);
+    if (pixels_follow) continue;
+    for (const Keypoint& k : keypoints) {
+      x.push_back(k.pixel.x());
+      y.push_back(k.pixel.y());
+    }
+  }
+  ByteWriter out;
+  write_packed_floats(out, image_x);
+  write_packed_floats(out, image_y);
+  out.raw(follows);
+  for (const auto* column : {&x, &y, &depth, &angle, &response}) write_packed_floats(out, *column);
+  write_packed(out, octave);
+  colour.write(out);
+  write_points_seen(out, map);
+  return out.bytes();
+}
+
+// Position of the first observation whose feature has the point's descriptor, from 1; 0 = none has.
+uint64_t descriptor_source(const Map& map, const MapPoint& p) {
+  for (size_t i = 0; i < p.observations.size(); ++i) {
+    const Observation& o = p.observations[i];
+    if (map.keyframe(o.keyframe)->features->descriptors[static_cast<size_t>(o.feature)] == p.descriptor) return i + 1;
+  }
+  return 0;
+}
+
+std::string point_section(const Map& map) {
+  ByteWriter out, numbers;
+  const std::vector<PointId> live = map.live_points();
+  out.varint(live.size());
+  std::vector<float> normal[3], distance, scale;
+  ColourColumns colour;
+  PointId before = 0;
+  for (PointId id : live) {
+    const MapPoint& p = *map.point(id);
+    if (birth_keyframe(id) >= map.keyframe_count())
+      throw std::logic_error("map: point " + std::to_string(id) + " was born at a keyframe that is not there");
+    if (const std::string flaw = flaw_of(p); !flaw.empty()) throw std::logic_error("map: " + flaw);
+    out.varint(id - before);
+    before = id;
+    for (int i = 0; i < 3; ++i) out.f64(p.position[i]);
+    for (int i = 0; i < 3; ++i) normal[i].push_back(p.normal[i]);
+    distance.push_back(p.reference_distance);
+    scale.push_back(p.reference_scale);
+    colour.add(p.colour);
+    numbers.zigzag(p.found);
+    numbers.zigzag(p.visible);
+    numbers.zigzag(static_cast<int64_t>(p.born_at) - birth_keyframe(id));
+    const uint64_t source = descriptor_source(map, p);
+    numbers.varint(source);
+    if (source == 0) write_descriptor(numbers, p.descriptor);
+  }
+  for (const auto* column : {&normal[0], &normal[1], &normal[2], &distance, &scale}) write_packed_floats(out, *column);
+  colour.write(out);
+  write_sized_packed(out, numbers.bytes());
+
+  const std::vector<RemovedPoint> removed = map.removed_points();
+  out.varint(removed.size());
+  before = 0;
+  for (const RemovedPoint& r : removed) {
+    if (birth_keyframe(r.id) >= map.keyframe_count())
+      throw std::logic_error("map: point " + std::to_string(r.id) + " was born at a keyframe that is not there");
+    out.varint(r.id - before);
+    before = r.id;
+    const int64_t step = static_cast<int64_t>(r.replaced_by) - static_cast<int64_t>(r.id);
+    out.varint(r.replaced_by == kNoPoint ? 0
+                                         : 1 + (static_cast<uint64_t>(step) << 1 ^ static_cast<uint64_t>(step >> 63)));
+  }
+  return out.bytes();
+}
+
+}  // namespace
+
+std::string flaw_of(const Keyframe& keyframe, int levels) {
+  const std::string name = "keyframe " + std::to_string(keyframe.id);
+  if (!std::isfinite(keyframe.timestamp)) return name + " has no finite timestamp";
+  if (!sound(keyframe.cam_from_world) || !sound(keyframe.cam_from_parent)) return name + " has an impossible pose";
+  if (!keyframe.features) return "";
+  for (const Keypoint& k : keyframe.features->keypoints) {
+    if (!sound(k.pixel) || !sound(k.image_pixel)) return name + " has a feature far outside its image";
+    if (!std::isfinite(k.depth) || k.depth < 0) return name + " has a feature with an impossible depth";
+    if (!std::isfinite(k.angle) || !std::isfinite(k.response)) return name + " has a feature that is not finite";
+    if (k.octave >= levels) return name + " has a feature above the pyramid's levels";
+  }
+  return "";
+}
+
+std::string flaw_of(const MapPoint& point) {
+  if (point.position.allFinite() && point.normal.allFinite() && std::isfinite(point.reference_distance) &&
+      std::isfinite(point.reference_scale))
+    return "";
+  return "point " + std::to_string(point.id) + " is not finite";
+}
+
+MapSections write_sections(const Map& map, const MapFileContext& context) {
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id)
+    if (const std::string flaw = flaw_of(*map.keyframe(id), context.levels); !flaw.empty())
+      throw std::logic_error("map: " + flaw);
+  return {{head_section(context), keyframe_section(map), descriptor_section(map), feature_section(map, context),
+           point_section(map)}};
+}
+
+}  // namespace dkb

@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/map/map.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <thread>
+
+#include "dkb/map/map_test_tools.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using test::broken_invariant;
+using test::fingerprint;
+
+Keyframe keyframe_at(KeyframeId id, double x, int features = 6) {
+  Random random(static_cast<uint64_t>(id) + 1);
+  Keyframe k;
+  k.id = id;
+  k.features = test::random_features(random, features, CameraModel(), true);
+  k.cam_from_world.translation.x() = x;
+  k.parent = id - 1;  // kNoKeyframe for the first
+  return k;
+}
+
+PointId born(Map& map, KeyframeId keyframe, int feature) {
+  MapPoint p;
+  p.id = make_point_id(keyframe, feature);
+  map.add_point(p);
+  map.observe(p.id, keyframe, feature);
+  return p.id;
+}
+
+// Keyframes 0, 1, 2 in a chain; points a, b, c, d born at features 0 ... 3 of keyframe 0. Keyframe 1 sees a, b, c;
+// keyframe 2 sees a.
+struct ThreeKeyframes {
+  Map map;
+  PointId a, b, c, d;
+  ThreeKeyframes() {
+    for (KeyframeId id = 0; id < 3; ++id) map.add_keyframe(keyframe_at(id, id));
+    a = born(map, 0, 0), b = born(map, 0, 1), c = born(map, 0, 2), d = born(map, 0, 3);
+    map.observe(a, 1, 5);
+    map.observe(b, 1, 4);
+    map.observe(c, 1, 3);
+    map.observe(a, 2, 0);
+  }
+};
+
+TEST(PointIds, NameBirthKeyframeAndFeature) {
+  const PointId id = make_point_id(300, 8191);
+  EXPECT_EQ(birth_keyframe(id), 300);
+  EXPECT_EQ(birth_feature(id), 8191);
+  EXPECT_LT(make_point_id(299, 8191), make_point_id(300, 0));
+}
+
+TEST(Map, UnknownIdsGiveNothing) {
+  const ThreeKeyframes world;
+  EXPECT_EQ(world.map.keyframe(-1), nullptr);
+  EXPECT_EQ(world.map.keyframe(3), nullptr);
+  EXPECT_EQ(world.map.point(kNoPoint), nullptr);
+  EXPECT_EQ(world.map.point(make_point_id(0, 5)), nullptr);
+  EXPECT_EQ(world.map.point(make_point_id(90, 5)), nullptr);
+  EXPECT_EQ(world.map.resolve(make_point_id(90, 5)), kNoPoint);
+  EXPECT_THROW(world.map.cam_from_world(3), std::logic_error);
+}
+
+TEST(Map, ObservationsAreKnownToBothSides) {
+  const ThreeKeyframes world;
+  EXPECT_EQ(world.map.point(world.a)->observations, (std::vector<Observation>{{0, 0}, {1, 5}, {2, 0}}));
+  EXPECT_EQ(world.map.keyframe(1)->points[5], world.a);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, AddingAKeyframeAddsItsObservationsThroughFusions) {
+  ThreeKeyframes world;
+  world.map.fuse(world.b, world.c);
+  world.map.remove_point(world.d);
+  Keyframe k = keyframe_at(3, 3);
+  k.points = {kNoPoint, world.b, kNoPoint, world.d, world.a, kNoPoint};
+  world.map.add_keyframe(k);
+  EXPECT_EQ(world.map.keyframe(3)->points[1], world.c);
+  EXPECT_EQ(world.map.keyframe(3)->points[3], kNoPoint);
+  EXPECT_EQ(world.map.keyframe(3)->points[4], world.a);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, KeyframeIdsMustFollowOneAnother) {
+  Map map;
+  EXPECT_THROW(map.add_keyframe(keyframe_at(1, 0)), std::logic_error);
+}
+
+TEST(Map, APointIsBornOnce) {
+  ThreeKeyframes world;
+  MapPoint again;
+  again.id = world.a;
+  EXPECT_THROW(world.map.add_point(again), std::logic_error);
+  world.map.remove_point(world.a);
+  EXPECT_THROW(world.map.add_point(again), std::logic_error);
+  EXPECT_THROW(world.map.add_point(MapPoint()), std::logic_error);
+}
+
+TEST(Map, AFeatureShowsOnePointTheNewer) {
+  ThreeKeyframes world;
+  world.map.observe(world.d, 1, 5);  // showed a
+  EXPECT_EQ(world.map.keyframe(1)->points[5], world.d);
+  EXPECT_EQ(world.map.point(world.a)->observations, (std::vector<Observation>{{0, 0}, {2, 0}}));
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, AKeyframeShowsAPointOnceTheFirst) {
+  ThreeKeyframes world;
+  world.map.observe(world.a, 1, 0);
+  EXPECT_EQ(world.map.keyframe(1)->points[0], kNoPoint);
+  EXPECT_EQ(world.map.keyframe(1)->points[5], world.a);
+}
+
+TEST(Map, AFeatureThatIsNotThereCannotBeObserved) {
+  ThreeKeyframes world;
+  EXPECT_THROW(world.map.observe(world.d, 1, 6), std::out_of_range);
+  EXPECT_THROW(world.map.observe(world.d, 1, -1), std::out_of_range);
+}
+
+TEST(Map, APointWithNoObservationLeftIsRemoved) {
+  ThreeKeyframes world;
+  EXPECT_EQ(world.map.point_count(), 4u);
+  world.map.forget(world.d, 0);
+  EXPECT_EQ(world.map.point(world.d), nullptr);
+  EXPECT_EQ(world.map.point_count(), 3u);
+  world.map.forget(world.d, 0);
+  EXPECT_EQ(world.map.point_count(), 3u);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, RemovedPointsLeaveNoTraceInKeyframes) {
+  ThreeKeyframes world;
+  world.map.remove_point(world.a);
+  EXPECT_EQ(world.map.keyframe(0)->points[0], kNoPoint);
+  EXPECT_EQ(world.map.keyframe(1)->points[5], kNoPoint);
+  EXPECT_EQ(world.map.keyframe(2)->points[0], kNoPoint);
+  EXPECT_EQ(world.map.resolve(world.a), kNoPoint);
+  EXPECT_EQ(world.map.removed_points(), (std::vector<RemovedPoint>{{world.a, kNoPoint}}));
+}
+
+TEST(Map, FusionMovesObservationsAndCounts) {
+  ThreeKeyframes world;
+  world.map.edit_point(world.a).found = 10;
+  world.map.edit_point(world.a).visible = 12;
+  world.map.edit_point(world.d).found = 3;
+  world.map.edit_point(world.d).visible = 4;
+  world.map.fuse(world.a, world.d);
+  // Keyframe 0 showed both: its feature of d stays, that of a is free. Those of keyframes 1 and 2 move.
+  EXPECT_EQ(world.map.point(world.d)->observations, (std::vector<Observation>{{0, 3}, {1, 5}, {2, 0}}));
+  EXPECT_EQ(world.map.keyframe(0)->points[0], kNoPoint);
+  EXPECT_EQ(world.map.keyframe(1)->points[5], world.d);
+  EXPECT_EQ(world.map.point(world.d)->found, 13);
+  EXPECT_EQ(world.map.point(world.d)->visible, 16);
+  EXPECT_EQ(world.map.point_count(), 3u);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, ChainsOfFusionsResolveToTheSurvivor) {
+  ThreeKeyframes world;
+  world.map.fuse(world.a, world.b);
+  world.map.fuse(world.b, world.c);
+  EXPECT_EQ(world.map.resolve(world.a), world.c);
+  world.map.fuse(world.c, world.a);  // a is gone: nothing happens
+  EXPECT_EQ(world.map.resolve(world.a), world.c);
+  world.map.remove_point(world.c);
+  EXPECT_EQ(world.map.resolve(world.a), kNoPoint);
+}
+
+TEST(Map, CovisibilityCountsSharedPointsAndIsMirrored) {
+  ThreeKeyframes world;
+  world.map.update_covisibility(1, 1);
+  // Keyframe 1 shares a, b, c with 0, and a with 2.
+  ASSERT_EQ(world.map.keyframe(1)->covisible.size(), 2u);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[0].keyframe, 0);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[0].shared_points, 3);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[1].keyframe, 2);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[1].shared_points, 1);
+  ASSERT_EQ(world.map.keyframe(2)->covisible.size(), 1u);
+  EXPECT_EQ(world.map.keyframe(2)->covisible[0].keyframe, 1);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, TooWeakCovisibilityLeavesOnlyTheBestEdge) {
+  ThreeKeyframes world;
+  world.map.update_covisibility(1, 1);
+  world.map.update_covisibility(1, 4);
+  ASSERT_EQ(world.map.keyframe(1)->covisible.size(), 1u);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[0].keyframe, 0);
+  EXPECT_TRUE(world.map.keyframe(2)->covisible.empty());
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, CulledKeyframesRideOnTheirParents) {
+  ThreeKeyframes world;
+  const Rigid3 before = world.map.cam_from_world(1);
+  world.map.cull_keyframe(1);
+  EXPECT_EQ(world.map.live_keyframe(1), nullptr);
+  ASSERT_NE(world.map.keyframe(1), nullptr);
+  EXPECT_TRUE(before.translation.isApprox(world.map.cam_from_world(1).translation, 1e-15));
+  EXPECT_EQ(world.map.keyframe(2)->parent, 0);
+  EXPECT_EQ(world.map.point(world.b)->observations, (std::vector<Observation>{{0, 1}}));
+  // Parent at x = 10 instead of 0: what stood 1 m from it still does.
+  Rigid3 moved = world.map.cam_from_world(0);
+  moved.translation.x() = 10;
+  world.map.set_pose(0, moved);
+  EXPECT_NEAR(world.map.cam_from_world(1).translation.x(), 11, 1e-12);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
+TEST(Map, ChainsOfCulledKeyframesKeepTheirRelativePoses) {
+  Map map;
+  for (KeyframeId id = 0; id < 5; ++id) map.add_keyframe(keyframe_at(id, id * id));
+  map.cull_keyframe(3);  // hangs on 2
+  map.cull_keyframe(2);  // hangs on 1, and 3 with it
+  const Rigid3 to = Rigid3(rotation_from_vector({0.3, -0.2, 0.1}), {4, 5, 6});
+  const Rigid3 three_from_one = map.cam_from_world(3) * map.cam_from_world(1).inverse();
+  map.set_pose(1, to);
+  const Rigid3 after = map.cam_from_world(3) * map.cam_from_world(1).inverse();
+  EXPECT_TRUE(after.translation.isApprox(three_from_one.translation, 1e-12));
+  EXPECT_LT(after.rotation.angularDistance(three_from_one.rotation), 1e-12);
+  EXPECT_EQ(map.keyframe(4)->parent, 1);
+  EXPECT_EQ(map.live_keyframes(), (std::vector<KeyframeId>{0, 1, 4}));
+  EXPECT_EQ(broken_invariant(map), "");
+}
+
+TEST(Map, TheRootIsNotCulled) {
+  ThreeKeyframes world;
+  world.map.cull_keyframe(0);
+  EXPECT_NE(world.map.live_keyframe(0), nullptr);
+}
+
+TEST(Map, ACulledParentIsReplacedByItsOwn) {
+  ThreeKeyframes world;
+  world.map.cull_keyframe(1);
+  world.map.add_keyframe(keyframe_at(3, 3));
+  world.map.set_parent(3, 1);
+  EXPECT_EQ(world.map.keyframe(3)->parent, 0);
+}
+
+TEST(Map, AKeyframeCannotHangOnItsDescendant) {
+  ThreeKeyframes world;
+  EXPECT_THROW(world.map.set_parent(0, 2), std::logic_error);
+  EXPECT_THROW(world.map.set_parent(1, 1), std::logic_error);
+}
+
+TEST(Map, SnapshotsDoNotSeeLaterWrites) {
+  ThreeKeyframes world;
+  const MapView view = world.map.snapshot();
+  const std::string before = fingerprint(*view);
+  world.map.fuse(world.a, world.b);
+  world.map.set_pose(0, Rigid3(Eigen::Quaterniond::Identity(), {9, 9, 9}));
+  world.map.edit_point(world.c).position.x() = 5;
+  world.map.cull_keyframe(1);
+  world.map.add_keyframe(keyframe_at(3, 3));
+  born(world.map, 3, 0);
+  EXPECT_EQ(fingerprint(*view), before);
+  EXPECT_NE(fingerprint(world.map), before);
+}
+
+TEST(Map, SnapshotsShareWhatDidNotChange) {
+  ThreeKeyframes world;
+  const MapView view = world.map.snapshot();
+  world.map.set_pose(0, Rigid3());
+  EXPECT_NE(view->keyframe(0), world.map.keyframe(0));
+  EXPECT_EQ(view->keyframe(1), world.map.keyframe(1));
+  EXPECT_EQ(view->keyframe(0)->features, world.map.keyframe(0)->features);
+  EXPECT_EQ(view->point(world.a), world.map.point(world.a));
+}
+
+TEST(Map, BetweenSnapshotsAPartIsCopiedOnce) {
+  ThreeKeyframes world;
+  const MapView view = world.map.snapshot();
+  world.map.set_pose(0, Rigid3());
+  const Keyframe* own = world.map.keyframe(0);
+  world.map.set_pose(0, Rigid3(Eigen::Quaterniond::Identity(), {1, 0, 0}));
+  EXPECT_EQ(world.map.keyframe(0), own);
+}
+
+TEST(Map, CopiesOfSnapshotsAreIndependent) {
+  ThreeKeyframes world;
+  const MapView view = world.map.snapshot();
+  const std::string before = fingerprint(*view);
+  Map copy = *view;
+  copy.set_pose(0, Rigid3(Eigen::Quaterniond::Identity(), {7, 0, 0}));
+  copy.remove_point(world.a);
+  EXPECT_EQ(fingerprint(*view), before);
+  EXPECT_EQ(fingerprint(world.map), before);
+  Map assigned;
+  assigned = copy;
+  assigned.remove_point(world.b);
+  EXPECT_NE(copy.point(world.b), nullptr);
+  copy.remove_point(world.c);
+  EXPECT_NE(assigned.point(world.c), nullptr);
+}
+
+TEST(Map, CopiesAndTheirSourceAreIndependent) {
+  ThreeKeyframes world;
+  const Map copy = world.map;
+  const std::string before = fingerprint(copy);
+  world.map.edit_point(world.a).position.x() = 3;
+  world.map.set_pose(2, Rigid3());
+  EXPECT_EQ(fingerprint(copy), before);
+}
+
+TEST(Map, AMovedMapStaysApartFromItsSnapshots) {
+  ThreeKeyframes world;
+  const MapView view = world.map.snapshot();
+  const std::string before = fingerprint(*view);
+  Map moved = std::move(world.map);
+  moved.set_pose(0, Rigid3(Eigen::Quaterniond::Identity(), {7, 0, 0}));
+  moved.remove_point(world.a);
+  EXPECT_EQ(fingerprint(*view), before);
+}
+
+TEST(Map, SnapshotsAreReadWhileTheOwnerWrites) {  // for the thread sanitizer
+  Map map = test::random_map(5, 8, 20, 0);
+  const MapView view = map.snapshot();
+  const std::string before = fingerprint(*view);
+  std::string seen, copied;
+  std::thread reader([&] {
+    seen = fingerprint(*view);
+    Map own = *view;
+    Random random(9);
+    for (int i = 0; i < 50; ++i) test::random_edit(own, random);
+    copied = fingerprint(*view);
+  });
+  Random random(8);
+  for (int i = 0; i < 200; ++i) {
+    test::random_edit(map, random);
+    if (i % 50 == 0) map.snapshot();
+  }
+  reader.join();
+  EXPECT_EQ(seen, before);
+  EXPECT_EQ(copied, before);
+}
+
+TEST(Map, InvariantsSurviveRandomEdits) {
+  for (uint64_t seed = 1; seed <= 30; ++seed) {
+    Random random(seed);
+    Map map;
+    std::vector<std::pair<MapView, std::string>> views;
+    for (int k = 0; k < 12; ++k) {
+      test::add_random_keyframe(map, random, 15, 8, 5);
+      for (int e = 0; e < 25; ++e) {
+        test::random_edit(map, random);
+        ASSERT_EQ(broken_invariant(map), "") << "seed " << seed << ", keyframe " << k << ", edit " << e;
+      }
+      const MapView view = map.snapshot();
+      views.emplace_back(view, fingerprint(*view));
+    }
+    for (size_t v = 0; v < views.size(); ++v)
+      ASSERT_EQ(fingerprint(*views[v].first), views[v].second) << "seed " << seed << ", view " << v;
+  }
+}
+
+TEST(Map, CulledPosesKeepTheirPlaceBesideTheirParentThroughRandomEdits) {
+  Random random(77);
+  Map map = test::random_map(77, 10, 10, 0);
+  for (KeyframeId id = 1; id < 10; id += 2) map.cull_keyframe(id);
+  std::vector<Rigid3> relative;
+  for (KeyframeId id = 0; id < 10; ++id) {
+    const KeyframeId parent = map.keyframe(id)->parent;
+    relative.push_back(parent == kNoKeyframe ? Rigid3()
+                                             : map.cam_from_world(id) * map.cam_from_world(parent).inverse());
+  }
+  for (KeyframeId id : map.live_keyframes())
+    map.set_pose(id, Rigid3(rotation_from_vector({random.normal(), 0, 0}), {random.normal(), 0, 0}));
+  for (KeyframeId id = 1; id < 10; id += 2) {
+    const Rigid3 now = map.cam_from_world(id) * map.cam_from_world(map.keyframe(id)->parent).inverse();
+    EXPECT_TRUE(now.translation.isApprox(relative[static_cast<size_t>(id)].translation, 1e-9));
+    EXPECT_LT(now.rotation.angularDistance(relative[static_cast<size_t>(id)].rotation), 1e-7);
+  }
+}
+
+struct Parts {
+  std::vector<Keyframe> keyframes;
+  std::vector<MapPoint> points;
+  std::vector<RemovedPoint> removed;
+};
+
+Parts parts_of(const Map& map) {
+  Parts parts;
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) parts.keyframes.push_back(*map.keyframe(id));
+  for (PointId id : map.live_points()) parts.points.push_back(*map.point(id));
+  parts.removed = map.removed_points();
+  return parts;
+}
+
+TEST(MapRestore, GivesTheSameMapFromItsParts) {
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const Map map = test::random_map(seed, 10, 20, 20);
+    const Parts parts = parts_of(map);
+    Map restored = Map::restore(parts.keyframes, parts.points, parts.removed);
+    ASSERT_EQ(fingerprint(restored), fingerprint(map));
+    // The restored map goes on as the first would have.
+    Map other = map;
+    Random a(seed), b(seed);
+    for (int i = 0; i < 50; ++i) {
+      test::random_edit(other, a);
+      test::random_edit(restored, b);
+    }
+    ASSERT_EQ(fingerprint(restored), fingerprint(other));
+    ASSERT_EQ(broken_invariant(restored), "");
+  }
+}
+
+TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
+  ThreeKeyframes world;
+  world.map.fuse(world.d, world.c);
+  world.map.update_covisibility(1, 1);
+  const Parts good = parts_of(world.map);
+  const auto message = [&](auto&& spoil) -> std::string {
+    Parts parts = good;
+    spoil(parts);
+    try {
+      Map::restore(parts.keyframes, parts.points, parts.removed);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message([](Parts&) {}), "");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].id = 2; }), "keyframe 2 stands where keyframe 1 should");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = 3; }), "keyframe 1 has the impossible parent 3");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = -2; }), "keyframe 1 has the impossible parent -2");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].parent = 2; }), "parents of keyframes run in a circle");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].culled = true; }), "keyframe 0 is culled but has no parent");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].culled = true; }), "keyframe 1 is culled but has features");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].features.reset(); }),
+            "keyframe 1 has not as many points and descriptors as features");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].points.pop_back(); }),
+            "keyframe 1 has not as many points and descriptors as features");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].covisible[0].keyframe = 1; }),
+            "keyframe 1 names an impossible covisible keyframe");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].covisible[0].shared_points = 0; }),
+            "keyframe 1 names an impossible covisible keyframe");
+  EXPECT_EQ(message([](Parts& p) { std::swap(p.keyframes[1].covisible[0], p.keyframes[1].covisible[1]); }),
+            "covisible keyframes of keyframe 1 are out of order");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].covisible.clear(); }),
+            "two keyframes disagree on how many points they share");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[2].points[3] = make_point_id(0, 5); }),
+            "keyframe 2 shows point 5, which is not there");
+  EXPECT_EQ(message([](Parts& p) { p.keyframes[2].points[3] = make_point_id(0, 0); }),
+            "keyframe 2 shows point 0 twice");
+  EXPECT_EQ(message([](Parts& p) { std::swap(p.points[0], p.points[1]); }), "point 0 is out of order");
+  EXPECT_EQ(message([](Parts& p) { p.points[0].id = make_point_id(7, 0); }),
+            "point 57344 was born at a keyframe that is not there");  // 7 * 8192
+  EXPECT_EQ(message([](Parts& p) { p.points[0].born_at = 3; }), "point 0 was made at a keyframe that is not there");
+  EXPECT_EQ(message([](Parts& p) { p.removed[0].id = 0; }), "point 0 is both there and removed");
+  EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 5; }),
+            "point 3 was replaced by point 5, which never was");
+  EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 3; }), "replacements of points run in a circle");
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "dkb/map/map.h"
+#include "dkb/util/random.h"
+
+namespace dkb::test {
+
+// A camera with the distortion of fr1.
+CameraModel distorted_camera();
+
+// Features at random places with random descriptors; most have depth. `follow`: the ideal pixels are those of the
+// camera's table, as extraction makes them.
+std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, const CameraModel& camera, bool follow);
+
+// Adds a keyframe that sees some of the points of its predecessors and gives birth to `born` points.
+KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen, int born);
+
+// One random change of any kind that Map offers.
+void random_edit(Map& map, Random& random);
+
+// `keyframes` keyframes with random edits between them.
+Map random_map(uint64_t seed, int keyframes, int features, int edits_per_keyframe);
+
+// What holds of every map and does not hold of this one; empty when all is well.
+std::string broken_invariant(const Map& map);
+
+// Every field of every part, bit for bit, features included.
+std::string fingerprint(const Map& map);
+
+}  // namespace dkb::test
