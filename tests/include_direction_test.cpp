@@ -73,7 +73,8 @@ TEST(Architecture, TheLibraryDoesNotIncludeOpenCv) {
 
 TEST(Architecture, TheLibraryNeitherSleepsNorExitsNorTunesForOneMachine) {
   const std::regex banned(
-      "sleep_for|sleep_until|\\busleep\\(|std::exit|std::abort|std::terminate\\(|[^_a-z]exit\\(|march=native");
+      "sleep_for|sleep_until|\\busleep\\(|std::exit|std::abort|std::terminate\\(|[^_a-z]exit\\(|march="
+      "native");
   for (const std::string& file : files_below("src", {".cpp", ".h", ".txt", ".cmake"})) {
     const std::vector<std::string> lines = read_lines(source_dir() / file);
     for (size_t i = 0; i < lines.size(); ++i) {
