@@ -72,7 +72,7 @@ struct BaResult {
 // Minimises sum w rho(e^T Sigma^-1 e) by Levenberg-Marquardt; points are eliminated (Schur complement), the cameras'
 // system is solved by a block-sparse Cholesky factorisation, so local windows and whole maps take the same way.
 // rho: Huber on the unweighted error. Where w differs from 1 and depth is present, the part min(w, 1) has one kernel
-// over pixel and depth; what the heavier of the two has beyond that has a kernel of its own (see docs in the .cpp).
+// over pixel and depth; what the heavier of the two has beyond that has a kernel of its own (kernels.inl).
 // Points that the observations do not determine move only where they are determined, and points without a usable
 // observation stay. Observations behind their camera are outliers. The result holds no NaN if the input holds none.
 // Deterministic. Throws InputError for indices or sizes that do not fit.

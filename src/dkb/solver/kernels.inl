@@ -1,38 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Source of the kernels, included once per instruction set with DKB_KERNEL set to the function attribute.
-// No include guard and no includes: see kernels.cpp.
-
-using Pack = double __attribute__((vector_size(32)));
-using Mask = long long __attribute__((vector_size(32)));
-
-DKB_KERNEL inline Pack load(const double* p) {
-  Pack x;
-  __builtin_memcpy(&x, p, sizeof x);
-  return x;
-}
-DKB_KERNEL inline void store(double* p, const Pack& x) { __builtin_memcpy(p, &x, sizeof x); }
-DKB_KERNEL inline Pack all(double x) { return Pack{x, x, x, x}; }
-DKB_KERNEL inline double sum(const Pack& x) { return (x[0] + x[1]) + (x[2] + x[3]); }
-DKB_KERNEL inline bool any(const Mask& m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
-DKB_KERNEL inline Pack square_root(const Pack& x) {
-  return Pack{__builtin_sqrt(x[0]), __builtin_sqrt(x[1]), __builtin_sqrt(x[2]), __builtin_sqrt(x[3])};
-}
-
-DKB_KERNEL inline void transpose(Pack& a, Pack& b, Pack& c, Pack& d) {
-  const Pack ab_low = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_high = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-  const Pack cd_low = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_high = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-  a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
-  b = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
-  c = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
-  d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
-}
+// Needs pack.inl; see kernels.cpp.
 
 // Huber: rho(s) = s up to the corner c^2, 2 c sqrt(s) - c^2 beyond. Returns rho; `slope` is its derivative.
 DKB_KERNEL inline Pack huber(const Pack& s, const Pack& corner2, Pack& slope) {
   const Mask beyond = s > corner2;
-  const Pack root = square_root(beyond ? s : corner2), corner = square_root(corner2);
-  slope = beyond ? corner / root : all(1.0);
-  return beyond ? 2.0 * corner * root - corner2 : s;
+  const Pack root = square_root(select(beyond, s, corner2)), corner = square_root(corner2);
+  slope = select(beyond, corner / root, all(1.0));
+  return select(beyond, 2.0 * corner * root - corner2, s);
 }
 
 // Residuals of four observations and their weights.
@@ -51,9 +26,9 @@ DKB_KERNEL inline void point_in_camera(const CameraPose& c, const Pack& px, cons
   r.y = c.rotation[3] * px + c.rotation[4] * py + c.rotation[5] * pz + c.translation[1];
   r.z = c.rotation[6] * px + c.rotation[7] * py + c.rotation[8] * pz + c.translation[2];
   r.in_front = r.z > all(c.depth_in_front);
-  r.x = r.in_front ? r.x : all(0.0);
-  r.y = r.in_front ? r.y : all(0.0);
-  r.z = r.in_front ? r.z : all(1.0);
+  r.x = select(r.in_front, r.x, all(0.0));
+  r.y = select(r.in_front, r.y, all(0.0));
+  r.z = select(r.in_front, r.z, all(1.0));
 }
 
 DKB_KERNEL inline void residuals(const CameraPose& c, const ObservationArrays& o, int i, Residuals& r) {
@@ -74,13 +49,13 @@ DKB_KERNEL inline void weigh(const ObservationArrays& o, int i, const RobustLimi
   const Pack zero = all(0.0), one = all(1.0);
   const Pack weight = load(o.weight + i);
   const Pack s_pixel = r.eu * r.eu + r.ev * r.ev, s_depth = r.ed * r.ed, s = s_pixel + s_depth;
-  const Pack corner2 = r.inv_depth_sigma > zero ? all(limits.chi2_depth) : all(limits.chi2_pixel);
+  const Pack corner2 = select(r.inv_depth_sigma > zero, all(limits.chi2_depth), all(limits.chi2_pixel));
   if (!limits.robust || !any(s > corner2)) {
     r.weight_pixel = weight;
     r.weight_depth = one;
     r.cost = weight * s_pixel + s_depth;
   } else {
-    const Pack common = weight < one ? weight : one, more_pixel = weight - common, more_depth = one - common;
+    const Pack common = select(weight < one, weight, one), more_pixel = weight - common, more_depth = one - common;
     Pack slope, slope_pixel, slope_depth;
     const Pack rho = huber(s, corner2, slope);
     // A kernel of its own with the whole weight where there is no depth: pixel corner, the same as the common one.
@@ -90,10 +65,10 @@ DKB_KERNEL inline void weigh(const ObservationArrays& o, int i, const RobustLimi
     r.weight_depth = common * slope + more_depth * slope_depth;
     r.cost = common * rho + more_pixel * rho_pixel + more_depth * rho_depth;
   }
-  r.weight_pixel = r.in_front ? r.weight_pixel : zero;
-  r.weight_depth = r.in_front ? r.weight_depth : zero;
-  const Pack behind = weight > zero ? all(kBehindCost) : zero;
-  r.cost = r.in_front ? r.cost : behind;
+  r.weight_pixel = select(r.in_front, r.weight_pixel, zero);
+  r.weight_depth = select(r.in_front, r.weight_depth, zero);
+  const Pack behind = select(weight > zero, all(kBehindCost), zero);
+  r.cost = select(r.in_front, r.cost, behind);
 }
 
 // M = J^T Omega J without its two zeros, g = J^T Omega e.
@@ -171,7 +146,7 @@ DKB_KERNEL void pose_sums(const PoseInput& in, double* out) {
 
 DKB_KERNEL inline void write_chi2(const Residuals& r, double* out) {
   const Pack s = r.eu * r.eu + r.ev * r.ev + r.ed * r.ed;
-  store(out, r.in_front ? s : all(__builtin_inf()));
+  store(out, select(r.in_front, s, all(__builtin_inf())));
 }
 
 DKB_KERNEL void pose_chi2(const PoseInput& in, double* chi2) {
@@ -190,8 +165,6 @@ DKB_KERNEL inline void gather_residuals(const BaCameraInput& in, int i, Residual
   point_in_camera(in.camera, x, y, z, r);
   residuals(in.camera, in.observations, i, r);
 }
-
-DKB_KERNEL inline void add_to(double* p, const Pack& x) { store(p, load(p) + x); }
 
 DKB_KERNEL void ba_linearise(const BaCameraInput& in, bool fixed, double* point_sums, double* pair_sums, double* out) {
   Pack sums[kPoseSums];
@@ -340,7 +313,7 @@ DKB_KERNEL void schur(const SchurInput& in, double* blocks, double* gradient, do
           for (int k = 0; k < 3; ++k) {
             const double even = ya[8 * c + 2 * k], odd = ya[8 * c + 2 * k + 1];
             factor[9 * c + 3 * k] = all(even);
-            factor[9 * c + 3 * k + 1] = Pack{even, even, odd, odd};
+            factor[9 * c + 3 * k + 1] = make(even, even, odd, odd);
             factor[9 * c + 3 * k + 2] = all(odd);
           }
         }
@@ -367,11 +340,11 @@ DKB_KERNEL void subtract_abt(double* c, const double* a, const double* b) {
   for (int m = 0; m < 6; ++m) {
     const double* y = a + 6 * m;
     const double* f = b + 6 * m;
-    const Pack head = load(y), tail = load(y + 2), wrap = __builtin_shufflevector(tail, head, 2, 3, 4, 5);
+    const Pack head = load(y), tail = load(y + 2), wrap = straddle(tail, head);
     for (int k = 0; k < 3; ++k) {
       const double even = f[2 * k], odd = f[2 * k + 1];
       s[3 * k] -= all(even) * head;
-      s[3 * k + 1] -= Pack{even, even, odd, odd} * wrap;
+      s[3 * k + 1] -= make(even, even, odd, odd) * wrap;
       s[3 * k + 2] -= all(odd) * tail;
     }
   }
