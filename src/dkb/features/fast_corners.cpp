@@ -69,7 +69,8 @@ DKB_TARGET_AVX2 inline __m256i load(const uint8_t* p) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
 }
 
-// Scores of 32 pixels; pixels at or below the threshold score 0.
+// Scores of 32 pixels; pixels at or below the threshold score 0. With kEarlyOut blocks without any corner cost less.
+template <bool kEarlyOut>
 DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::array<ptrdiff_t, 16>& circle,
                                              __m256i threshold) {
   const __m256i zero = _mm256_setzero_si256();
@@ -78,7 +79,7 @@ DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::a
   // the other must both be brighter (or the smaller ones darker).
   __m256i may = _mm256_set1_epi8(-1);
   __m256i bright_bound = may, dark_bound = zero;
-  for (size_t i = 0; i < 4; i += 2) {
+  for (size_t i = 0; kEarlyOut && i < 4; i += 2) {
     const __m256i a = load(centre + circle[i]), b = load(centre + circle[i + 8]);
     const __m256i d = load(centre + circle[i + 4]), e = load(centre + circle[i + 12]);
     bright_bound = _mm256_min_epu8(bright_bound, _mm256_min_epu8(_mm256_max_epu8(a, b), _mm256_max_epu8(d, e)));
@@ -109,12 +110,22 @@ DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::a
   return _mm256_andnot_si256(too_small, contrast);
 }
 
+DKB_TARGET_AVX2 void contrasts_5x5_avx2(const uint8_t* centre, ptrdiff_t stride, uint8_t (&contrasts)[25]) {
+  const std::array<ptrdiff_t, 16> circle = circle_offsets(stride);
+  for (ptrdiff_t row = 0; row < 5; ++row) {
+    alignas(32) uint8_t block[32];
+    const __m256i values = contrast_avx2<false>(centre + (row - 2) * stride - 2, circle, _mm256_setzero_si256());
+    _mm256_store_si256(reinterpret_cast<__m256i*>(block), values);
+    std::copy(block, block + 5, contrasts + 5 * row);
+  }
+}
+
 DKB_TARGET_AVX2 void score_row_avx2(const uint8_t* row, int begin, int end, const std::array<ptrdiff_t, 16>& circle,
                                     int threshold, uint8_t* scores) {
   const __m256i t = _mm256_set1_epi8(static_cast<char>(threshold));
   for (int x = begin; x < end; x += 32) {
     const int at = std::min(x, end - 32);  // the last block overlaps the one before it, with the same result
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(scores + at), contrast_avx2(row + at, circle, t));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(scores + at), contrast_avx2<true>(row + at, circle, t));
   }
 }
 
@@ -139,6 +150,18 @@ DKB_TARGET_AVX2 void emit_avx2(const uint8_t* above, const uint8_t* here, const 
 #endif
 
 }  // namespace
+
+void fast_contrasts_5x5(const GreyImage& image, int x, int y, uint8_t (&contrasts)[25], [[maybe_unused]] Simd simd) {
+#if defined(__x86_64__)
+  // The vector kernel loads 32 pixels from three columns left of the window on, in rows up to five below (x, y).
+  const size_t last = static_cast<size_t>(y + 5) * static_cast<size_t>(image.width()) + static_cast<size_t>(x + 1 + 31);
+  if (simd == Simd::avx2 && last < image.size()) return contrasts_5x5_avx2(image.row(y) + x, image.width(), contrasts);
+#endif
+  const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
+  for (int row = 0; row < 5; ++row)
+    for (int column = 0; column < 5; ++column)
+      contrasts[5 * row + column] = contrast_scalar(image.row(y + row - 2) + x + column - 2, circle, 0);
+}
 
 void FastCornerFinder::find(const GreyImage& image, int threshold, int border, std::vector<PixelCorner>& corners) {
   corners.clear();

@@ -33,4 +33,8 @@ class FastCornerFinder {
   std::vector<uint8_t> scores_;  // three padded rows
 };
 
+// FAST-9 contrasts (score + 1; 0 if the pixel is no corner at any threshold) of the 5 x 5 pixels about (x, y),
+// row-major. (x, y) must be at least 5 px from the image's edge.
+void fast_contrasts_5x5(const GreyImage& image, int x, int y, uint8_t (&contrasts)[25], Simd simd = best_simd());
+
 }  // namespace dkb

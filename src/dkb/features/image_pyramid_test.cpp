@@ -5,18 +5,11 @@
 
 #include <cmath>
 
+#include "dkb/features/feature_test_util.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/random.h"
 
 namespace dkb {
 namespace {
-
-GreyImage noise_image(int width, int height, uint64_t seed) {
-  Random random(seed);
-  GreyImage image(width, height);
-  for (size_t i = 0; i < image.size(); ++i) image.data()[i] = static_cast<uint8_t>(random.below(256));
-  return image;
-}
 
 TEST(ImagePyramid, SizesFallByTheScaleAndAreRounded) {
   ImagePyramid pyramid({.levels = 8, .scale = 1.2});

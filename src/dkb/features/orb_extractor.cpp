@@ -2,8 +2,10 @@
 #include "dkb/features/orb_extractor.h"
 
 #include <algorithm>
+#include <string>
 
 #include "dkb/features/orientation.h"
+#include "dkb/features/subpixel.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -89,8 +91,10 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image) {
     for (const PixelCorner& pixel : corners) {
       Corner corner;
       corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
-      corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x));
-      corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y));
+      const SubpixelOffset offset =
+          options_.subpixel ? refine_corner(pixels, pixel.x, pixel.y, simd_) : SubpixelOffset{};
+      corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x + offset.x));
+      corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y + offset.y));
       corner.response = pixel.score;
       corner.octave = static_cast<uint8_t>(level);
       features.corners.push_back(corner);

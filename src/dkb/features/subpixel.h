@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "dkb/features/simd.h"
+#include "dkb/image/image.h"
+
+namespace dkb {
+
+// Offset from a pixel to the corner next to it [px].
+struct SubpixelOffset {
+  float x = 0, y = 0;
+  bool operator==(const SubpixelOffset&) const = default;
+};
+
+// Position of a FAST corner below the pixel: peak of the quadratic that fits best (least squares) the 3 x 3 contrasts
+// about it, after smoothing them by 1-2-1 in both directions, at most 1 px away per axis; zero where they have no peak.
+// FAST contrasts localise better than gradient-based corner measures here, because it is their maximum that was found
+// (docs/decisions.md has the numbers). The pixel must be at least 5 px from the image's edge.
+SubpixelOffset refine_corner(const GreyImage& image, int x, int y, Simd simd = best_simd());
+
+}  // namespace dkb
