@@ -1,2 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/boxes_file.h"
+
 #include <gtest/gtest.h>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+std::string error_of(const std::string& text) {
+  try {
+    parse_boxes(text, "b.txt", 640, 480);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(BoxesFile, RowsAreGroupedByStampAndSorted) {
+  const BoxesByTime boxes = parse_boxes(
+      "\xEF\xBB\xBF# rgb_timestamp class x y w h score\r\n\r\n2.5 person 10 20 30 40 0.75\r\n1.5 dog 1 2 3 4\r\n"
+      "2.5 chair 5 6 7 8 0.5 more",
+      "b.txt", 640, 480);
+  ASSERT_EQ(boxes.size(), 2u);
+  EXPECT_EQ(boxes[0].timestamp, 1.5);
+  EXPECT_EQ(boxes[0].boxes, (std::vector<Detection>{{"dog", {1, 2, 3, 4}, 1.0f}}));
+  EXPECT_EQ(boxes[1].boxes,
+            (std::vector<Detection>{{"person", {10, 20, 30, 40}, 0.75f}, {"chair", {5, 6, 7, 8}, 0.5f}}));
+}
+
+TEST(BoxesFile, BoxesAreClippedToTheImage) {
+  EXPECT_EQ(parse_boxes("1 person -10 400 30 200", "b.txt", 640, 480)[0].boxes[0].box, (Box{0, 400, 20, 80}));
+}
+
+TEST(BoxesFile, BadLinesAreNamedByLine) {
+  const std::string good = "# head\n1 person 1 2 3 4\n";
+  for (const char* bad :
+       {"1 person 1 2 3", "1 person nan 2 3 4", "1 person 1 2 inf 4", "x person 1 2 3 4", "1 person 1 2 0 4",
+        "1 person 1 2 3 -4", "1 person 640 2 3 4", "1 person 1 480 3 4", "1 person -9 2 9 4", "1 person 1 -9 3 9",
+        "1 person 1 2 3 4 high", "1 person 1,5 2 3 4", "1 person 1e300 2 3 4"})
+    EXPECT_EQ(error_of(good + bad + "\n").find("b.txt:3: "), 0u) << bad << ": " << error_of(good + bad);
+}
+
+TEST(BoxesFile, MissingFilesAreNamed) {
+  EXPECT_THROW(read_boxes("/nowhere/b.txt", 640, 480), InputError);
+}
+
+TEST(BoxesFile, WhatIsWrittenIsReadBack) {
+  const BoxesByTime boxes = {{1.25, {{"person", {1.5f, 2, 3, 4}, 0.5f}}, {}},
+                             {2.5, {{"dog", {5, 6, 7, 8.25f}, 1}, {"cat", {9, 8, 7, 6}, 0.125f}}, {}}};
+  EXPECT_EQ(parse_boxes(boxes_to_text(boxes), "b.txt", 640, 480), boxes);
+  const BoxesByTime spaced = {{1, {{"cell phone", {1, 2, 3, 4}, 1}}, {}}};
+  EXPECT_EQ(parse_boxes(boxes_to_text(spaced), "b.txt", 640, 480)[0].boxes[0].class_name, "cell_phone");
+}
+
+TEST(BoxesFile, AnyMutationIsReadOrRefused) {
+  const std::string whole =
+      "# t c x y w h s\n1305031102.175304 person 0 119 107 236 0.389\n1305031102.211214 person 0 115 109 237\n";
+  Random random(3);
+  for (int i = 0; i < 20000; ++i) {
+    std::string text = whole;
+    for (uint32_t k = 1 + random.below(4); k > 0; --k)
+      text[random.below(static_cast<uint32_t>(text.size()))] = static_cast<char>(random.below(256));
+    try {
+      for (const Detections& at : parse_boxes(text, "b.txt", 640, 480))
+        for (const Detection& d : at.boxes) {
+          EXPECT_GT(d.box.w, 0);
+          EXPECT_LE(d.box.x + d.box.w, 640);
+          EXPECT_GT(d.box.h, 0);
+          EXPECT_LE(d.box.y + d.box.h, 480);
+        }
+    } catch (const InputError& e) {
+      EXPECT_EQ(std::string(e.what()).find("b.txt:"), 0u);
+    }
+  }
+}
+
+TEST(FileDetector, TakesTheNearestStampWithinTwoMilliseconds) {
+  FileDetector detector({{1.000, {{"a", {0, 0, 1, 1}, 1}}, {}}, {1.003, {{"b", {0, 0, 1, 1}, 1}}, {}}});
+  const auto class_at = [&](double stamp) {
+    RgbdImage image;
+    image.timestamp = stamp;
+    const Detections found = detector.detect(image);
+    EXPECT_EQ(found.timestamp, stamp);
+    return found.boxes.empty() ? "" : found.boxes[0].class_name;
+  };
+  EXPECT_EQ(class_at(1.0), "a");
+  EXPECT_EQ(class_at(1.0012), "a");
+  EXPECT_EQ(class_at(1.0018), "b");
+  EXPECT_EQ(class_at(1.0049), "b");
+  EXPECT_EQ(class_at(1.0055), "");
+  EXPECT_EQ(class_at(0.9975), "");
+}
+
+}  // namespace
+}  // namespace dkb

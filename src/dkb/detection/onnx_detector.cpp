@@ -111,8 +111,7 @@ int usual_size(OnnxNetwork& network) {
 }
 
 // Width and height of the graph's input; 0 x 0 when it leaves them open.
-std::pair<int, int> fixed_input(const OnnxInput& input, const OnnxOptions& options) {
-  const std::string name = options.model.string();
+std::pair<int, int> declared_input(const OnnxInput& input, const std::string& name) {
   if (input.element_type != kFloat)
     throw InputError(
         name + ": the graph's input is not of 32-bit floats; export it without half precision or quantised input");
@@ -123,12 +122,7 @@ std::pair<int, int> fixed_input(const OnnxInput& input, const OnnxOptions& optio
   if (input.dims[2] > kLargest || input.dims[3] > kLargest || input.dims[2] % kStep != 0 || input.dims[3] % kStep != 0)
     throw InputError(name + ": the graph's input of " + std::to_string(input.dims[3]) + " x " +
                      std::to_string(input.dims[2]) + " px is no multiple of 32 up to 4096; export it for such a size");
-  const std::pair size(static_cast<int>(input.dims[3]), static_cast<int>(input.dims[2]));
-  if (options.input_size != 0 && options.input_size != std::max(size.first, size.second))
-    throw InputError(name + ": the graph's input is fixed to " + std::to_string(size.first) + " x " +
-                     std::to_string(size.second) +
-                     " px; leave the input size at 0, or export the model with open size");
-  return size;
+  return {static_cast<int>(input.dims[3]), static_cast<int>(input.dims[2])};
 }
 
 }  // namespace
@@ -146,13 +140,15 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
   require_option(height > 0, "height", height, "positive");
   const std::string name = options_.model.string();
   const std::string bytes = read_file(options_.model);
-  const auto fixed = fixed_input(read_onnx_input(bytes, name), options_);
+  const auto declared = declared_input(read_onnx_input(bytes, name), name);
   labels_ = read_labels(options_.labels);
   network_ = std::make_unique<OnnxNetwork>(bytes, name);
-  std::tie(input_width_, input_height_) = fixed;
-  if (input_width_ == 0)
-    std::tie(input_width_, input_height_) =
-        input_for(options_.input_size != 0 ? options_.input_size : usual_size(*network_), width, height);
+  if (options_.input_size != 0)
+    std::tie(input_width_, input_height_) = input_for(options_.input_size, width, height);
+  else if (declared.first != 0)
+    std::tie(input_width_, input_height_) = declared;
+  else
+    std::tie(input_width_, input_height_) = input_for(usual_size(*network_), width, height);
   std::string outputs;
   const auto head = head_at(*network_, input_width_, input_height_, &outputs);
   if (!head)

@@ -22,8 +22,10 @@ struct OnnxOptions {
   std::filesystem::path model;            // ONNX file
   std::filesystem::path labels;           // class names, one per line, in the graph's order; empty = the 80 of COCO
   std::string classes = kMovableClasses;  // classes that may move, by comma
-  int input_size = 0;       // [px] longer side of the network's input, multiple of 32, <= 4096; 0 = the graph's own,
-                            // or where it leaves it open 416 for YOLOX and 640 for others
+  // [px] longer side of the network's input, multiple of 32, <= 4096; the other side follows the images' shape. 0 = as
+  // the graph says, or where it leaves the size open 416 for YOLOX and 640 for others. Many graphs run at other sizes
+  // than they say; one that does not is an error.
+  int input_size = 0;
   float min_score = 0.25f;  // objectness x class score that a detection must reach, in (0, 1)
   float max_overlap =
       0.45f;  // intersection over union above which the weaker of two boxes of a class is dropped, (0, 1]

@@ -1,2 +1,277 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/onnx_detector.h"
+
 #include <gtest/gtest.h>
+
+// jpeglib.h needs stdio first
+#include <cstdio>
+
+#include <jpeglib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "dkb/detection/onnx_graph_test_util.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+namespace fs = std::filesystem;
+using namespace onnx_test;
+
+class OnnxDetectorTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!onnx_available()) GTEST_SKIP() << "skipped: this build has no OpenCV dnn";
+    folder_ = fs::path(testing::TempDir()) /
+              ("dkb_onnx_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  OnnxOptions write(const std::string& bytes, const std::string& name = "m.onnx") const {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    OnnxOptions options;
+    options.model = folder_ / name;
+    return options;
+  }
+  // The error's message, which must be one line that names the file.
+  static std::string error_of(const OnnxOptions& options) {
+    try {
+      const OnnxDetector detector(options, 640, 480);
+    } catch (const InputError& e) {
+      const std::string text = e.what();
+      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+      EXPECT_EQ(text.find(options.model.string()), 0u) << text;
+      return text;
+    }
+    ADD_FAILURE() << "no error";
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+RgbdImage flat_image(int width, int height, Rgb colour) {
+  RgbdImage image;
+  image.timestamp = 7;
+  image.colour = ColourImage(width, height, colour);
+  image.grey = grey_from_colour(image.colour);
+  return image;
+}
+
+// 96 x 64: 12 x 8 + 6 x 4 + 3 x 2 = 126 cells. One prediction of class 0 in the first row, whose score is the first
+// channel's mean.
+std::string one_box(YoloHead head, int classes, float per_unit) {
+  const int cells = 126, rows = head == YoloHead::v5 ? 3 * cells : cells, columns = 5 + classes;
+  std::vector<float> bias(static_cast<size_t>(rows * columns), 0.0f);
+  std::array<std::vector<float>, 3> slope;
+  slope.fill(bias);
+  const float box[] = {32, 16, 20, 10};
+  std::copy_n(box, 4, bias.begin());
+  bias[4] = 1;
+  slope[0][5] = per_unit;
+  return mean_graph(96, 64, rows, columns, bias, slope);
+}
+
+std::string one_v8_box(int classes) {
+  const int cells = 126;
+  std::vector<float> bias(static_cast<size_t>(cells * (4 + classes)), 0.0f);
+  std::array<std::vector<float>, 3> slope;
+  slope.fill(bias);
+  const float box[] = {32, 16, 20, 10};
+  for (size_t i = 0; i < 4; ++i) bias[i * cells] = box[i];
+  slope[0][4 * cells] = 1;
+  return mean_graph(96, 64, 4 + classes, cells, bias, slope);
+}
+
+TEST_F(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
+  OnnxDetector detector(write(one_box(YoloHead::v5, 80, 1.0f)), 192, 128);
+  EXPECT_EQ(detector.head(), YoloHead::v5);
+  EXPECT_EQ(detector.input_width(), 96);
+  const Detections found = detector.detect(flat_image(192, 128, {204, 0, 0}));
+  ASSERT_EQ(found.boxes.size(), 1u);
+  EXPECT_EQ(found.timestamp, 7);
+  EXPECT_EQ(found.boxes[0].class_name, "person");
+  EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);        // 204 / 255
+  EXPECT_EQ(found.boxes[0].box, (Box{44, 22, 40, 20}));  // (32 - 10, 16 - 5, 20, 10) x 2
+  EXPECT_TRUE(detector.detect(flat_image(192, 128, {0, 0, 255})).boxes.empty());
+}
+
+TEST_F(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
+  OnnxDetector detector(write(one_v8_box(80)), 192, 128);
+  EXPECT_EQ(detector.head(), YoloHead::v8);
+  const Detections found = detector.detect(flat_image(192, 128, {204, 0, 0}));
+  ASSERT_EQ(found.boxes.size(), 1u);
+  EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
+  EXPECT_EQ(found.boxes[0].box, (Box{44, 22, 40, 20}));
+}
+
+TEST_F(OnnxDetectorTest, YoloxGraphsGetBgrUpTo255) {
+  OnnxDetector detector(write(one_box(YoloHead::yolox, 80, 1.0f / 255)), 96, 64);
+  EXPECT_EQ(detector.head(), YoloHead::yolox);
+  EXPECT_TRUE(detector.detect(flat_image(96, 64, {204, 0, 0})).boxes.empty());
+  const Detections found = detector.detect(flat_image(96, 64, {0, 0, 204}));
+  ASSERT_EQ(found.boxes.size(), 0u + 1);
+  EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
+}
+
+TEST_F(OnnxDetectorTest, OpenYoloxGraphsTakeTheImagesShapeAt416) {
+  std::vector<float> cell(85, 0.0f);
+  cell[0] = cell[1] = 0.5f;  // box in the middle of the cell, exp(0) x 32 px
+  cell[4] = 0.9f;
+  cell[5] = 1.0f;
+  OnnxDetector detector(write(yolox_graph(-1, -1, cell)), 640, 480);
+  EXPECT_EQ(detector.head(), YoloHead::yolox);
+  EXPECT_EQ(detector.input_width(), 416);
+  EXPECT_EQ(detector.input_height(), 320);  // 416 x 480 / 640 = 312, rounded up to a multiple of 32
+  // 13 x 10 cells of 32 px; the last row covers input rows 288 ... 320, of which the image has 24, so it is clipped.
+  const Detections found = detector.detect(flat_image(640, 480, {9, 9, 9}));
+  ASSERT_EQ(found.boxes.size(), 130u);
+  EXPECT_NEAR(found.boxes[0].box.w, 32 * 640.0 / 416, 1e-3);
+  EXPECT_NEAR(found.boxes[129].box.h, 24 * 480.0 / 312, 1e-2);
+}
+
+TEST_F(OnnxDetectorTest, InputSizeOverridesWhatTheGraphSays) {
+  std::vector<float> cell(85, 0.0f);
+  OnnxOptions options = write(yolox_graph(416, 416, cell));
+  EXPECT_EQ(OnnxDetector(options, 640, 480).input_height(), 416);
+  options.input_size = 320;
+  const OnnxDetector detector(options, 480, 640);
+  EXPECT_EQ(detector.input_width(), 256);  // 320 x 480 / 640 = 240, rounded up
+  EXPECT_EQ(detector.input_height(), 320);
+  options.input_size = 100;
+  EXPECT_THROW(OnnxDetector(options, 640, 480), InvalidOption);
+}
+
+TEST_F(OnnxDetectorTest, OnlyMovableClassesAreGiven) {
+  OnnxOptions options = write(one_box(YoloHead::v5, 80, 1.0f));
+  options.classes = "chair, dog";
+  EXPECT_TRUE(OnnxDetector(options, 96, 64).detect(flat_image(96, 64, {255, 0, 0})).boxes.empty());
+  options.classes = "persn";
+  EXPECT_NE(error_of(options).find("did you mean \"person\""), std::string::npos);
+}
+
+TEST_F(OnnxDetectorTest, LabelsMustMatchTheGraph) {
+  OnnxOptions options = write(one_box(YoloHead::v5, 2, 1.0f));
+  EXPECT_NE(error_of(options).find("2 classes"), std::string::npos);
+  options.labels = folder_ / "labels.txt";
+  std::ofstream(options.labels) << "robot\r\nperson\r\n\r\n";
+  options.classes = "robot";
+  const Detections found = OnnxDetector(options, 96, 64).detect(flat_image(96, 64, {255, 0, 0}));
+  ASSERT_EQ(found.boxes.size(), 1u);
+  EXPECT_EQ(found.boxes[0].class_name, "robot");
+  for (const char* text : {"robot\n", "robot\nperson\ncat\n", "", "robot\n\nperson\n"}) {
+    std::ofstream(options.labels) << text;
+    try {
+      const OnnxDetector detector(options, 96, 64);
+      ADD_FAILURE() << text;
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find("labels.txt"), std::string::npos) << e.what();
+    }
+  }
+}
+
+TEST_F(OnnxDetectorTest, MissingTruncatedAndForeignModelsAreNamed) {
+  OnnxOptions options;
+  options.model = folder_ / "none.onnx";
+  error_of(options);
+  error_of(write("not a model"));
+  error_of(write(""));
+  error_of(write("\x89PNG\r\n\x1a\n"));
+  const std::string whole = one_box(YoloHead::v5, 1, 1.0f);
+  for (const size_t size : {size_t{1}, size_t{40}, whole.size() / 2, whole.size() - 1})
+    error_of(write(whole.substr(0, size)));
+}
+
+TEST_F(OnnxDetectorTest, UnknownHeadsAreToldByTheirShape) {
+  const std::vector<float> zeros(300 * 6, 0.0f);
+  EXPECT_NE(error_of(write(mean_graph(64, 64, 300, 6, zeros, {zeros, zeros, zeros}))).find("1 x 300 x 6"),
+            std::string::npos);
+}
+
+TEST_F(OnnxDetectorTest, LayersThatOpenCvLacksAreNamed) {
+  const std::string foreign = model(node("Frobnicate", {"images"}, "output") +
+                                    value_info(11, "images", {1, 3, 64, 64}) + value_info(12, "output", {1, 84, 85}));
+  const std::string text = error_of(write(foreign));
+  EXPECT_NE(text.find("Frobnicate"), std::string::npos) << text;
+  EXPECT_NE(text.find("export"), std::string::npos) << text;
+}
+
+TEST_F(OnnxDetectorTest, InputsThatAreNoFloatImageAreRefused) {
+  const auto with_input = [&](const std::string& input) {
+    return error_of(write(model(node("Identity", {"images"}, "output") + input)));
+  };
+  with_input(value_info(11, "images", {1, 3, 64, 64}, 10));
+  with_input(value_info(11, "images", {1, 1, 64, 64}));
+  with_input(value_info(11, "images", {4, 3, 64, 64}));
+  with_input(value_info(11, "images", {1, 3, 70, 64}));
+  with_input(value_info(11, "images", {1, 3, 64}));
+}
+
+// Real weights and images, where they are.
+
+const fs::path kData = fs::path(DKB_SOURCE_DIR) / ".." / "shared" / "data";
+
+RgbdImage read_jpeg(const fs::path& path) {
+  const std::string bytes = read_file(path);
+  jpeg_decompress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_decompress(&jpeg);
+  jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  jpeg_read_header(&jpeg, TRUE);
+  jpeg.out_color_space = JCS_RGB;
+  jpeg_start_decompress(&jpeg);
+  RgbdImage image;
+  image.colour = ColourImage(static_cast<int>(jpeg.output_width), static_cast<int>(jpeg.output_height));
+  while (jpeg.output_scanline < jpeg.output_height) {
+    JSAMPROW row = &image.colour.row(static_cast<int>(jpeg.output_scanline))->r;
+    jpeg_read_scanlines(&jpeg, &row, 1);
+  }
+  jpeg_finish_decompress(&jpeg);
+  jpeg_destroy_decompress(&jpeg);
+  image.grey = grey_from_colour(image.colour);
+  return image;
+}
+
+struct RealModel {
+  const char* file;
+  YoloHead head;
+  int width, height;
+};
+
+class RealModelTest : public testing::TestWithParam<RealModel> {};
+
+TEST_P(RealModelTest, FindsBothWalkingPeople) {
+  const fs::path model = kData / "models" / GetParam().file;
+  const fs::path frames = kData / "rgbd_dataset_freiburg3_walking_halfsphere" / "rgb";
+  if (!fs::exists(model) || !fs::exists(frames)) GTEST_SKIP() << "skipped: no " << model << " or " << frames;
+  if (!onnx_available()) GTEST_SKIP() << "skipped: this build has no OpenCV dnn";
+  std::vector<fs::path> files(fs::directory_iterator(frames), fs::directory_iterator{});
+  std::sort(files.begin(), files.end());
+  OnnxOptions options;
+  options.model = model;
+  OnnxDetector detector(options, 640, 480);
+  EXPECT_EQ(detector.head(), GetParam().head);
+  EXPECT_EQ(detector.input_width(), GetParam().width);
+  EXPECT_EQ(detector.input_height(), GetParam().height);
+  for (const size_t i : {size_t{2}, size_t{12}}) {
+    const RgbdImage image = read_jpeg(files.at(i));
+    const Detections found = detector.detect(image);
+    const auto people = std::count_if(found.boxes.begin(), found.boxes.end(),
+                                      [](const Detection& d) { return d.class_name == "person"; });
+    EXPECT_EQ(people, 2) << files[i];
+    EXPECT_EQ(detector.detect(image), found);  // the same bytes again
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, RealModelTest,
+                         testing::Values(RealModel{"yolov5n_640x480.onnx", YoloHead::v5, 640, 480},
+                                         RealModel{"yolov5n_320x256.onnx", YoloHead::v5, 320, 256},
+                                         RealModel{"yolox_nano.onnx", YoloHead::yolox, 416, 416}));
+
+}  // namespace
+}  // namespace dkb

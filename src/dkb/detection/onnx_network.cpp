@@ -41,15 +41,30 @@ const DkbOnnxApi* load_module() {
   return nullptr;
 }
 
-// OpenCV's message in one line: where it names a layer, that first.
+std::string between(const std::string& text, const std::string& before, const std::string& after) {
+  const size_t start = text.find(before);
+  if (start == std::string::npos) return {};
+  const size_t end = text.find(after, start + before.size());
+  return end == std::string::npos ? std::string() : text.substr(start + before.size(), end - start - before.size());
+}
+
+// What to do about OpenCV's message, in one line with the layer first where it names one:
+// `Node [Gemm@ai.onnx]:(onnx_node!name) parse error: ... error: reason`, or `Can't create layer "..." of type "Gemm"`.
 std::string explain(const std::string& message) {
   std::string text;
   for (const char c : message) text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  if (const size_t error = text.find("error: "); error != std::string::npos) text = text.substr(error + 7);
-  if (const size_t code = text.find(") "); text.starts_with("(-") && code != std::string::npos)
-    text = text.substr(code + 2);
-  while (!text.empty() && text.back() == ' ') text.pop_back();
-  return text.size() > 300 ? text.substr(0, 300) + "..." : text;
+  std::string type = between(text, "Node [", "@"), layer = between(text, "]:(", ")");
+  if (type.empty()) type = between(text, "of type \"", "\"");
+  if (layer.empty()) layer = between(text, "Can't create layer \"", "\"");
+  if (layer.starts_with("onnx_node!")) layer.erase(0, 10);
+  std::string reason = text;
+  if (const size_t last = text.rfind("error: "); last != std::string::npos) reason = text.substr(last + 7);
+  if (const size_t code = reason.find(") "); reason.starts_with("(-") && code != std::string::npos)
+    reason.erase(0, code + 2);
+  while (!reason.empty() && (reason.back() == ' ' || reason.back() == '>')) reason.pop_back();
+  if (reason.size() > 160) reason = reason.substr(0, 160) + "...";
+  return (type.empty() ? "" : "at layer " + type + " \"" + layer + "\" ") + "(" + reason +
+         "); export it with opset 12, fixed size, 32-bit floats and without NMS, or simplify it (onnxsim)";
 }
 
 }  // namespace
@@ -64,9 +79,7 @@ OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::
                      " is not installed beside it); build with OpenCV's dnn module, or use --detector motion");
   std::array<char, 2048> error{};
   network_ = api_->open(bytes.data(), bytes.size(), error.data(), error.size());
-  if (network_ == nullptr)
-    throw InputError(name_ + ": OpenCV cannot parse the graph: " + explain(error.data()) +
-                     "; export with opset 12, static shapes and without built-in NMS");
+  if (network_ == nullptr) throw InputError(name_ + ": OpenCV cannot read the graph " + explain(error.data()));
 }
 
 OnnxNetwork::~OnnxNetwork() {
@@ -80,8 +93,7 @@ std::vector<OnnxNetwork::Output> OnnxNetwork::forward(const std::vector<float>& 
                                   static_cast<int>(tensors.size()), error.data(), error.size());
   if (count < 0)
     throw InputError(name_ + ": OpenCV cannot run the graph at " + std::to_string(width) + " x " +
-                     std::to_string(height) + " px: " + explain(error.data()) +
-                     "; export with opset 12, static shapes and without built-in NMS");
+                     std::to_string(height) + " px " + explain(error.data()));
   std::vector<Output> outputs;
   for (int i = 0; i < std::min<int>(count, static_cast<int>(tensors.size())); ++i) {
     const DkbOnnxTensor& tensor = tensors[static_cast<size_t>(i)];
