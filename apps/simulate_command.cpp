@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulate_command.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "dkb/dataset/simulator/sequence_writer.h"
+#include "dkb/dataset/simulator/simulator.h"
+
+namespace dkb {
+namespace {
+
+struct SimulateArguments {
+  SimulatorOptions options;
+  std::string out;
+};
+
+void run_simulate(const SimulateArguments& arguments) {
+  const Simulator simulator(arguments.options);
+  for (const std::string& note : simulator.notes()) std::fprintf(stderr, "warning: %s\n", note.c_str());
+  const bool live = isatty(STDERR_FILENO) != 0;
+  write_sequence(simulator, arguments.out, [&](int written) {
+    if (live) std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
+  });
+  if (live) std::fputs("\n", stderr);
+  std::printf("%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
+              arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),
+              static_cast<unsigned long long>(arguments.options.seed));
+}
+
+}  // namespace
+
+void register_simulate(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<SimulateArguments>();
+  CLI::App* command = app.add_subcommand("simulate", "Make a synthetic sequence in TUM layout, with its exact truth");
+  std::string scenes;
+  for (const std::string& name : simulator_scenes()) scenes += (scenes.empty() ? "" : ", ") + name;
+  SimulatorOptions& o = arguments->options;
+  command->add_option("--out", arguments->out, "folder to write; files of the same names are replaced")->required();
+  command->add_option("--scene", o.scene, scenes + ", or a YAML scene file")->capture_default_str();
+  command->add_option("--path", o.path, "trajectory (TUM format) that the camera follows, the room furnished around it");
+  command->add_option("--frames", o.frames, "frames at 30 Hz; 0: as many as the scene needs (300; loop and twins 900)")
+      ->capture_default_str();
+  command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)");
+  command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")->capture_default_str();
+  command->callback([arguments, &exit_code] {
+    run_simulate(*arguments);
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace dkb::sim {
+
+// Stateless noise: a value is a function of its coordinates and a seed alone, so that any pixel of any frame can be
+// made on any thread in any order.
+
+inline uint64_t hash64(uint64_t z) {
+  z += 0x9E3779B97F4A7C15ULL;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31);
+}
+inline uint64_t hash64(uint64_t a, uint64_t b) { return hash64(hash64(a) ^ b); }
+inline uint64_t hash64(uint64_t a, uint64_t b, uint64_t c) { return hash64(hash64(a, b) ^ c); }
+
+// Uniform in [0, 1).
+inline float unit_float(uint64_t h) { return static_cast<float>(h >> 40) * 0x1.0p-24F; }
+
+// Nearly normal, mean 0, standard deviation 1, |value| < 3.5: the sum of four 16-bit uniforms.
+inline float normal_from_bits(uint64_t h) {
+  const int sum = static_cast<int>(h & 0xFFFF) + static_cast<int>((h >> 16) & 0xFFFF) +
+                  static_cast<int>((h >> 32) & 0xFFFF) + static_cast<int>(h >> 48);
+  return static_cast<float>(sum - 131070) * (1.7320508F / 65536.0F);
+}
+
+// Smooth noise in [-1, 1] with features of size 1.
+inline float lattice_noise(float x, float y, uint64_t seed) {
+  const float fx = std::floor(x), fy = std::floor(y);
+  const auto ix = static_cast<uint32_t>(static_cast<int32_t>(fx)), iy = static_cast<uint32_t>(static_cast<int32_t>(fy));
+  float u = x - fx, v = y - fy;
+  u = u * u * (3 - 2 * u);
+  v = v * v * (3 - 2 * v);
+  const auto at = [&](uint32_t dx, uint32_t dy) {
+    uint32_t h = (ix + dx) * 0x85EBCA6BU ^ (iy + dy) * 0xC2B2AE35U ^ static_cast<uint32_t>(seed);
+    h = (h ^ (h >> 15)) * 0x2C1B3C6DU;
+    h = (h ^ (h >> 12)) * 0x297A2D39U;
+    h ^= h >> 15;
+    return static_cast<float>(h) * 0x1.0p-31F - 1.0F;
+  };
+  const float a = at(0, 0) * (1 - u) + at(1, 0) * u, b = at(0, 1) * (1 - u) + at(1, 1) * u;
+  return a * (1 - v) + b * v;
+}
+
+// Octaves of it, each half as large and half as strong; in about [-1, 1].
+inline float fractal_noise(float x, float y, int octaves, uint64_t seed) {
+  float sum = 0, weight = 0.5F;
+  for (int i = 0; i < octaves; ++i, x *= 2, y *= 2, weight *= 0.5F)
+    sum += weight * lattice_noise(x, y, seed + static_cast<uint64_t>(i) * 0x632BE5ABU);
+  return sum;
+}
+
+}  // namespace dkb::sim

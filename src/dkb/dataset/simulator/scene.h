@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/dataset/simulator/camera_path.h"
+#include "dkb/dataset/simulator/furniture.h"
+#include "dkb/dataset/simulator/movers.h"
+
+namespace dkb::sim {
+
+// Everything that a simulator shows. Scene frame: z up, floor at z = 0.
+struct Scene {
+  Materials materials;
+  Furnishing furnishing;
+  std::vector<Mover> movers;
+  Footprint inside;          // walls of the room where people walk
+  CameraPath path;           // scene_from_cam over seconds from the first frame
+  Rigid3 world_from_scene;
+  double start_stamp = 1700000000.0;  // [s] of the first frame
+  int frames = 300;
+  double exposure = 0.014;   // [s]
+  std::vector<std::string> notes;
+};
+
+// What the command line says about a scene.
+struct SceneRequest {
+  std::string name;
+  int frames = 0;   // 0: the scene's own
+  int people = -1;  // -1: the scene's own
+  uint64_t seed = 1;
+  double fps = 30;
+};
+
+// A scene by name, with its own camera path; the name is valid.
+Scene build_scene(const SceneRequest& request);
+
+// A room furnished around a given camera path (poses in any frame whose up is z or, failing that, the pictures' average
+// up), so that the camera sees furnished things 0.6 ... 3 m away.
+Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest& request);
+
+// Adds walkers that go where the camera looks. `area.inside`, `area.obstacles` and `area.camera` are filled in here.
+void add_walkers(Scene* scene, WalkArea area, int count, double duration, uint64_t seed);
+void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed);
+
+// A scene from a YAML file (docs: scene files). Throws InputError with file:line.
+Scene read_scene_file(const std::string& file, const SceneRequest& request);
+
+}  // namespace dkb::sim

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/simulator/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/dataset/simulator/noise.h"
+
+namespace dkb::sim {
+namespace {
+
+constexpr double kBaseline = 0.075;  // [m] between projector and camera
+
+uint8_t byte(float v) { return static_cast<uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F); }
+
+float in_units(float z, const CameraModel& camera) {
+  const auto factor = static_cast<float>(camera.depth_factor);
+  const float units = std::floor(z * factor + 0.5F);
+  return units <= 0 || units > 65535 ? 0.0F : static_cast<float>(static_cast<double>(units) / camera.depth_factor);
+}
+
+}  // namespace
+
+ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, double grey_noise, uint64_t seed) {
+  ColourImage out(width, height);
+  // Noise common to the channels and of each channel, so that 0.299 r + 0.587 g + 0.114 b has the wanted spread.
+  const auto own = static_cast<float>(0.8 * grey_noise);
+  const auto common = static_cast<float>(std::sqrt(std::max(0.0, 1 - 0.64 * (0.299 * 0.299 + 0.587 * 0.587 + 0.114 * 0.114))) * grey_noise);
+  const float cx = static_cast<float>(width - 1) / 2, cy = static_cast<float>(height - 1) / 2, r2 = cx * cx + cy * cy;
+  for (int y = 0; y < height; ++y) {
+    const uint64_t* row = sum.data() + static_cast<size_t>(y) * static_cast<size_t>(width);
+    Rgb* target = out.row(y);
+    const float dy = static_cast<float>(y) - cy;
+    for (int x = 0; x < width; ++x) {
+      const float dx = static_cast<float>(x) - cx, gain = (1.0F - 0.16F * (dx * dx + dy * dy) / r2) * (1.0F / 256.0F);
+      const uint64_t h = hash64(seed ^ (static_cast<uint64_t>(y) << 32 | static_cast<uint64_t>(x)));
+      const uint64_t g = hash64(h);
+      const float n = common * normal_from_bits(h);
+      // Two independent normals of the second hash's halves: sums of two uniforms are near enough for the channels.
+      const auto pair = [&](int shift) {
+        return own * (static_cast<float>((g >> shift) & 0x3FF) + static_cast<float>((g >> (shift + 10)) & 0x3FF) - 1023.0F) * (2.4494897F / 1024.0F);
+      };
+      const uint64_t c = row[x];
+      target[x].r = byte(static_cast<float>(c & 0xFFFF) * gain + n + pair(0));
+      target[x].b = byte(static_cast<float>((c >> 16) & 0xFFFF) * gain + n + pair(20));
+      target[x].g = byte(static_cast<float>((c >> 32) & 0xFFFF) * gain + n + pair(40));
+    }
+  }
+  return out;
+}
+
+DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& camera) {
+  DepthImage out(inverse_depth.width(), inverse_depth.height());
+  for (int y = 0; y < out.height(); ++y)
+    for (int x = 0; x < out.width(); ++x) {
+      const float i = inverse_depth(x, y), z = i > 0 ? 1 / i : 0;
+      if (z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max)) out(x, y) = in_units(z, camera);
+    }
+  return out;
+}
+
+DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine, const CameraModel& camera,
+                       uint64_t seed) {
+  const int width = inverse_depth.width(), height = inverse_depth.height();
+  DepthImage out(width, height);
+  const auto fb = static_cast<float>(camera.fx * kBaseline);  // disparity [px] = fb / z
+  const auto z_min = static_cast<float>(camera.depth_min), z_max = static_cast<float>(camera.depth_max);
+  std::vector<float> shadow(static_cast<size_t>(width));
+  std::vector<int> source(static_cast<size_t>(width));
+  for (int y = 0; y < height; ++y) {
+    const auto fy = static_cast<float>(y);
+    // The sensor correlates windows: outlines wander by about a pixel.
+    for (int x = 0; x < width; ++x) {
+      const float n = lattice_noise(static_cast<float>(x) * 0.35F, fy * 0.35F, hash64(seed, 11));
+      source[static_cast<size_t>(x)] = std::clamp(x + static_cast<int>(std::floor(n * 1.6F + 0.5F)), 0, width - 1);
+    }
+    // A point is lit when no point further right hides it from the projector, which stands to the right: along the row
+    // its column in the projector's image must fall.
+    float lowest = 1e9F;
+    for (int x = width - 1; x >= 0; --x) {
+      const float i = inverse_depth(source[static_cast<size_t>(x)], y), column = static_cast<float>(x) - fb * i;
+      shadow[static_cast<size_t>(x)] = column - lowest;
+      lowest = std::min(lowest, column);
+    }
+    for (int x = 0; x < width; ++x) {
+      const int sx = source[static_cast<size_t>(x)];
+      const float inverse = inverse_depth(sx, y);
+      if (inverse <= 0) continue;
+      const float z = 1 / inverse;
+      if (z < z_min || z > z_max) continue;
+      const uint64_t h = hash64(seed ^ (static_cast<uint64_t>(y) << 32 | static_cast<uint64_t>(x)));
+      const auto fx = static_cast<float>(x);
+      const float patch = lattice_noise(fx * 0.12F, fy * 0.12F, hash64(seed, 12));
+      const float rough = 0.6F * patch + 0.4F * lattice_noise(fx * 0.4F, fy * 0.4F, hash64(seed, 13));
+      if (shadow[static_cast<size_t>(x)] > 1.0F + 0.6F * patch) continue;
+      if (cosine(sx, y) < 0.19F + 0.06F * rough) continue;                                 // slanted
+      if (grey(sx, y) * (0.4F + 0.6F * cosine(sx, y)) < 23.0F + 9.0F * rough + 1.5F * z) continue;  // dark
+      if ((h & 1023) < 2) continue;                                                        // single drop-outs
+      // Windows that straddle an edge find no match.
+      bool edge = false;
+      const int reach = rough > 0.1F ? 2 : 1;
+      for (const int dy : {-reach, 0, reach})
+        for (const int dx : {-reach, 0, reach}) {
+          const int nx = std::clamp(sx + dx, 0, width - 1), ny = std::clamp(y + dy, 0, height - 1);
+          edge |= std::abs(inverse_depth(nx, ny) - inverse) > 0.06F * inverse;
+        }
+      if (edge && rough > -0.25F) continue;
+      // Half of the noise's variance is shared by neighbours, as windows overlap. 1.96: lattice noise to unit spread.
+      const float sigma = 0.0012F + 0.0019F * (z - 0.4F) * (z - 0.4F);
+      const float shared = 1.96F * lattice_noise(fx * 0.31F + 7.7F, fy * 0.31F + 3.3F, hash64(seed, 14));
+      const float noise = 0.70710678F * (normal_from_bits(hash64(h)) + shared) * sigma;
+      const float disparity = fb * inverse - noise * fb * inverse * inverse;
+      const float stepped = std::floor(disparity * 8.0F + 0.5F) / 8.0F;
+      if (stepped <= 0) continue;
+      const float measured = fb / stepped;
+      if (measured >= z_min && measured <= z_max) out(x, y) = in_units(measured, camera);
+    }
+  }
+  return out;
+}
+
+}  // namespace dkb::sim

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/simulator/simulator.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "dkb/dataset/simulator/noise.h"
+#include "dkb/dataset/simulator/rasteriser.h"
+#include "dkb/dataset/simulator/scene.h"
+#include "dkb/dataset/simulator/sensor.h"
+#include "dkb/dataset/trajectory_file.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+namespace {
+
+// Ray positions in a pixel and moments of the exposure, one each per drawing: the two do not follow each other, so that
+// neither direction of motion is favoured. 1/16 px.
+constexpr std::array<std::array<int, 2>, 8> kRays{{{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
+constexpr double kLensBlur = 1.3;     // rays spread over that many pixels
+constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth
+
+std::string stamp_text(int64_t microseconds) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%lld.%06lld", static_cast<long long>(microseconds / 1000000), static_cast<long long>(microseconds % 1000000));
+  return text.data();
+}
+
+std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
+  std::vector<sim::TimedPose> poses;
+  for (const StampedPose& p : read_trajectory(file))
+    if (poses.empty() || p.timestamp > poses.back().time) poses.push_back({p.timestamp, p.world_from_cam});
+  if (poses.size() < 2) throw InputError(file + ": holds " + std::to_string(poses.size()) + " poses; a camera path needs at least 2 at different times");
+  return poses;
+}
+
+double median_of(std::vector<float>* v) {
+  const auto middle = v->begin() + static_cast<std::ptrdiff_t>(v->size() / 2);
+  std::nth_element(v->begin(), middle, v->end());
+  return static_cast<double>(*middle);
+}
+
+}  // namespace
+
+const std::vector<std::string>& simulator_scenes() {
+  static const std::vector<std::string> names{"room", "crowd", "loop", "spin", "rush", "straight", "cover", "chair", "twins"};
+  return names;
+}
+
+void SimulatorOptions::check() const {
+  require_option(frames >= 0 && frames <= 1000000, "frames", frames, "0 (as many as the scene needs) ... 1000000");
+  require_option(people >= -1 && people <= 30, "people", people, "0 ... 30");
+  require_option(width >= 64 && width <= 4096, "width", width, "64 ... 4096 px");
+  require_option(height >= 64 && height <= 4096, "height", height, "64 ... 4096 px");
+  require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure, "0.001 ... 0.03 s, or 0 for the scene's own");
+  require_option(grey_noise >= 0 && grey_noise <= 20, "grey_noise", grey_noise, "0 ... 20 grey levels");
+}
+
+struct Simulator::Impl {
+  SimulatorOptions options;
+  CameraModel camera;
+  sim::Scene scene;
+  double exposure = 0.014;
+
+  int64_t start_us() const { return std::llround(scene.start_stamp * 1e6); }
+  int64_t colour_us(int i) const { return std::llround(i * 1e6 / camera.fps); }
+  int64_t depth_us(int i) const {
+    const double shift = (2.0 * static_cast<double>(sim::unit_float(sim::hash64(options.seed, 0xD5, static_cast<uint64_t>(i)))) - 1.0) * kStampSpread;
+    return colour_us(i) + std::llround(shift * 1e6);
+  }
+
+  // Surfaces of all movers at a time, with the owner of each primitive.
+  struct MoverSurfaces {
+    std::vector<sim::Surfaces> parts;
+  };
+  MoverSurfaces movers_at(double t) const {
+    MoverSurfaces m;
+    for (const sim::Mover& mover : scene.movers) m.parts.push_back(mover.surfaces(t));
+    return m;
+  }
+  static sim::DrawList with(const sim::DrawList& still, const MoverSurfaces& movers) {
+    sim::DrawList list = still;
+    for (const sim::Surfaces& s : movers.parts) list.add(s);
+    return list;
+  }
+  // Index of the mover that owns each id; -1 for still things.
+  static std::vector<int> owners(const sim::DrawList& still, const MoverSurfaces& movers) {
+    std::vector<int> out(still.patches.size(), -1);
+    for (size_t m = 0; m < movers.parts.size(); ++m) out.insert(out.end(), movers.parts[m].patches.size(), static_cast<int>(m));
+    out.insert(out.end(), still.quadrics.size(), -1);
+    for (size_t m = 0; m < movers.parts.size(); ++m) out.insert(out.end(), movers.parts[m].quadrics.size(), static_cast<int>(m));
+    return out;
+  }
+  void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam, double t,
+                      SimulatedFrame* frame) const;
+};
+
+void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam, double t,
+                                     SimulatedFrame* frame) const {
+  struct Seen {
+    int x0 = 1 << 20, y0 = 1 << 20, x1 = -1, y1 = -1;
+    std::vector<float> x, y, z;
+  };
+  std::vector<Seen> seen(scene.movers.size());
+  frame->mask = GreyImage(camera.width, camera.height);
+  const Rigid3 world_from_cam = scene.world_from_scene * scene_from_cam;
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x) {
+      const int32_t id = geometry.id(x, y);
+      if (id < 0 || owner[static_cast<size_t>(id)] < 0) continue;
+      frame->mask(x, y) = 255;
+      Seen& s = seen[static_cast<size_t>(owner[static_cast<size_t>(id)])];
+      s.x0 = std::min(s.x0, x);
+      s.y0 = std::min(s.y0, y);
+      s.x1 = std::max(s.x1, x);
+      s.y1 = std::max(s.y1, y);
+      const Eigen::Vector3d p = world_from_cam * camera.unproject({x, y}, 1.0 / static_cast<double>(geometry.inverse_depth(x, y)));
+      s.x.push_back(static_cast<float>(p.x()));
+      s.y.push_back(static_cast<float>(p.y()));
+      s.z.push_back(static_cast<float>(p.z()));
+    }
+  for (size_t m = 0; m < seen.size(); ++m) {
+    Seen& s = seen[m];
+    if (s.x.empty()) continue;
+    SimulatedMover out;
+    out.id = scene.movers[m].id;
+    out.kind = scene.movers[m].kind;
+    out.position_in_world = {median_of(&s.x), median_of(&s.y), median_of(&s.z)};
+    const Eigen::Vector2d v = scene.movers[m].track.at(t).velocity;
+    out.velocity_in_world = scene.world_from_scene.rotation * Eigen::Vector3d(v.x(), v.y(), 0);
+    out.box_x = s.x0;
+    out.box_y = s.y0;
+    out.box_width = s.x1 - s.x0 + 1;
+    out.box_height = s.y1 - s.y0 + 1;
+    frame->movers.push_back(out);
+  }
+}
+
+Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<Impl>()) {
+  options.check();
+  Impl& m = *impl_;
+  m.options = options;
+  const double scale = options.width / 640.0;
+  m.camera.width = options.width;
+  m.camera.height = options.height;
+  m.camera.fx = m.camera.fy = 525.0 * scale;
+  m.camera.cx = (options.width - 1) / 2.0;
+  m.camera.cy = (options.height - 1) / 2.0;
+  m.camera.depth_min = 0.4;
+  m.camera.depth_max = 8.0;
+  m.camera.check();
+  sim::SceneRequest request;
+  request.name = options.scene;
+  request.frames = options.frames;
+  request.people = options.people;
+  request.seed = options.seed;
+  request.fps = m.camera.fps;
+  const bool file = options.scene.find_first_of("./") != std::string::npos;
+  const auto& names = simulator_scenes();
+  if (!file && std::find(names.begin(), names.end(), options.scene) == names.end()) {
+    std::string list;
+    for (const std::string& n : names) list += (list.empty() ? "" : ", ") + n;
+    throw InputError("--scene: unknown scene \"" + options.scene + "\"" + did_you_mean(options.scene, names) + "; there are " + list +
+                     ", or a YAML file");
+  }
+  if (!options.path.empty()) {
+    if (options.scene != "room") throw InputError("--path: the camera follows a path only in scene room, not in " + options.scene + "; leave out --scene");
+    m.scene = sim::build_scene_around(poses_of_file(options.path), request);
+  } else if (file) {
+    m.scene = sim::read_scene_file(options.scene, request);
+  } else {
+    m.scene = sim::build_scene(request);
+  }
+  m.exposure = options.exposure > 0 ? options.exposure : m.scene.exposure;
+}
+
+Simulator::~Simulator() = default;
+Simulator::Simulator(Simulator&&) noexcept = default;
+Simulator& Simulator::operator=(Simulator&&) noexcept = default;
+
+int Simulator::frames() const { return impl_->scene.frames; }
+const CameraModel& Simulator::camera() const { return impl_->camera; }
+double Simulator::exposure() const { return impl_->exposure; }
+const std::vector<std::string>& Simulator::notes() const { return impl_->scene.notes; }
+Rigid3 Simulator::world_from_cam(double seconds) const { return impl_->scene.world_from_scene * impl_->scene.path(seconds); }
+double Simulator::stamp(int index) const { return static_cast<double>(impl_->start_us() + impl_->colour_us(index)) * 1e-6; }
+
+double Simulator::nearest_mover(double seconds) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d eye = impl_->scene.path(seconds).translation;
+  for (const sim::Mover& mover : impl_->scene.movers) nearest = std::min(nearest, (mover.track.at(seconds).position - eye.head<2>()).norm());
+  return nearest;
+}
+
+SimulatedFrame Simulator::render(int index) const {
+  const Impl& m = *impl_;
+  SimulatedFrame frame;
+  frame.index = index;
+  const int64_t colour_us = m.colour_us(index), depth_us = m.depth_us(index);
+  frame.stamp = stamp_text(m.start_us() + colour_us);
+  frame.depth_stamp = stamp_text(m.start_us() + depth_us);
+  frame.image.timestamp = static_cast<double>(m.start_us() + colour_us) * 1e-6;
+  frame.image.depth_timestamp = static_cast<double>(m.start_us() + depth_us) * 1e-6;
+  const double t = static_cast<double>(colour_us) * 1e-6, depth_t = static_cast<double>(depth_us) * 1e-6;
+  const Rigid3 middle = m.scene.path(t);
+  frame.world_from_cam = m.scene.world_from_scene * middle;
+  frame.world_from_depth_cam = m.scene.world_from_scene * m.scene.path(depth_t);
+
+  // What may be seen at any moment of the frame.
+  double slack = 0;
+  for (const double other : {t - m.exposure / 2, t + m.exposure / 2, depth_t}) {
+    const Rigid3 motion = m.scene.path(other).inverse() * middle;
+    slack = std::max({slack, motion.translation.norm(), vector_from_rotation(motion.rotation).norm()});
+  }
+  sim::DrawList still;
+  still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), 1.5 * slack + 0.02);
+
+  sim::Rasteriser rasteriser(m.camera);
+  sim::GeometryImage geometry;
+  const uint64_t seed = sim::hash64(m.options.seed, 0x5EED, static_cast<uint64_t>(index));
+  {
+    const auto movers = m.movers_at(t);
+    const sim::DrawList list = Impl::with(still, movers);
+    rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), &geometry);
+    m.observe_movers(geometry, Impl::owners(still, movers), middle, t, &frame);
+    frame.true_depth = DepthImage(m.camera.width, m.camera.height);
+    for (size_t i = 0; i < geometry.inverse_depth.size(); ++i) {
+      const float inverse = geometry.inverse_depth.data()[i];
+      frame.true_depth.data()[i] = inverse > 0 ? 1 / inverse : 0;
+    }
+  }
+  std::vector<uint64_t> sum(static_cast<size_t>(m.camera.width) * static_cast<size_t>(m.camera.height), 0);
+  for (size_t k = 0; k < kRays.size(); ++k) {
+    const double at = t + m.exposure * ((static_cast<double>(k) + 0.5) / kRays.size() - 0.5);
+    const auto movers = m.movers_at(at);
+    const sim::DrawList list = Impl::with(still, movers);
+    const Eigen::Vector2d offset = kLensBlur / 16.0 * Eigen::Vector2d(kRays[k][0], kRays[k][1]);
+    rasteriser.draw(list, m.scene.path(at).inverse(), offset, &geometry);
+    // The mip level is dithered in an order of its own.
+    const float level_shift = (static_cast<float>((k * 3) % kRays.size()) + 0.5F) / static_cast<float>(kRays.size());
+    rasteriser.add_colour(list, m.scene.materials, geometry, level_shift, &sum);
+  }
+  frame.image.colour = sim::expose(sum, m.camera.width, m.camera.height, m.options.grey_noise, sim::hash64(seed, 1));
+  frame.image.grey = grey_from_colour(frame.image.colour);
+  {
+    const auto movers = m.movers_at(depth_t);
+    const sim::DrawList list = Impl::with(still, movers);
+    rasteriser.draw(list, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), &geometry);
+    if (m.options.depth_noise) {
+      Image<float> grey, cosine;
+      rasteriser.reflectance(list, m.scene.materials, geometry, &grey, &cosine);
+      frame.image.depth = sim::sense_depth(geometry.inverse_depth, grey, cosine, m.camera, sim::hash64(seed, 2));
+    } else {
+      frame.image.depth = sim::round_depth(geometry.inverse_depth, m.camera);
+    }
+  }
+  return frame;
+}
+
+}  // namespace dkb
