@@ -11,7 +11,6 @@ namespace baseline {
 #define DKB_KERNEL
 #define DKB_WIDE 0
 #include "dkb/solver/kernels.inl"
-#include "dkb/solver/pack.inl"
 #undef DKB_WIDE
 #undef DKB_KERNEL
 }  // namespace baseline
@@ -21,7 +20,6 @@ namespace avx2 {
 #define DKB_KERNEL __attribute__((target("avx2")))
 #define DKB_WIDE 1
 #include "dkb/solver/kernels.inl"
-#include "dkb/solver/pack.inl"
 #undef DKB_WIDE
 #undef DKB_KERNEL
 }  // namespace avx2

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Source of the kernels, included once per instruction set with DKB_KERNEL set to the function attribute.
-// Needs pack.inl; see kernels.cpp.
+// No include guard: see kernels.cpp.
+#include "dkb/solver/pack.inl"
 
 // Huber: rho(s) = s up to the corner c^2, 2 c sqrt(s) - c^2 beyond. Returns rho; `slope` is its derivative.
 DKB_KERNEL inline Pack huber(const Pack& s, const Pack& corner2, Pack& slope) {

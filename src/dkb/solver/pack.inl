@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Four numbers that the processor works on at once: one register of AVX2 (DKB_WIDE), or two of SSE2 or NEON. Included
-// once per instruction set, by kernels.cpp, with DKB_KERNEL set to the function attribute. Both kinds do the same
+// once per instruction set, by kernels.inl, with DKB_KERNEL set to the function attribute. Both kinds do the same
 // operations number by number, so they give the same bits.
 
 #if DKB_WIDE
