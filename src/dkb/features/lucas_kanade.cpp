@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/lucas_kanade.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace dkb {
+namespace {
+
+constexpr int kWeightBits = 14;
+constexpr int kShift = kWeightBits - 4;  // leaves 1/16 grey levels
+constexpr int kRound = 1 << (kShift - 1);
+
+// Top-left pixel of a window and the bilinear weights that all its samples share.
+struct Placement {
+  int x = 0, y = 0;
+  int w00 = 0, w01 = 0, w10 = 0, w11 = 0;
+};
+
+Placement place(double x, double y, int size) {
+  const double floor_x = std::floor(x), floor_y = std::floor(y);
+  const double fx = x - floor_x, fy = y - floor_y;
+  constexpr double kOne = 1 << kWeightBits;
+  Placement p;
+  p.x = static_cast<int>(floor_x) - size / 2;
+  p.y = static_cast<int>(floor_y) - size / 2;
+  p.w00 = static_cast<int>((1 - fx) * (1 - fy) * kOne + 0.5);
+  p.w01 = static_cast<int>(fx * (1 - fy) * kOne + 0.5);
+  p.w10 = static_cast<int>((1 - fx) * fy * kOne + 0.5);
+  p.w11 = (1 << kWeightBits) - p.w00 - p.w01 - p.w10;
+  return p;
+}
+
+void sample_scalar(const GreyImage& image, const Placement& p, int size, int16_t* samples) {
+  for (int row = 0; row < size; ++row) {
+    const uint8_t* upper = image.row(p.y + row) + p.x;
+    const uint8_t* lower = image.row(std::min(p.y + row + 1, image.height() - 1)) + p.x;
+    // On the last pixel the weight of the next one is 0; do not read it.
+    const int last = image.width() - 1 - p.x;
+    for (int i = 0; i < size; ++i) {
+      const int next = std::min(i + 1, last);
+      const int sum = upper[i] * p.w00 + upper[next] * p.w01 + lower[i] * p.w10 + lower[next] * p.w11;
+      samples[row * kLkStride + i] = static_cast<int16_t>((sum + kRound) >> kShift);
+    }
+  }
+}
+
+LkSums sums_scalar(const LkTemplate& reference, const int16_t* samples) {
+  LkSums sums;
+  for (int row = 0; row < reference.size; ++row)
+    for (int i = row * kLkStride; i < row * kLkStride + reference.size; ++i) {
+      const int d = samples[i] - reference.value[i];
+      sums.d += d;
+      sums.absolute += std::abs(d);
+      sums.squared += d * d;
+      sums.dx += d * reference.dx[i];
+      sums.dy += d * reference.dy[i];
+    }
+  return sums;
+}
+
+#if defined(__x86_64__)
+struct PixelPairs {
+  __m256i low, high;  // horizontally adjacent pixels of 16 columns, as 16-bit numbers
+};
+
+DKB_TARGET_AVX2 inline PixelPairs load_pairs(const uint8_t* p) {
+  const __m128i here = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
+  const __m128i next = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p + 1));
+  return {_mm256_cvtepu8_epi16(_mm_unpacklo_epi8(here, next)), _mm256_cvtepu8_epi16(_mm_unpackhi_epi8(here, next))};
+}
+
+DKB_TARGET_AVX2 void sample_avx2(const GreyImage& image, const Placement& p, int size, int16_t* samples) {
+  const __m256i upper_weights = _mm256_set1_epi32(p.w00 | p.w01 << 16);
+  const __m256i lower_weights = _mm256_set1_epi32(p.w10 | p.w11 << 16);
+  const __m256i round = _mm256_set1_epi32(kRound);
+  for (int column = 0; column < size; column += 16) {
+    PixelPairs upper = load_pairs(image.row(p.y) + p.x + column);
+    for (int row = 0; row < size; ++row) {
+      const PixelPairs lower = load_pairs(image.row(p.y + row + 1) + p.x + column);
+      __m256i low =
+          _mm256_add_epi32(_mm256_madd_epi16(upper.low, upper_weights), _mm256_madd_epi16(lower.low, lower_weights));
+      __m256i high =
+          _mm256_add_epi32(_mm256_madd_epi16(upper.high, upper_weights), _mm256_madd_epi16(lower.high, lower_weights));
+      low = _mm256_srai_epi32(_mm256_add_epi32(low, round), kShift);
+      high = _mm256_srai_epi32(_mm256_add_epi32(high, round), kShift);
+      const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xD8);
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(samples + row * kLkStride + column), packed);
+      upper = lower;
+    }
+  }
+}
+
+DKB_TARGET_AVX2 inline int64_t sum_lanes(__m256i v) {
+  alignas(32) int32_t lanes[8];
+  _mm256_store_si256(reinterpret_cast<__m256i*>(lanes), v);
+  int64_t sum = 0;
+  for (const int32_t lane : lanes) sum += lane;
+  return sum;
+}
+
+// No lane overflows: products of differences are below 4080^2, two to a lane and step, in at most 29 rows of 2 blocks.
+DKB_TARGET_AVX2 LkSums sums_avx2(const LkTemplate& reference, const int16_t* samples) {
+  const __m256i ones = _mm256_set1_epi16(1);
+  const __m256i index = _mm256_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  __m256i sum = _mm256_setzero_si256(), absolute = sum, squared = sum, dx = sum, dy = sum;
+  for (int column = 0; column < reference.size; column += 16) {
+    const __m256i inside = _mm256_cmpgt_epi16(_mm256_set1_epi16(static_cast<int16_t>(reference.size - column)), index);
+    for (int row = 0; row < reference.size; ++row) {
+      const int at = row * kLkStride + column;
+      const __m256i value = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.value + at));
+      const __m256i sample = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(samples + at));
+      const __m256i d = _mm256_and_si256(_mm256_sub_epi16(sample, value), inside);
+      const __m256i slope_x = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dx + at));
+      const __m256i slope_y = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dy + at));
+      sum = _mm256_add_epi32(sum, _mm256_madd_epi16(d, ones));
+      absolute = _mm256_add_epi32(absolute, _mm256_madd_epi16(_mm256_abs_epi16(d), ones));
+      squared = _mm256_add_epi32(squared, _mm256_madd_epi16(d, d));
+      dx = _mm256_add_epi32(dx, _mm256_madd_epi16(d, slope_x));
+      dy = _mm256_add_epi32(dy, _mm256_madd_epi16(d, slope_y));
+    }
+  }
+  return {sum_lanes(sum), sum_lanes(absolute), sum_lanes(squared), sum_lanes(dx), sum_lanes(dy)};
+}
+#endif
+
+}  // namespace
+
+bool lk_fits(const GreyImage& image, double x, double y, int size) {
+  const double before = size / 2, after = size - 1 - size / 2;
+  return x - before >= 0 && y - before >= 0 && x + after <= image.width() - 1 && y + after <= image.height() - 1;
+}
+
+void lk_sample(const GreyImage& image, double x, double y, int size, int16_t* samples, [[maybe_unused]] Simd simd) {
+  const Placement p = place(x, y, size);
+#if defined(__x86_64__)
+  // Blocks of 16 columns and their right neighbours are read, one row beyond the window; that must stay in memory.
+  const size_t columns = static_cast<size_t>((size + 15) / 16 * 16);
+  const size_t last =
+      static_cast<size_t>(p.y + size) * static_cast<size_t>(image.width()) + static_cast<size_t>(p.x) + columns;
+  if (simd == Simd::avx2 && last < image.size()) return sample_avx2(image, p, size, samples);
+#endif
+  sample_scalar(image, p, size, samples);
+}
+
+void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& target) {
+  target.size = size;
+  int64_t sum_dx = 0, sum_dy = 0, xx = 0, xy = 0, yy = 0;
+  for (int row = 0; row < size; ++row) {
+    const int16_t* middle = samples_with_rim + (row + 1) * kLkStride + 1;
+    const int16_t* above = middle - kLkStride;
+    const int16_t* below = middle + kLkStride;
+    int16_t* value = target.value + row * kLkStride;
+    int16_t* dx = target.dx + row * kLkStride;
+    int16_t* dy = target.dy + row * kLkStride;
+    int32_t row_dx = 0, row_dy = 0, row_xx = 0, row_xy = 0, row_yy = 0;
+    for (int i = 0; i < size; ++i) {
+      value[i] = middle[i];
+      dx[i] = static_cast<int16_t>(middle[i + 1] - middle[i - 1]);
+      dy[i] = static_cast<int16_t>(below[i] - above[i]);
+      row_dx += dx[i];
+      row_dy += dy[i];
+      row_xx += dx[i] * dx[i];
+      row_xy += dx[i] * dy[i];
+      row_yy += dy[i] * dy[i];
+    }
+    // The vector kernel reads whole blocks and multiplies what lies outside by zero.
+    std::fill(value + size, value + kLkStride, int16_t{0});
+    std::fill(dx + size, dx + kLkStride, int16_t{0});
+    std::fill(dy + size, dy + kLkStride, int16_t{0});
+    sum_dx += row_dx;
+    sum_dy += row_dy;
+    xx += row_xx;
+    xy += row_xy;
+    yy += row_yy;
+  }
+  target.sum_dx = sum_dx;
+  target.sum_dy = sum_dy;
+  target.sum_xx = xx;
+  target.sum_xy = xy;
+  target.sum_yy = yy;
+}
+
+LkSums lk_sums(const LkTemplate& reference, const int16_t* samples, [[maybe_unused]] Simd simd) {
+#if defined(__x86_64__)
+  if (simd == Simd::avx2) return sums_avx2(reference, samples);
+#endif
+  return sums_scalar(reference, samples);
+}
+
+}  // namespace dkb

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "dkb/features/image_pyramid.h"
+#include "dkb/features/simd.h"
+
+namespace dkb {
+
+struct OpticalFlowOptions {
+  int window = 11;            // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
+  int levels = 4;             // pyramid levels used, >= 1; the pyramids may have fewer
+  int max_iterations = 10;    // per level, >= 1
+  double epsilon = 0.02;      // [px of the level] a smaller step ends a level, > 0
+  double min_eigenvalue = 1;  // [(grey levels / px)^2] mean over the window; flatter windows are not followed, >= 0
+  double max_residual = 30;   // [grey levels] a larger mean absolute difference means lost, > 0
+  void check() const;         // throws InvalidOption
+
+  // What build() of both frames' pyramids is best given.
+  ImagePyramidOptions pyramid() const { return {.levels = levels, .scale = 2.0, .min_size = 2 * window}; }
+};
+
+struct FlowResult {
+  Eigen::Vector2f position{0, 0};  // [px] in the current image; the last estimate when not found
+  bool found = false;
+  float residual = 0;        // [grey levels] mean absolute difference of the windows at full resolution
+  float min_eigenvalue = 0;  // [(grey levels / px)^2] of the structure tensor at full resolution, mean over the window
+};
+
+// Sparse optical flow by pyramidal Lucas-Kanade (Lucas and Kanade, IJCAI 1981; Bouguet 2000): from the coarsest level
+// to the finest, the displacement minimises the squared difference of a window, [u v]^T = (A^T A)^-1 A^T b (DKB eqs.
+// 1-8), iterated with slopes of the previous image. Levels where the window does not fit or is too flat are passed
+// over, the finest excepted. Deterministic and independent of the processor; results do not depend on one another.
+class OpticalFlow {
+ public:
+  explicit OpticalFlow(OpticalFlowOptions options = {}, Simd simd = best_simd());
+
+  // Positions [px, full resolution] of the previous image's `points` in the current image. Both pyramids must be of
+  // equal size (InputError). `guesses`: where to begin in the current image, as many as points or none (at the points).
+  std::vector<FlowResult> track(const ImagePyramid& previous, const ImagePyramid& current,
+                                std::span<const Eigen::Vector2f> points,
+                                std::span<const Eigen::Vector2f> guesses = {}) const;
+
+  // Follows found results back to the previous image and clears `found` of those that end more than `max_distance` [px]
+  // away from where they began.
+  void reject_inconsistent(const ImagePyramid& previous, const ImagePyramid& current,
+                           std::span<const Eigen::Vector2f> points, double max_distance,
+                           std::vector<FlowResult>& results) const;
+
+ private:
+  FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point,
+                       const Eigen::Vector2f& guess) const;
+
+  OpticalFlowOptions options_;
+  Simd simd_;
+};
+
+}  // namespace dkb

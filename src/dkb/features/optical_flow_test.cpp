@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/optical_flow.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/features/fast_corners.h"
+#include "dkb/features/feature_test_util.h"
+#include "dkb/features/lucas_kanade.h"
+#include "dkb/util/errors.h"
+
+#ifdef DKB_TEST_OPENCV
+#include <opencv2/video/tracking.hpp>
+#endif
+
+namespace dkb {
+namespace {
+
+using Motion = SquareWorld::Motion;
+
+struct Scene {
+  SquareWorld world{320, 240, 250, 8};
+  OpticalFlowOptions options;
+  ImagePyramid previous{options.pyramid()}, current{options.pyramid()};
+  std::vector<Eigen::Vector2f> points;
+
+  explicit Scene(const Motion& motion, double noise = 0) {
+    const GreyImage first = world.render({}, noise, 1);
+    previous.build(first);
+    current.build(world.render(motion, noise, 2));
+    std::vector<PixelCorner> corners;
+    FastCornerFinder().find(first, 30, 20, corners);
+    for (size_t i = 0; i < corners.size() && points.size() < 150; i += 2)
+      points.emplace_back(static_cast<float>(corners[i].x) + 0.3F, static_cast<float>(corners[i].y) - 0.2F);
+  }
+  Eigen::Vector2f truth(const Motion& motion, const Eigen::Vector2f& p) const {
+    double x = 0, y = 0;
+    world.move(motion, p.x(), p.y(), x, y);
+    return {static_cast<float>(x), static_cast<float>(y)};
+  }
+};
+
+double median_error(const Scene& scene, const Motion& motion, const std::vector<FlowResult>& results) {
+  std::vector<double> errors;
+  for (size_t i = 0; i < results.size(); ++i)
+    if (results[i].found) errors.push_back((results[i].position - scene.truth(motion, scene.points[i])).norm());
+  EXPECT_GT(errors.size(), 0.8 * static_cast<double>(scene.points.size()));
+  std::sort(errors.begin(), errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST(LucasKanade, SamplesABilinearSurfaceExactly) {
+  GreyImage image(40, 30);
+  for (int y = 0; y < 30; ++y)
+    for (int x = 0; x < 40; ++x) image(x, y) = static_cast<uint8_t>(10 + 3 * x + 2 * y);
+  LkSamples samples;
+  lk_sample(image, 12.25, 10.5, 5, samples, Simd::scalar);
+  EXPECT_EQ(samples[2 * kLkStride + 2], 16 * (10 + 3 * 12.25 + 2 * 10.5));
+  EXPECT_EQ(samples[0], 16 * (10 + 3 * 10.25 + 2 * 8.5));
+}
+
+TEST(LucasKanade, VectorKernelsEqualScalar) {
+  const GreyImage image = noise_image(70, 50, 2);
+  Random random(3);
+  for (const int size : {5, 8, 10, 11, 15, 16, 17, 21, 29})
+    for (int trial = 0; trial < 50; ++trial) {
+      const int rim = size + 2;
+      const double x = random.uniform(rim / 2, 69 - rim / 2), y = random.uniform(rim / 2, 49 - rim / 2);
+      if (!lk_fits(image, x, y, rim)) continue;
+      alignas(32) LkSamples fast, scalar;
+      lk_sample(image, x, y, rim, fast, best_simd());
+      lk_sample(image, x, y, rim, scalar, Simd::scalar);
+      for (int row = 0; row < rim; ++row)
+        for (int i = 0; i < rim; ++i) ASSERT_EQ(fast[row * kLkStride + i], scalar[row * kLkStride + i]);
+      LkTemplate reference;
+      lk_make_template(fast, size, reference);
+      lk_sample(image, y, x > 40 ? 20 : x, std::min(size, 9), fast, best_simd());
+      EXPECT_EQ(lk_sums(reference, fast, best_simd()), lk_sums(reference, fast, Simd::scalar));
+    }
+}
+
+TEST(LucasKanade, SumsDoNotOverflowAtTheLargestContrast) {
+  GreyImage black(60, 60, 0), stripes(60, 60, 0);
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 60; ++x) stripes(x, y) = (x / 2) % 2 == 0 ? 255 : 0;
+  alignas(32) LkSamples samples;
+  LkTemplate reference;
+  lk_sample(stripes, 30, 30, 31, samples, best_simd());
+  lk_make_template(samples, 29, reference);
+  lk_sample(black, 30, 30, 29, samples, best_simd());
+  EXPECT_EQ(lk_sums(reference, samples, best_simd()), lk_sums(reference, samples, Simd::scalar));
+}
+
+TEST(OpticalFlow, FollowsShiftsOfAllSizesToAFractionOfAPixel) {
+  for (const Motion& motion : {Motion{1, 0, 0.3, -0.4}, Motion{1, 0, 4.7, 2.2}, Motion{1, 0, -13.4, 9.8}}) {
+    const Scene scene(motion);
+    EXPECT_LT(median_error(scene, motion, OpticalFlow().track(scene.previous, scene.current, scene.points)), 0.03);
+  }
+}
+
+TEST(OpticalFlow, FollowsUnderNoiseAndSmallTurns) {
+  const Motion motion = Motion::turned(0.03, 1.02, 3.3, -1.8);
+  const Scene scene(motion, 2.0);
+  EXPECT_LT(median_error(scene, motion, OpticalFlow().track(scene.previous, scene.current, scene.points)), 0.12);
+}
+
+TEST(OpticalFlow, AGuessBridgesWhatTheWindowCannot) {
+  const Motion motion{1, 0, 31.0, -22.0};
+  const Scene scene(motion);
+  const OpticalFlow flow({.levels = 1});
+  std::vector<Eigen::Vector2f> points, guesses;
+  for (const Eigen::Vector2f& p : scene.points) {
+    const Eigen::Vector2f target = scene.truth(motion, p);
+    if (target.x() < 20 || target.y() < 20 || target.x() > 300 || target.y() > 220) continue;
+    points.push_back(p);
+    guesses.push_back(target + Eigen::Vector2f(1.2F, -0.9F));
+  }
+  ASSERT_GT(points.size(), 30u);
+  const std::vector<FlowResult> results = flow.track(scene.previous, scene.current, points, guesses);
+  size_t good = 0;
+  for (size_t i = 0; i < points.size(); ++i)
+    good += results[i].found && (results[i].position - scene.truth(motion, points[i])).norm() < 0.1F;
+  EXPECT_GT(good, 0.8 * static_cast<double>(points.size()));
+}
+
+TEST(OpticalFlow, VectorKernelsEqualScalarBitForBit) {
+  const Scene scene(Motion{1, 0, 4.7, 2.2}, 2.0);
+  for (const int window : {5, 11, 15, 21}) {
+    const std::vector<FlowResult> fast =
+        OpticalFlow({.window = window}).track(scene.previous, scene.current, scene.points);
+    const std::vector<FlowResult> scalar =
+        OpticalFlow({.window = window}, Simd::scalar).track(scene.previous, scene.current, scene.points);
+    for (size_t i = 0; i < fast.size(); ++i) {
+      EXPECT_EQ(fast[i].position, scalar[i].position);
+      EXPECT_EQ(fast[i].found, scalar[i].found);
+      EXPECT_EQ(fast[i].residual, scalar[i].residual);
+      EXPECT_EQ(fast[i].min_eigenvalue, scalar[i].min_eigenvalue);
+    }
+  }
+}
+
+TEST(OpticalFlow, FlatWindowsAndPointsOutsideAreNotFound) {
+  ImagePyramid flat(OpticalFlowOptions{}.pyramid());
+  flat.build(GreyImage(320, 240, 100));
+  const std::vector<Eigen::Vector2f> points = {{100, 100}, {-5, 20}, {3, 3}, {500, 20}, {NAN, 20}};
+  for (const FlowResult& result : OpticalFlow().track(flat, flat, points)) EXPECT_FALSE(result.found);
+}
+
+TEST(OpticalFlow, EdgesHaveASmallEigenvalueAndCornersALargeOne) {
+  GreyImage image(320, 240, 50);
+  for (int y = 100; y < 240; ++y)
+    for (int x = 150; x < 320; ++x) image(x, y) = 200;
+  ImagePyramid pyramid(OpticalFlowOptions{}.pyramid());
+  pyramid.build(image);
+  const std::vector<Eigen::Vector2f> points = {{150, 100}, {150, 180}};
+  const std::vector<FlowResult> results = OpticalFlow().track(pyramid, pyramid, points);
+  EXPECT_TRUE(results[0].found);
+  EXPECT_GT(results[0].min_eigenvalue, 100);
+  EXPECT_NEAR(results[1].min_eigenvalue, 0, 1e-3);
+  EXPECT_FALSE(results[1].found);
+}
+
+TEST(OpticalFlow, GoingThereAndBackRejectsWhatGotCovered) {
+  const Motion still{};
+  Scene scene(still);
+  GreyImage covered = scene.current.level(0);
+  for (int y = 60; y < 180; ++y)
+    for (int x = 80; x < 240; ++x) covered(x, y) = noise_image(1, 1, static_cast<uint64_t>(1000 * y + x))(0, 0);
+  scene.current.build(covered);
+  OpticalFlow flow({.max_residual = 200});
+  std::vector<FlowResult> results = flow.track(scene.previous, scene.current, scene.points);
+  flow.reject_inconsistent(scene.previous, scene.current, scene.points, 0.5, results);
+  size_t wrong = 0, kept = 0;
+  for (size_t i = 0; i < results.size(); ++i) {
+    kept += results[i].found;
+    wrong += results[i].found && (results[i].position - scene.points[i]).norm() > 1.5F;
+  }
+  EXPECT_GT(kept, scene.points.size() / 4);
+  EXPECT_LT(wrong, scene.points.size() / 20);
+}
+
+TEST(OpticalFlow, RefusesBadInput) {
+  EXPECT_THROW(OpticalFlow({.window = 10}), InvalidOption);
+  EXPECT_THROW(OpticalFlow({.window = 31}), InvalidOption);
+  ImagePyramid a, b;
+  a.build(GreyImage(100, 80));
+  b.build(GreyImage(100, 90));
+  const std::vector<Eigen::Vector2f> points(2, Eigen::Vector2f(50, 40)), guesses(1, Eigen::Vector2f(50, 40));
+  EXPECT_THROW(OpticalFlow().track(a, b, points), InputError);
+  EXPECT_THROW(OpticalFlow().track(a, a, points, guesses), InputError);
+}
+
+#ifdef DKB_TEST_OPENCV
+TEST(OpticalFlow, AgreesWithOpenCvs) {
+  for (const Motion& motion : {Motion{1, 0, 1.3, -0.6}, Motion::turned(0.02, 1.0, 5.5, 3.1)}) {
+    const Scene scene(motion, 1.0);
+    const auto wrap = [](const GreyImage& image) {
+      return cv::Mat(image.height(), image.width(), CV_8U, const_cast<uint8_t*>(image.data()));
+    };
+    std::vector<cv::Point2f> from, to;
+    for (const Eigen::Vector2f& p : scene.points) from.emplace_back(p.x(), p.y());
+    std::vector<uint8_t> status;
+    std::vector<float> error;
+    cv::calcOpticalFlowPyrLK(wrap(scene.previous.level(0)), wrap(scene.current.level(0)), from, to, status, error,
+                             {11, 11}, 3);
+    const std::vector<FlowResult> results = OpticalFlow().track(scene.previous, scene.current, scene.points);
+    std::vector<float> differences;
+    for (size_t i = 0; i < results.size(); ++i)
+      if (results[i].found && status[i] != 0)
+        differences.push_back((results[i].position - Eigen::Vector2f(to[i].x, to[i].y)).norm());
+    ASSERT_GT(differences.size(), 0.85 * static_cast<double>(scene.points.size()));
+    std::sort(differences.begin(), differences.end());
+    EXPECT_LT(differences[differences.size() / 2], 0.03F);
+    EXPECT_LT(differences[differences.size() * 9 / 10], 0.15F);
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace dkb
