@@ -190,7 +190,7 @@ void Map::remove_point(PointId id) {
   PointBlock& block = edit_block(birth_keyframe(id));
   PointSlot& s = block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(id))])];
   s.alive = false;
-  s.point.observations = {};
+  s.point.observations = std::vector<Observation>();  // {} would keep the memory
   --point_count_;
 }
 
@@ -269,8 +269,8 @@ void Map::cull_keyframe(KeyframeId id) {
   me.culled = true;
   me.cam_from_parent = cam_from_parent;
   me.features.reset();
-  me.points = {};
-  me.covisible = {};
+  me.points = std::vector<PointId>();  // {} would keep the memory
+  me.covisible = std::vector<Covisible>();
   --live_keyframe_count_;
 }
 

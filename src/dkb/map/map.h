@@ -2,13 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <atomic>
 #include <memory>
 #include <vector>
 
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
+#include "dkb/place/copy_epoch.h"
 
 namespace dkb {
 
@@ -113,28 +113,6 @@ class Map {
     std::vector<int16_t> slot_of_feature;  // -1 = none
     std::vector<PointSlot> slots;
   };
-  // Counts the copies that were made of a map. Both sides of a copy are newer than all they share, so whoever writes
-  // first takes a copy of its own. Atomic because several threads may copy the same (immutable) view.
-  class Epoch {
-   public:
-    Epoch() = default;
-    Epoch(const Epoch& other) : value_(other.advance()) {}
-    Epoch(Epoch&& other) noexcept : value_(other.value_.load(std::memory_order_relaxed)) {}
-    Epoch& operator=(const Epoch& other) {
-      value_.store(other.advance(), std::memory_order_relaxed);
-      return *this;
-    }
-    Epoch& operator=(Epoch&& other) noexcept {
-      value_.store(other.value_.load(std::memory_order_relaxed), std::memory_order_relaxed);
-      return *this;
-    }
-    uint64_t value() const { return value_.load(std::memory_order_relaxed); }
-
-   private:
-    uint64_t advance() const { return value_.fetch_add(1, std::memory_order_relaxed) + 1; }
-    mutable std::atomic<uint64_t> value_{1};
-  };
-
   // Shared while its epoch is older than the map's, ours to write when equal.
   template <class T>
   struct Shared {
@@ -149,7 +127,7 @@ class Map {
   void check_keyframes() const;
   void check_forwarding() const;
 
-  Epoch epoch_;
+  CopyEpoch epoch_;
   std::vector<Shared<Keyframe>> keyframes_;
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
   size_t point_count_ = 0;
