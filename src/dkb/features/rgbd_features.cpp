@@ -62,16 +62,19 @@ Eigen::Vector2f UndistortionTable::operator()(float x, float y) const {
 }
 
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
-                                const UndistortionTable& undistort, const Rigid3& colour_cam_from_depth_cam,
+                                const UndistortionTable& undistort, const Vector6d& velocity,
                                 const DepthOptions& options) {
   RgbdFeatures result;
   result.descriptors = orb.descriptors;
   result.keypoints.resize(orb.corners.size());
+  const Rigid3 colour_cam_from_depth_cam =
+      rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
   const Eigen::Matrix3d back = rotation.transpose();
   const bool moved =
       options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
                                     vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
+  const bool rolling = options.model_rolling_shutter && camera.readout > 0 && velocity.squaredNorm() > 0;
   std::vector<float> xs(orb.corners.size()), ys(orb.corners.size());
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     const Corner& c = orb.corners[i];
@@ -81,8 +84,6 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
     k.angle = c.angle;
     k.response = c.response;
     k.octave = c.octave;
-    xs[i] = k.pixel.x();
-    ys[i] = k.pixel.y();
     float z = depth_at(image.depth, c.x, c.y, options.edge_fraction);
     if (moved && z > 0) {
       // Where was this surface point when the depth image was taken? Ask there, and carry the answer over.
@@ -97,6 +98,19 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
                        : 0.0f;
       }
     }
+    if (rolling) {
+      const double early =
+          (0.5 - c.y / camera.height) * camera.readout;  // this row was exposed so long before the middle
+      const Eigen::Vector3d seen = camera.unproject(k.pixel.cast<double>(), z > 0 ? z : 1.0);
+      const Eigen::Vector3d turned =
+          seen + early * (velocity.tail<3>().cross(seen) + (z > 0 ? 1.0 : 0.0) * velocity.head<3>());
+      if (turned.z() > 0.05) {
+        k.pixel = camera.project(turned).cast<float>();
+        if (z > 0) z = static_cast<float>(turned.z());
+      }
+    }
+    xs[i] = k.pixel.x();
+    ys[i] = k.pixel.y();
     k.depth = z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max) ? z : 0.0f;
     const int ix = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.grey.width() - 1);
     const int iy = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.grey.height() - 1);

@@ -34,6 +34,7 @@ struct DepthOptions {
   float edge_fraction =
       0.05f;  // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
   bool model_time_offset = true;  // move depths to the colour image's time with the camera's motion
+  bool model_rolling_shutter = true;  // move features to where they would lie had the whole image been exposed at once
   void check() const;
 };
 
@@ -53,7 +54,7 @@ class UndistortionTable {
 // colour image's, as colour_cam_from_depth_cam (identity when unknown): hand-held Kinects move millimetres between the
 // two stamps.
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
-                                const UndistortionTable& undistort, const Rigid3& colour_cam_from_depth_cam,
+                                const UndistortionTable& undistort, const Vector6d& velocity,
                                 const DepthOptions& options);
 
 }  // namespace dkb

@@ -14,6 +14,7 @@ struct CameraModel {
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;        // radial k, tangential p (OpenCV's order k1 k2 p1 p2 k3)
   double depth_factor = 5000.0;                         // [units per metre] of integer depth images, > 0
   double fps = 30.0;                                    // [1/s] nominal frame rate, > 0
+  double readout = 0.0;                                 // [s] rolling shutter: from the first row's exposure to the last row's; 0 = global
   double depth_min = 0.2, depth_max = 10.0;             // [m] depth outside is treated as missing
 
   void check() const;  // throws InvalidOption
@@ -31,7 +32,8 @@ struct CameraModel {
   Eigen::Vector2d undistort(const Eigen::Vector2d& image_pixel) const;  // image -> ideal pixel, fixed-point iteration
 };
 
-// Intrinsics known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names.
+// Cameras known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names. The readout of
+// TUM's Kinects is ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);
 
 }  // namespace dkb

@@ -10,7 +10,7 @@ struct SensorNoise {
   double pixel_sigma = 1.0;             // [px] of a corner on the finest pyramid level, > 0; grows with the level's scale
   double depth_sigma_base = 0.0012;     // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
   double depth_sigma_quadratic = 0.0019;  // [1/m] growth with (z - 0.4 m)^2, >= 0   (the same source)
-  double depth_sigma_factor = 3.0;      // what edges, registration and calibration add to the source's flat-wall figure, >= 1
+  double depth_sigma_factor = 10.0;      // what edges, registration and calibration add to the source's flat-wall figure, >= 1
 
   void check() const {
     require_option(pixel_sigma > 0, "pixel_sigma", pixel_sigma, "greater than 0 px");

@@ -17,7 +17,7 @@ struct MappingOptions {
   int least_shared_points = 15;        // [points] shared points that make two keyframes covisible, >= 1
   double least_found_ratio = 0.25;     // found / visible below which a young point is dropped, 0 ... 1
   int probation_keyframes = 3;         // [keyframes] after its birth that a point is on probation, >= 1
-  int least_observers = 3;             // keyframes that must see a point by the end of its probation, >= 2
+  int least_observers = 2;             // keyframes that must see a point by the end of its probation, >= 2
   double redundant_share = 0.9;        // a keyframe is culled when this share of its points ..., 0 ... 1
   int redundant_observers = 3;         // ... is seen by so many others at the same scale or finer, >= 1
   int fusion_keyframes = 10;           // covisible keyframes whose points are fused with a new keyframe's, >= 0

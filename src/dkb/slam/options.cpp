@@ -39,6 +39,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("depth.edge_fraction", &o.depth.edge_fraction, "[1] depth step in a 3 x 3 window that voids a depth");
   s.bind("depth.model_time_offset", &o.depth.model_time_offset, "carry depths to the colour image's time");
 
+  s.bind("depth.model_rolling_shutter", &o.depth.model_rolling_shutter, "undo the rolling shutter (needs the camera's readout)");
+
   s.bind("noise.pixel_sigma", &o.noise.pixel_sigma, "[px] of a corner on the finest level");
   s.bind("noise.depth_sigma_base", &o.noise.depth_sigma_base, "[m] depth noise at 0.4 m");
   s.bind("noise.depth_sigma_quadratic", &o.noise.depth_sigma_quadratic, "[1/m] growth with (z - 0.4 m)^2");
@@ -54,6 +56,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.radius_last_frame", &t.radius_last_frame, "[px] search around the predicted position");
   s.bind("tracking.radius_wide", &t.radius_wide, "[px] second try");
   s.bind("tracking.radius_local_map", &t.radius_local_map, "[px] search for local map points");
+  s.bind("tracking.match_distance", &t.match_distance, "[bits] of a match with a map point");
+  s.bind("tracking.match_ratio", &t.match_ratio, "best over second best distance of such a match");
   s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
   s.bind("tracking.recovery_keyframes", &t.recovery_keyframes, "newest keyframes that a lost tracker tries");
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes, "keyframes that share most points with the frame");

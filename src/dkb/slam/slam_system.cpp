@@ -36,6 +36,7 @@ class SlamSystem::Impl {
   SlamOptions options_;
   UndistortionTable undistort_;
   OrbExtractor extractor_;
+  OrbFeatures orb_;  // of the frame at hand
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<MappingStage> mapping_;
@@ -62,7 +63,7 @@ class SlamSystem::Impl {
 
  private:
   void take_map(bool wait);
-  std::shared_ptr<const RgbdFeatures> extract(const RgbdImage& image);
+  void extract(const RgbdImage& image);
   KeyframeDecision decide(const TrackOutcome& outcome) const;
   void insert_keyframe(TrackedFrame& frame);
 };
@@ -91,14 +92,10 @@ void SlamSystem::Impl::take_map(bool wait) {
   if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
 }
 
-std::shared_ptr<const RgbdFeatures> SlamSystem::Impl::extract(const RgbdImage& image) {
+void SlamSystem::Impl::extract(const RgbdImage& image) {
   const Stopwatch watch;
-  const OrbFeatures orb = extractor_.extract(image.grey);
-  const Rigid3 colour_from_depth = tracker_->expected_motion(image.timestamp - image.depth_timestamp);
-  auto features = std::make_shared<const RgbdFeatures>(
-      make_rgbd_features(orb, image, camera_, undistort_, colour_from_depth, options_.depth));
+  orb_ = extractor_.extract(image.grey);
   times_.add("features", watch.ms());
-  return features;
 }
 
 KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
@@ -121,7 +118,7 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
     else
       ++q.creatable_close_points;
   }
-  q.reference_points = tracker_->reference_point_count(frame.reference, next_keyframe_ > 2 ? 3 : 2);
+  q.reference_points = tracker_->reference_point_count(frame.reference, next_keyframe_ > 2 ? 2 : 1);
   q.cam_from_world = frame.cam_from_world;
   q.last_keyframe_cam_from_world = tracker_->keyframe_pose(q.last_keyframe);
   q.points = &frame.points;
@@ -157,9 +154,14 @@ FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
   times_.add("wait_mapper", result.wait_ms);
 
   const Stopwatch tracking;
-  features_ = extract(image);
-  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_, {});
+  extract(image);
+  const auto features_at = [&](const Vector6d& velocity) {
+    return std::make_shared<const RgbdFeatures>(
+        make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth));
+  };
+  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, {});
   TrackedFrame& frame = outcome.frame;
+  features_ = frame.features;
   if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
   feature_states_.assign(features_->size(), FeatureState::unused);
   for (size_t f = 0; f < frame.points.size(); ++f) {

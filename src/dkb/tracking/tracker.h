@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,6 +28,8 @@ struct TrackingOptions {
   double radius_last_frame = 10.0;   // [px] search around the motion model's prediction, > 0
   double radius_wide = 30.0;         // [px] second try, > 0
   double radius_local_map = 4.0;     // [px] search for local map points under the first pose, > 0
+  int match_distance = 90;           // [bits] largest Hamming distance of a match with a map point, 0 ... 256
+  double match_ratio = 0.8;          // best over second best distance of such a match, 0 ... 1
   int refresh_frames = 5;            // [frames] the choice of local map points is renewed at least so often, >= 1
   int recovery_keyframes = 8;        // newest keyframes that a lost tracker tries, >= 1
   LocalMapOptions local_map;
@@ -57,10 +60,14 @@ class Tracker {
 
   // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
   Rigid3 expected_motion(double seconds) const;
+  // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
+  Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
   // `usable` (when not empty): per feature, 0 = must not be matched (it may move).
-  TrackOutcome track(FrameIndex index, double timestamp, std::shared_ptr<const RgbdFeatures> features,
-                     const std::vector<uint8_t>& usable);
+  // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once for
+  // the expected velocity, and again for the one that the first pose shows.
+  using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
+  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at, const std::vector<uint8_t>& usable);
 
   // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
   KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame, const std::vector<uint8_t>& usable);
@@ -84,6 +91,8 @@ class Tracker {
   bool track_local_map(const Rigid3& initial, double radius, int least_inliers, const std::vector<uint8_t>& blocked,
                        std::vector<PointId>& points, TrackedFrame& frame);
   void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
+  Vector6d velocity_to(const TrackedFrame& frame) const;
+  void refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const;
   void finish(TrackedFrame& frame);
 
   CameraModel camera_;
