@@ -2,6 +2,7 @@
 #include "dkb/detection/onnx_detector.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string_view>
 #include <tuple>
@@ -143,6 +144,7 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
   const auto declared = declared_input(read_onnx_input(bytes, name), name);
   labels_ = read_labels(options_.labels);
   network_ = std::make_unique<OnnxNetwork>(bytes, name);
+  model_bytes_ = bytes.size();
   if (options_.input_size != 0)
     std::tie(input_width_, input_height_) = input_for(options_.input_size, width, height);
   else if (declared.first != 0)
@@ -150,11 +152,19 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
   else
     std::tie(input_width_, input_height_) = input_for(usual_size(*network_), width, height);
   std::string outputs;
-  const auto head = head_at(*network_, input_width_, input_height_, &outputs);
+  const auto head = [&] {
+    try {
+      return head_at(*network_, input_width_, input_height_, &outputs);
+    } catch (const InputError& e) {
+      if (options_.input_size == 0) throw;
+      throw InputError(std::string(e.what()) + "; or leave input_size at 0");
+    }
+  }();
   if (!head)
     throw InputError(name + ": has no known detection head (" + outputs + " at " + std::to_string(input_width_) +
                      " x " + std::to_string(input_height_) +
-                     " px); use a raw YOLOv5, YOLOv8 or YOLOX export without NMS");
+                     " px); use a raw YOLOv5, YOLOv8 or YOLOX export without NMS" +
+                     (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
   head_ = *head;
   if (static_cast<size_t>(head_.classes) != labels_.size()) {
     const std::string count = std::to_string(labels_.size());
@@ -168,6 +178,14 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 }
 
 OnnxDetector::~OnnxDetector() = default;
+
+int OnnxDetector::frames_per_detection() const {
+  constexpr double kMsPerPixel = 0.45e-3, kNanoBytes = 8e6;  // measured on the nano models, which lie below these bytes
+  constexpr double kFrameMs = 1000.0 / 30, kReserve = 1.15;  // p95 above the mean
+  const double ms =
+      kMsPerPixel * input_width_ * input_height_ * std::max(1.0, static_cast<double>(model_bytes_) / kNanoBytes);
+  return static_cast<int>(std::ceil(kReserve * ms / kFrameMs));
+}
 
 Detections OnnxDetector::detect(const RgbdImage& image) {
   if (image.grey.empty()) throw InputError("the detector was given an empty image");

@@ -146,6 +146,12 @@ TEST_F(OnnxDetectorTest, InputSizeOverridesWhatTheGraphSays) {
   EXPECT_THROW(OnnxDetector(options, 640, 480), InvalidOption);
 }
 
+TEST_F(OnnxDetectorTest, SizesThatTheGraphCannotRunAreRefused) {
+  OnnxOptions options = write(one_box(YoloHead::v5, 80, 1.0f));  // always puts out the head of 96 x 64
+  options.input_size = 128;
+  EXPECT_NE(error_of(options).find("leave input_size at 0"), std::string::npos);
+}
+
 TEST_F(OnnxDetectorTest, OnlyMovableClassesAreGiven) {
   OnnxOptions options = write(one_box(YoloHead::v5, 80, 1.0f));
   options.classes = "chair, dog";
@@ -241,6 +247,7 @@ struct RealModel {
   const char* file;
   YoloHead head;
   int width, height;
+  int frames;  // per detection
 };
 
 class RealModelTest : public testing::TestWithParam<RealModel> {};
@@ -258,6 +265,7 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
   EXPECT_EQ(detector.head(), GetParam().head);
   EXPECT_EQ(detector.input_width(), GetParam().width);
   EXPECT_EQ(detector.input_height(), GetParam().height);
+  EXPECT_EQ(detector.frames_per_detection(), GetParam().frames);
   for (const size_t i : {size_t{2}, size_t{12}}) {
     const RgbdImage image = read_jpeg(files.at(i));
     const Detections found = detector.detect(image);
@@ -269,9 +277,9 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, RealModelTest,
-                         testing::Values(RealModel{"yolov5n_640x480.onnx", YoloHead::v5, 640, 480},
-                                         RealModel{"yolov5n_320x256.onnx", YoloHead::v5, 320, 256},
-                                         RealModel{"yolox_nano.onnx", YoloHead::yolox, 416, 416}));
+                         testing::Values(RealModel{"yolov5n_640x480.onnx", YoloHead::v5, 640, 480, 5},
+                                         RealModel{"yolov5n_320x256.onnx", YoloHead::v5, 320, 256, 2},
+                                         RealModel{"yolox_nano.onnx", YoloHead::yolox, 416, 416, 3}));
 
 }  // namespace
 }  // namespace dkb

@@ -26,7 +26,9 @@ fs::path own_folder() {
 }
 
 // Beside an installed program first; then the build tree, and where this build installs to.
-const DkbOnnxApi* load_module() {
+// `reason`: why not, in one line, when the answer is null.
+const DkbOnnxApi* load_module(std::string* reason) {
+  *reason = std::string(kModule) + " is not installed beside it";
   std::vector<fs::path> folders;
   if (const fs::path own = own_folder(); !own.empty())
     folders = {own, (own / ".." / DKB_MODULE_LIBDIR).lexically_normal()};
@@ -35,7 +37,12 @@ const DkbOnnxApi* load_module() {
   for (const fs::path& folder : folders) {
     // Never closed: OpenCV's threads and statics outlive any network.
     void* module = folder.empty() ? nullptr : dlopen((folder / kModule).c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (module == nullptr) continue;
+    if (module == nullptr) {
+      const char* error = dlerror();
+      std::error_code ignored;
+      if (error != nullptr && !folder.empty() && fs::exists(folder / kModule, ignored)) *reason = error;
+      continue;
+    }
     if (void* symbol = dlsym(module, "dkb_onnx_api_1")) return reinterpret_cast<const DkbOnnxApi* (*)()>(symbol)();
   }
   return nullptr;
@@ -73,10 +80,12 @@ bool OnnxNetwork::available() {
   return load_module() != nullptr;
 }
 
-OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::move(name)), api_(load_module()) {
+OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::move(name)) {
+  std::string reason;
+  api_ = load_module(&reason);
   if (api_ == nullptr)
-    throw InputError(name_ + ": this build cannot run ONNX models (" + kModule +
-                     " is not installed beside it); build with OpenCV's dnn module, or use --detector motion");
+    throw InputError(name_ + ": this build cannot run ONNX models (" + reason +
+                     "); build with OpenCV's dnn module, or use --detector motion");
   std::array<char, 2048> error{};
   network_ = api_->open(bytes.data(), bytes.size(), error.data(), error.size());
   if (network_ == nullptr) throw InputError(name_ + ": OpenCV cannot read the graph " + explain(error.data()));

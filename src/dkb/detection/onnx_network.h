@@ -33,8 +33,8 @@ class OnnxNetwork {
 
  private:
   const std::string name_;
-  const DkbOnnxApi* api_;
-  void* network_;
+  const DkbOnnxApi* api_ = nullptr;
+  void* network_ = nullptr;
 };
 
 }  // namespace dkb
