@@ -44,7 +44,7 @@ void CornerSpread::drop_weak(const CornerRegion& region, int strong, int cell_si
 void CornerSpread::keep(const CornerRegion& region, int count, std::vector<PixelCorner>& corners) {
   if (static_cast<int>(corners.size()) <= count) return;
   if (count <= 0) return corners.clear();
-  const double side = std::sqrt(static_cast<double>(region.width()) * region.height() / count);
+  const double side = std::sqrt(static_cast<double>(region.width()) * region.height() * kCornersPerCell / count);
   const Grid grid{std::max(1, static_cast<int>(std::lround(region.width() / side))),
                   std::max(1, static_cast<int>(std::lround(region.height() / side)))};
   sort_into_cells(region, grid, corners);

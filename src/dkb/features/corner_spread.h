@@ -21,12 +21,16 @@ struct CornerRegion {
 // corner that comes first. Buffers are kept between calls.
 class CornerSpread {
  public:
+  // Smaller cells spread more evenly, larger ones give corners that are found again more often. 8 gave the smallest
+  // variance of poses between real frames (1: 8% more on static, 12% more on dynamic ones; 32: no better than 8).
+  static constexpr int kCornersPerCell = 8;
+
   // Removes corners weaker than `strong` from every cell (about `cell_size` px) that has a corner of that strength, as
   // if each cell had been searched with the high threshold first and with the low one only in vain.
   void drop_weak(const CornerRegion& region, int strong, int cell_size, std::vector<PixelCorner>& corners);
 
-  // Keeps at most `count` corners: the region is cut into about `count` cells; every cell gives its strongest corner,
-  // then its second strongest, and so on; of the last round the strongest are taken.
+  // Keeps at most `count` corners: the region is cut into about count / kCornersPerCell cells; every cell gives its
+  // strongest corner, then its second strongest, and so on; of the last round the strongest are taken.
   // Survivors are ordered by cell (row-major), then by falling strength.
   void keep(const CornerRegion& region, int count, std::vector<PixelCorner>& corners);
 

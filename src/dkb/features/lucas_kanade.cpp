@@ -2,7 +2,6 @@
 #include "dkb/features/lucas_kanade.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 
 #if defined(__x86_64__)
@@ -23,12 +22,12 @@ struct Placement {
 };
 
 Placement place(double x, double y, int size) {
-  const double floor_x = std::floor(x), floor_y = std::floor(y);
+  const int floor_x = static_cast<int>(x), floor_y = static_cast<int>(y);  // the window fits, so both are positive
   const double fx = x - floor_x, fy = y - floor_y;
   constexpr double kOne = 1 << kWeightBits;
   Placement p;
-  p.x = static_cast<int>(floor_x) - size / 2;
-  p.y = static_cast<int>(floor_y) - size / 2;
+  p.x = floor_x - size / 2;
+  p.y = floor_y - size / 2;
   p.w00 = static_cast<int>((1 - fx) * (1 - fy) * kOne + 0.5);
   p.w01 = static_cast<int>(fx * (1 - fy) * kOne + 0.5);
   p.w10 = static_cast<int>((1 - fx) * fy * kOne + 0.5);
@@ -97,11 +96,10 @@ DKB_TARGET_AVX2 void sample_avx2(const GreyImage& image, const Placement& p, int
 }
 
 DKB_TARGET_AVX2 inline int64_t sum_lanes(__m256i v) {
-  alignas(32) int32_t lanes[8];
-  _mm256_store_si256(reinterpret_cast<__m256i*>(lanes), v);
-  int64_t sum = 0;
-  for (const int32_t lane : lanes) sum += lane;
-  return sum;
+  const __m256i four = _mm256_add_epi64(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(v)),
+                                        _mm256_cvtepi32_epi64(_mm256_extracti128_si256(v, 1)));
+  const __m128i two = _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
+  return _mm_cvtsi128_si64(_mm_add_epi64(two, _mm_unpackhi_epi64(two, two)));
 }
 
 // No lane overflows: products of differences are below 4080^2, two to a lane and step, in at most 29 rows of 2 blocks.

@@ -10,6 +10,10 @@
 
 namespace dkb {
 
+namespace {
+constexpr double kCoarseEpsilon = 0.1;  // [px of the level]
+}
+
 void OpticalFlowOptions::check() const {
   require_option(window >= 5 && window <= kLkMaxSize && window % 2 == 1, "window", window, "odd and in 5 ... 29");
   require_option(levels >= 1 && levels <= 16, "levels", levels, "in 1 ... 16");
@@ -50,6 +54,8 @@ FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyram
 
     double x = current.level_x(level, full_x), y = current.level_y(level, full_y);
     bool inside = true;
+    // Coarse levels only have to bring the finer one near.
+    const double epsilon = level == 0 ? options_.epsilon : std::max(options_.epsilon, kCoarseEpsilon);
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
       inside = lk_fits(target, x, y, size);
       if (!inside) break;
@@ -63,7 +69,7 @@ FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyram
       const double step_y = 2.0 * (xy * bx - xx * by) / determinant;
       x += step_x;
       y += step_y;
-      if (step_x * step_x + step_y * step_y < options_.epsilon * options_.epsilon) break;
+      if (step_x * step_x + step_y * step_y < epsilon * epsilon) break;
     }
     inside = inside && lk_fits(target, x, y, size);
     if (!inside && level > 0) continue;  // the finer level begins where this one did

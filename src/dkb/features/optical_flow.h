@@ -11,10 +11,10 @@
 namespace dkb {
 
 struct OpticalFlowOptions {
-  int window = 11;            // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
-  int levels = 4;             // pyramid levels used, >= 1; the pyramids may have fewer
-  int max_iterations = 10;    // per level, >= 1
-  double epsilon = 0.02;      // [px of the level] a smaller step ends a level, > 0
+  int window = 11;          // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
+  int levels = 4;           // pyramid levels used, >= 1; the pyramids may have fewer
+  int max_iterations = 10;  // per level, >= 1
+  double epsilon = 0.02;    // [px] a smaller step ends the search at full resolution (0.1 px of the level before), > 0
   double min_eigenvalue = 1;  // [(grey levels / px)^2] mean over the window; flatter windows are not followed, >= 0
   double max_residual = 30;   // [grey levels] a larger mean absolute difference means lost, > 0
   void check() const;         // throws InvalidOption

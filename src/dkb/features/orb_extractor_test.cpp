@@ -152,11 +152,18 @@ TEST(SteeredBrief, VectorKernelEqualsScalar) {
 }
 
 TEST(CornerSpread, KeepsExactlyTheCountAndTheStrongestOfEachCell) {
-  // Two cells side by side; the left one is crowded with strong corners, the right one has one weak corner.
-  std::vector<PixelCorner> corners = {{10, 10, 90}, {12, 10, 80}, {14, 10, 70}, {150, 10, 8}};
+  // Two cells side by side; the left one is crowded with strong corners, the right one has two weak ones.
+  std::vector<PixelCorner> corners;
+  for (int i = 0; i < 30; ++i)
+    corners.push_back({static_cast<uint16_t>(3 * i), 10, static_cast<uint8_t>(60 + (7 * i) % 30)});
+  corners.push_back({150, 20, 8});
+  corners.push_back({160, 20, 9});
   CornerSpread spread;
-  spread.keep({0, 0, 200, 100}, 2, corners);
-  EXPECT_EQ(corners, (std::vector<PixelCorner>{{10, 10, 90}, {150, 10, 8}}));
+  spread.keep({0, 0, 200, 100}, 2 * CornerSpread::kCornersPerCell, corners);
+  ASSERT_EQ(corners.size(), 16u);
+  for (size_t i = 0; i < 14; ++i) EXPECT_EQ(corners[i].score, 89 - i);  // scores 60 ... 89 occur once each
+  EXPECT_EQ(corners[14], (PixelCorner{160, 20, 9}));
+  EXPECT_EQ(corners[15], (PixelCorner{150, 20, 8}));
 }
 
 TEST(CornerSpread, WeakCornersSurviveOnlyWhereThereIsNothingStronger) {

@@ -14,8 +14,9 @@ struct SubpixelOffset {
 
 // Position of a FAST corner below the pixel: peak of the quadratic that fits best (least squares) the 3 x 3 contrasts
 // about it, after smoothing them by 1-2-1 in both directions, at most 1 px away per axis; zero where they have no peak.
-// FAST contrasts localise better than gradient-based corner measures here, because it is their maximum that was found
-// (docs/decisions.md has the numbers). The pixel must be at least 5 px from the image's edge.
+// On real consecutive frames the noise per axis falls from 0.66 to 0.50 px of the level. Peaks of gradient-based corner
+// measures (Foerstner, Shi-Tomasi, Hessian) do worse than no refinement, because it is the FAST contrast's maximum that
+// was found. The pixel must be at least 5 px from the image's edge.
 SubpixelOffset refine_corner(const GreyImage& image, int x, int y, Simd simd = best_simd());
 
 }  // namespace dkb
