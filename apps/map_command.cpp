@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "dkb/map/map_file.h"
+#include "dkb/map/point_cloud.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+
+// One `key: value` per line, so that people and scripts read the same.
+void print_info(const std::string& path) {
+  const std::string bytes = read_file(path);
+  const MapFile file = decode_map(bytes, path);
+  const Map& map = file.map;
+  size_t features = 0, observations = 0;
+  double first_stamp = 0, last_stamp = 0;
+  const auto live = map.live_keyframes();
+  for (KeyframeId id : live) {
+    const Keyframe& k = *map.keyframe(id);
+    features += k.features->size();
+    first_stamp = id == live.front() ? k.timestamp : std::min(first_stamp, k.timestamp);
+    last_stamp = id == live.front() ? k.timestamp : std::max(last_stamp, k.timestamp);
+  }
+  Eigen::AlignedBox3d extent;
+  for (PointId id : map.live_points()) {
+    observations += map.point(id)->observations.size();
+    extent.extend(map.point(id)->position);
+  }
+  const Eigen::Vector3d size = extent.isEmpty() ? Eigen::Vector3d::Zero().eval() : extent.sizes().eval();
+  const auto removed = map.removed_points();
+  const auto fused =
+      std::count_if(removed.begin(), removed.end(), [](const RemovedPoint& r) { return r.replaced_by != kNoPoint; });
+  const CameraModel& c = file.context.camera;
+  fmt::print("file: {}\n", path);
+  fmt::print("checksums: right\n");
+  fmt::print("bytes: {}\n", bytes.size());
+  fmt::print("keyframes: {}\n", live.size());
+  fmt::print("culled_keyframes: {}\n", map.keyframe_count() - map.live_keyframe_count());
+  fmt::print("features: {}\n", features);
+  fmt::print("points: {}\n", map.point_count());
+  fmt::print("observations: {}\n", observations);
+  fmt::print("removed_points: {}\n", removed.size());
+  fmt::print("fused_points: {}\n", fused);
+  fmt::print("first_stamp_s: {:.6f}\n", first_stamp);
+  fmt::print("last_stamp_s: {:.6f}\n", last_stamp);
+  fmt::print("extent_m: {:.2f} {:.2f} {:.2f}\n", size.x(), size.y(), size.z());
+  fmt::print("camera: {}x{} fx {} fy {} cx {} cy {}\n", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
+  fmt::print("pyramid: {} levels of {}\n", file.context.levels, file.context.scale_factor);
+}
+
+struct ExportArguments {
+  std::string file, format, out;
+};
+
+void export_cloud(const ExportArguments& arguments) {
+  const MapFile file = load_map(arguments.file);
+  const std::string cloud = arguments.format == "ply"   ? point_cloud_ply(file.map)
+                            : arguments.format == "pcd" ? point_cloud_pcd(file.map)
+                                                        : point_cloud_json(file.map);
+  write_file_atomically(arguments.out, cloud);
+  fmt::print("{}: {} points\n", arguments.out, file.map.point_count());
+}
+
+}  // namespace
+
+void register_map(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("map", "Look into a saved map");
+  command->require_subcommand(1);
+
+  CLI::App* info = command->add_subcommand("info", "Verify every checksum and print what is in a map");
+  auto path = std::make_shared<std::string>();
+  info->add_option("FILE", *path, "map.dkb")->required();
+  info->callback([path, &exit_code] {
+    print_info(*path);
+    exit_code = 0;
+  });
+
+  CLI::App* cloud = command->add_subcommand("export", "Write the map points as a coloured cloud");
+  auto arguments = std::make_shared<ExportArguments>();
+  cloud->add_option("FILE", arguments->file, "map.dkb")->required();
+  cloud->add_option("--format", arguments->format, "ply, pcd or json")
+      ->required()
+      ->check(CLI::IsMember({"ply", "pcd", "json"}));
+  cloud->add_option("--out", arguments->out, "file to write")->required();
+  cloud->callback([arguments, &exit_code] {
+    export_cloud(*arguments);
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/map/point_cloud.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <iterator>
+
+#include "dkb/map/byte_stream.h"
+
+namespace dkb {
+namespace {
+
+void write_position(ByteWriter& out, const Eigen::Vector3d& position) {
+  for (int i = 0; i < 3; ++i) out.u32(std::bit_cast<uint32_t>(static_cast<float>(position[i])));
+}
+
+}  // namespace
+
+std::string point_cloud_ply(const Map& map) {
+  ByteWriter out;
+  out.raw(
+      fmt::format("ply\n"
+                  "format binary_little_endian 1.0\n"
+                  "comment sparse map by dkb-slam; metres\n"
+                  "element vertex {}\n"
+                  "property float x\n"
+                  "property float y\n"
+                  "property float z\n"
+                  "property uchar red\n"
+                  "property uchar green\n"
+                  "property uchar blue\n"
+                  "property int observations\n"
+                  "end_header\n",
+                  map.point_count()));
+  for (PointId id : map.live_points()) {
+    const MapPoint& p = *map.point(id);
+    write_position(out, p.position);
+    for (uint8_t channel : {p.colour.r, p.colour.g, p.colour.b}) out.u8(channel);
+    out.i32(static_cast<int32_t>(p.observations.size()));
+  }
+  return out.bytes();
+}
+
+std::string point_cloud_pcd(const Map& map) {
+  ByteWriter out;
+  out.raw(
+      fmt::format("# .PCD v0.7 - Point Cloud Data file format\n"
+                  "VERSION 0.7\n"
+                  "FIELDS x y z rgb\n"
+                  "SIZE 4 4 4 4\n"
+                  "TYPE F F F U\n"
+                  "COUNT 1 1 1 1\n"
+                  "WIDTH {0}\n"
+                  "HEIGHT 1\n"
+                  "VIEWPOINT 0 0 0 1 0 0 0\n"
+                  "POINTS {0}\n"
+                  "DATA binary\n",
+                  map.point_count()));
+  for (PointId id : map.live_points()) {
+    const MapPoint& p = *map.point(id);
+    write_position(out, p.position);
+    out.u32(static_cast<uint32_t>(p.colour.r) << 16 | static_cast<uint32_t>(p.colour.g) << 8 | p.colour.b);
+  }
+  return out.bytes();
+}
+
+std::string point_cloud_json(const Map& map) {
+  std::string json = "{\"points\": [";
+  const char* separator = "\n";
+  for (PointId id : map.live_points()) {
+    const MapPoint& p = *map.point(id);
+    fmt::format_to(std::back_inserter(json),
+                   "{}{{\"id\": {}, \"position\": [{}, {}, {}], \"colour\": [{}, {}, {}], \"observations\": {}}}",
+                   separator, p.id, p.position.x(), p.position.y(), p.position.z(), p.colour.r, p.colour.g, p.colour.b,
+                   p.observations.size());
+    separator = ",\n";
+  }
+  json += "],\n\"keyframes\": [";
+  separator = "\n";
+  for (KeyframeId id : map.live_keyframes()) {
+    const Keyframe& k = *map.keyframe(id);
+    const Rigid3 world_from_cam = k.cam_from_world.inverse();
+    const Eigen::Vector3d& t = world_from_cam.translation;
+    const Eigen::Quaterniond& q = world_from_cam.rotation;
+    fmt::format_to(std::back_inserter(json),
+                   "{}{{\"id\": {}, \"timestamp\": {}, \"world_from_cam\": {{\"position\": [{}, {}, {}], "
+                   "\"quaternion_xyzw\": [{}, {}, {}, {}]}}}}",
+                   separator, id, k.timestamp, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    separator = ",\n";
+  }
+  return json + "]}\n";
+}
+
+}  // namespace dkb
