@@ -77,7 +77,8 @@ std::string explain(const std::string& message) {
 }  // namespace
 
 bool OnnxNetwork::available() {
-  return load_module() != nullptr;
+  std::string reason;
+  return load_module(&reason) != nullptr;
 }
 
 OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::move(name)) {
