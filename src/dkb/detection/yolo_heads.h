@@ -25,6 +25,7 @@ struct HeadLayout {
 };
 
 // The head whose output has these dimensions at this input size [px, multiples of 32]; none when no known one does.
+// Where N equals the other dimension (84 x 84: 80 classes at 64 x 64 px) YOLOX is assumed.
 std::optional<HeadLayout> recognise_head(std::span<const int> dims, int input_width, int input_height);
 
 // How an image lies in a network's input: scaled by `scale` keeping its aspect, padded with grey 114.
