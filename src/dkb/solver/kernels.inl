@@ -22,7 +22,8 @@ struct Residuals {
   Mask in_front;
 };
 
-DKB_KERNEL inline void point_in_camera(const CameraPose& c, const Pack& px, const Pack& py, const Pack& pz, Residuals& r) {
+DKB_KERNEL inline void point_in_camera(const CameraPose& c, const Pack& px, const Pack& py, const Pack& pz,
+                                       Residuals& r) {
   r.x = c.rotation[0] * px + c.rotation[1] * py + c.rotation[2] * pz + c.translation[0];
   r.y = c.rotation[3] * px + c.rotation[4] * py + c.rotation[5] * pz + c.translation[1];
   r.z = c.rotation[6] * px + c.rotation[7] * py + c.rotation[8] * pz + c.translation[2];

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -39,7 +40,7 @@ struct Data {
       point.push_back(i % 20);
       pair.push_back(i);
     }
-    for (int i = 0; i < 20; ++i) {
+    for (int i = 0; i < std::min(count, 20); ++i) {
       for (const double value : {x[i], y[i], z[i], 0.0}) points.push_back(value);
     }
   }
