@@ -19,7 +19,8 @@ class KeypointGrid {
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
     index_.resize(x_.size());
     std::vector<int32_t> next(first_.begin(), first_.end() - 1);
-    for (size_t i = 0; i < x_.size(); ++i) index_[static_cast<size_t>(next[cell(x_[i], y_[i])]++)] = static_cast<int32_t>(i);
+    for (size_t i = 0; i < x_.size(); ++i)
+      index_[static_cast<size_t>(next[cell(x_[i], y_[i])]++)] = static_cast<int32_t>(i);
   }
 
   // Calls visit(i) for every point within `radius` (in both x and y) of (x, y), cell by cell in row-major order, by

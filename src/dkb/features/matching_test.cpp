@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/matching.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "dkb/features/keypoint_grid.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+std::vector<Descriptor> random_descriptors(size_t count, uint64_t seed) {
+  Random random(seed);
+  std::vector<Descriptor> descriptors(count);
+  for (Descriptor& d : descriptors)
+    for (uint64_t& word : d) word = random.next();
+  return descriptors;
+}
+
+// The same with `bits` random bits flipped (some perhaps twice).
+Descriptor disturbed(Descriptor d, int bits, Random& random) {
+  for (int i = 0; i < bits; ++i) d[random.below(4)] ^= uint64_t{1} << random.below(64);
+  return d;
+}
+
+TEST(Matching, HammingDistanceCountsDifferingBits) {
+  const Descriptor zero{}, full{~uint64_t{0}, ~uint64_t{0}, ~uint64_t{0}, ~uint64_t{0}};
+  EXPECT_EQ(hamming_distance(zero, zero), 0);
+  EXPECT_EQ(hamming_distance(zero, full), 256);
+  EXPECT_EQ(hamming_distance(zero, Descriptor{1, 3, 7, uint64_t{1} << 63}), 7);  // 1 + 2 + 3 + 1
+  const std::vector<Descriptor> d = random_descriptors(200, 1);
+  for (size_t i = 1; i < d.size(); ++i) {
+    int expected = 0;
+    for (size_t w = 0; w < 4; ++w) expected += std::popcount(d[i][w] ^ d[i - 1][w]);
+    EXPECT_EQ(hamming_distance(d[i], d[i - 1]), expected);
+  }
+}
+
+TEST(Matching, BestTwoEqualsASearchByHandWithEveryKernel) {
+  const std::vector<Descriptor> set = random_descriptors(300, 2), queries = random_descriptors(20, 3);
+  std::vector<int32_t> candidates;
+  for (int32_t i = 299; i >= 0; i -= 3) candidates.push_back(i);
+  for (const Descriptor& query : queries) {
+    BestTwo expected;
+    for (const int32_t c : candidates) {
+      const int d = hamming_distance(query, set[static_cast<size_t>(c)]);
+      if (d < expected.distance) {
+        expected = {c, d, expected.distance};
+      } else {
+        expected.second = std::min(expected.second, d);
+      }
+    }
+    EXPECT_EQ(best_two(query, set, candidates), expected);
+    EXPECT_EQ(best_two(query, set, candidates, Simd::scalar), expected);
+    EXPECT_EQ(best_two(query, set), best_two(query, set, Simd::scalar));
+    std::vector<int32_t> distances(candidates.size());
+    hamming_distances(query, set, candidates, distances);
+    EXPECT_EQ(*std::min_element(distances.begin(), distances.end()), expected.distance);
+  }
+}
+
+TEST(Matching, TiesGoToTheFirstAndNothingMatchesNothing) {
+  const std::vector<Descriptor> set(3);
+  EXPECT_EQ(best_two(Descriptor{}, set), (BestTwo{0, 0, 0}));
+  const std::vector<int32_t> candidates = {2, 1};
+  EXPECT_EQ(best_two(Descriptor{}, set, candidates), (BestTwo{2, 0, 0}));
+  EXPECT_EQ(best_two(Descriptor{}, std::vector<Descriptor>{}), BestTwo{});
+  EXPECT_TRUE(match_brute_force({}, set).empty());
+  EXPECT_TRUE(match_brute_force(set, {}).empty());
+}
+
+TEST(Matching, BruteForceFindsDisturbedCopiesAndNothingElse) {
+  const std::vector<Descriptor> a = random_descriptors(200, 4);
+  std::vector<Descriptor> b = random_descriptors(150, 5);
+  Random random(6);
+  for (size_t i = 0; i < 100; ++i) b[149 - i] = disturbed(a[2 * i], 30, random);
+  const std::vector<DescriptorMatch> matches = match_brute_force(a, b);
+  ASSERT_EQ(matches.size(), 100u);
+  for (size_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(matches[i].a, static_cast<int>(2 * i));
+    EXPECT_EQ(matches[i].b, static_cast<int>(149 - i));
+    EXPECT_LE(matches[i].distance, 30);
+  }
+  EXPECT_EQ(match_brute_force(a, b, {}, Simd::scalar), matches);
+}
+
+TEST(Matching, RatioAndMutualTestsRejectRepeatedStructure) {
+  const std::vector<Descriptor> a = random_descriptors(1, 7);
+  Random random(8);
+  const std::vector<Descriptor> twice = {disturbed(a[0], 5, random), disturbed(a[0], 6, random)};
+  EXPECT_TRUE(match_brute_force(a, twice, {.ratio = 0.8F}).empty());
+  EXPECT_EQ(match_brute_force(a, twice, {.ratio = 1.0F}).size(), 1u);
+  // Two of a look like the one b: only the nearer one may have it.
+  const std::vector<Descriptor> pair = {disturbed(a[0], 20, random), a[0]};
+  const std::vector<DescriptorMatch> mutual = match_brute_force(pair, a, {.ratio = 1.0F});
+  ASSERT_EQ(mutual.size(), 1u);
+  EXPECT_EQ(mutual[0].a, 1);
+  EXPECT_EQ(match_brute_force(pair, a, {.ratio = 1.0F, .mutual = false}).size(), 2u);
+}
+
+TEST(Matching, RefusesBadOptions) {
+  EXPECT_THROW(match_brute_force({}, {}, {.max_distance = 257}), InvalidOption);
+  EXPECT_THROW(match_brute_force({}, {}, {.ratio = 1.5F}), InvalidOption);
+}
+
+TEST(Matching, OrientationsThatDoNotTurnWithTheRestAreRejected) {
+  // All turn by 0.5 rad, wherever they point; every fifth one turns elsewhere.
+  std::vector<float> a, b;
+  Random random(9);
+  for (int i = 0; i < 100; ++i) {
+    const double angle = random.uniform(0, 6.28),
+                 turn = i % 5 == 0 ? random.uniform(1.2, 6.0) : 0.5 + random.uniform(-0.1, 0.1);
+    a.push_back(static_cast<float>(std::fmod(angle + turn, 6.2831853)));
+    b.push_back(static_cast<float>(angle));
+  }
+  const std::vector<bool> keep = consistent_orientations(a, b);
+  for (size_t i = 0; i < 100; ++i) EXPECT_EQ(keep[i], i % 5 != 0) << i;
+}
+
+TEST(Matching, NoTurnIsAPeakLikeAnyOther) {
+  // Differences just below and just above zero fall into the last and the first bin.
+  const std::vector<float> a = {1.00F, 2.00F, 3.00F, 4.00F, 0.01F, 1.0F}, b = {1.01F, 1.99F, 3.01F, 3.99F, 6.27F, 4.0F};
+  const std::vector<bool> keep = consistent_orientations(a, b);
+  EXPECT_EQ(keep, (std::vector<bool>{true, true, true, true, true, false}));
+}
+
+TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {
+  Random random(10);
+  std::vector<float> x, y;
+  for (int i = 0; i < 500; ++i) {
+    x.push_back(static_cast<float>(random.uniform(-30, 670)));  // some outside the image
+    y.push_back(static_cast<float>(random.uniform(-30, 510)));
+  }
+  const KeypointGrid grid(x, y, 640, 480);
+  for (int trial = 0; trial < 100; ++trial) {
+    const float cx = static_cast<float>(random.uniform(-40, 680)), cy = static_cast<float>(random.uniform(-40, 520));
+    const float radius = static_cast<float>(random.uniform(0, 60));
+    std::vector<int> found, again, expected;
+    grid.for_each_near(cx, cy, radius, [&](int i) { found.push_back(i); });
+    grid.for_each_near(cx, cy, radius, [&](int i) { again.push_back(i); });
+    EXPECT_EQ(found, again);
+    for (size_t i = 0; i < x.size(); ++i)
+      if (std::abs(x[i] - cx) <= radius && std::abs(y[i] - cy) <= radius) expected.push_back(static_cast<int>(i));
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, expected);
+  }
+}
+
+TEST(KeypointGrid, AnEmptyGridHasNoNeighbours) {
+  int visits = 0;
+  KeypointGrid().for_each_near(1, 1, 100, [&](int) { ++visits; });
+  KeypointGrid({}, {}, 640, 480).for_each_near(1, 1, 100, [&](int) { ++visits; });
+  EXPECT_EQ(visits, 0);
+}
+
+}  // namespace
+}  // namespace dkb
