@@ -85,7 +85,7 @@ void Furnisher::shell(double x0, double y0, double x1, double y1, double height,
   for (double x = x0 + 0.8; x + 0.9 < x1; x += 2.1)
     for (double y = y0 + 0.7; y + 0.5 < y1; y += 1.7) {  // lamps and panels
       Surfaces s;
-      const int t = texture(Material::drawers, 12, 0.6, 0.4);
+      const int t = texture(Material::drawers, 40, 0.6, 0.4);
       box(&s, Vector3d(x, y, height - 0.06), Vector3d(0.6, 0.4, 0.06), {t, t, t, t, t, -1});
       target_->surfaces.append(s);
     }
@@ -105,7 +105,7 @@ void Furnisher::block(double x0, double y0, double x1, double y1, double height)
 
 void Furnisher::picture_on_wall(const Rigid3& wall_frame, double x, double z, double width, double height, Material material) {
   Surfaces s;
-  const int edge = materials_->get(Material::metal, 1, 0.1, 0.1), t = detail(material, 64, width, height);
+  const int edge = materials_->get(Material::metal, 1, 0.1, 0.1), t = detail(material, 4096, width, height);
   const double thick = material == Material::poster || material == Material::page ? 0.002 : 0.02;
   box(&s, Vector3d(x, 0, z), Vector3d(width, thick, height), {edge, edge, -1, t, edge, edge});
   add(s, wall_frame);
@@ -148,28 +148,28 @@ void Furnisher::shelf(const Rigid3& at, double width, double depth, double heigh
         const double split = width * random_.uniform(0.35, 0.6);
         books(row, split, depth, room);
         clutter(row * Rigid3(Eigen::Quaterniond::Identity(), Vector3d((split + width - 2 * thick) / 2, depth / 2, 0)),
-                width - 2 * thick - split, depth, false);
+                width - 2 * thick - split, depth, Clutter::normal);
         break;
       }
       default: books(row, width - 2 * thick, depth, room);
     }
   }
   add(s, at);
-  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, false);
+  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, Clutter::normal);
   reserve(at, -half, 0, half, depth);
 }
 
 void Furnisher::cabinet(const Rigid3& at, double width, double depth, double height) {
   Surfaces s;
-  const int front = texture(Material::drawers, 12, width, height), side = texture(Material::wood, 3, depth, height);
+  const int front = texture(Material::drawers, 40, width, height), side = texture(Material::wood, 3, depth, height);
   const int top = texture(Material::wood, 3, width, depth);
   box(&s, Vector3d(-width / 2, 0, 0), Vector3d(width, depth, height), {side, side, side, front, -1, top});
   add(s, at);
-  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, false);
+  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, Clutter::normal);
   reserve(at, -width / 2, 0, width / 2, depth);
 }
 
-void Furnisher::desk(const Rigid3& at, double width, double depth, bool tall_things) {
+void Furnisher::desk(const Rigid3& at, double width, double depth, Clutter kind) {
   Surfaces s;
   const int top = texture(Material::wood, 3, width, depth), edge = materials_->get(Material::wood, 9, 1.0, 0.1);
   const int leg = materials_->get(Material::metal, 2, 0.1, 0.7);
@@ -177,10 +177,10 @@ void Furnisher::desk(const Rigid3& at, double width, double depth, bool tall_thi
   box(&s, Vector3d(-half, 0, height - 0.03), Vector3d(width, depth, 0.03), {edge, edge, edge, edge, edge, top});
   for (const double x : {-half + 0.04, half - 0.09})
     for (const double y : {0.04, depth - 0.09}) box(&s, Vector3d(x, y, 0), Vector3d(0.05, 0.05, height - 0.03), {leg, leg, leg, leg, -1, -1});
-  const int drawer = texture(Material::drawers, 12, 0.4, 0.55);
+  const int drawer = texture(Material::drawers, 40, 0.4, 0.55);
   box(&s, Vector3d(half - 0.5, 0.06, 0.08), Vector3d(0.4, depth - 0.12, 0.55), all(drawer));
   add(s, at);
-  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, tall_things);
+  clutter(at * Rigid3(Eigen::Quaterniond::Identity(), Vector3d(0, depth / 2, height)), width, depth, kind);
   reserve(at, -half, 0, half, depth);
 }
 
@@ -205,7 +205,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
   };
   switch (kind) {
     case 0: {  // cup
-      const int t = detail(Material::carton, 16, 0.25, 0.1), inside = materials_->get(Material::hair, 5, 0.08, 0.08);
+      const int t = detail(Material::carton, 200, 0.25, 0.1), inside = materials_->get(Material::hair, 5, 0.08, 0.08);
       tube(&s, Vector3d(0, 0, 0.1), Vector3d(0, 0, 0), 0.04, t, 0.8);
       disc(Vector3d(0, 0, 0.092), 0.037, inside);
       break;
@@ -221,7 +221,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
       break;
     }
     case 2: {  // bottle
-      const int t = detail(Material::carton, 16, 0.2, 0.2), cap = texture(Material::plastic, 8, 0.1, 0.03);
+      const int t = detail(Material::carton, 200, 0.2, 0.2), cap = texture(Material::plastic, 8, 0.1, 0.03);
       tube(&s, Vector3d(0, 0, 0), Vector3d(0, 0, 0.17), 0.035, t);
       tube(&s, Vector3d(0, 0, 0.17), Vector3d(0, 0, 0.22), 0.035, t, 0.4);
       tube(&s, Vector3d(0, 0, 0.22), Vector3d(0, 0, 0.24), 0.015, cap);
@@ -239,7 +239,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
       const int n = 1 + static_cast<int>(random_.below(3));
       for (int i = 0; i < n; ++i) {
         const double w = random_.uniform(0.14, 0.2), d = w * 1.35, h = random_.uniform(0.015, 0.05), turn = random_.uniform(-0.3, 0.3);
-        const int cover = detail(Material::cover, 32, 0.17, 0.23), page = materials_->get(Material::page, seed_ % 7, 0.21, 0.05);
+        const int cover = detail(Material::cover, 64, 0.17, 0.23), page = materials_->get(Material::page, seed_ % 7, 0.21, 0.05);
         const int spine = texture(Material::spine, 96, 0.04, 0.24);
         Surfaces book;
         box(&book, Vector3d(-w / 2, -d / 2, 0), Vector3d(w, d, h), {spine, page, page, page, cover, cover});
@@ -250,7 +250,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
     }
     case 5: {  // carton
       const double w = random_.uniform(0.08, 0.2), d = random_.uniform(0.06, 0.14), h = random_.uniform(0.06, 0.2);
-      const int t = detail(Material::carton, 16, 0.2, 0.15), u = detail(Material::carton, 16, 0.2, 0.15);
+      const int t = detail(Material::carton, 200, 0.2, 0.15), u = detail(Material::carton, 200, 0.2, 0.15);
       box(&s, Vector3d(-w / 2, -d / 2, 0), Vector3d(w, d, h), {t, u, u, t, -1, u});
       break;
     }
@@ -276,7 +276,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
   add(s, at);
 }
 
-void Furnisher::clutter(const Rigid3& at, double width, double depth, bool tall_things) {
+void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter height) {
   struct Spot {
     double x, y, r;
   };
@@ -286,7 +286,7 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, bool tall_
       if (std::hypot(x - t.x, y - t.y) < r + t.r) return false;
     return true;
   };
-  if (tall_things)
+  if (height == Clutter::monitors)
     for (double x = -width / 2 + 0.32; x + 0.3 < width / 2; x += random_.uniform(0.65, 0.9)) {
       if (random_.below(5) == 0) continue;
       const double y = -depth / 2 + 0.16;
@@ -308,13 +308,13 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, bool tall_
   for (int i = 0; i < pages; ++i) {
     const double x = random_.uniform(-width / 2 + 0.18, width / 2 - 0.18), y = random_.uniform(-depth / 2 + 0.18, depth / 2 - 0.18);
     Surfaces s;
-    const int t = detail(Material::page, 24, 0.21, 0.297);
+    const int t = detail(Material::page, 48, 0.21, 0.297);
     box(&s, Vector3d(-0.105, -0.148, 0), Vector3d(0.21, 0.297, 0.0006 + 0.0004 * i), {-1, -1, -1, -1, -1, t});
     add(s, at * placed(x, y, 0, random_.uniform(-3.1, 3.1)));
   }
   const int tries = static_cast<int>(width * depth * 60) + 4;
   for (int i = 0; i < tries; ++i) {
-    const uint32_t kind = random_.below(8);
+    const uint32_t kind = height == Clutter::low ? std::array<uint32_t, 4>{0, 3, 4, 7}[random_.below(4)] : random_.below(8);
     const double r = kind == 4 ? 0.13 : kind == 5 ? 0.11 : kind == 7 ? 0.12 : 0.06, margin = std::min(r, depth * 0.4);
     if (width < 2 * margin + 0.02 || depth < 2 * margin) continue;
     const double x = random_.uniform(-width / 2 + margin, width / 2 - margin), y = random_.uniform(-depth / 2 + margin, depth / 2 - margin);
@@ -360,7 +360,7 @@ void Furnisher::cartons(const Rigid3& at, double width, double depth) {
   double z = 0;
   for (int i = 0; i < 4; ++i) {
     const double w = width * random_.uniform(0.6, 0.98), d = depth * random_.uniform(0.6, 0.98), h = random_.uniform(0.2, 0.4);
-    const int t = detail(Material::carton, 16, 0.5, 0.3), u = detail(Material::carton, 16, 0.5, 0.3);
+    const int t = detail(Material::carton, 200, 0.5, 0.3), u = detail(Material::carton, 200, 0.5, 0.3);
     Surfaces one;
     box(&one, Vector3d(-w / 2, 0.01, 0), Vector3d(w, d, h), {u, t, -1, t, -1, u});
     s.append(one.moved(placed(random_.uniform(-0.02, 0.02), 0, z, random_.uniform(-0.06, 0.06))));
@@ -412,40 +412,42 @@ void Furnisher::line_wall(const Eigen::Vector2d& start, const Eigen::Vector2d& a
   for (double x = random_.uniform(0.08, 0.2); x < length - 0.45;) {
     const double left = length - x;
     double width = 0.5;
-    const uint32_t choice = random_.below(depth_limit < 0.25 ? 4 : depth_limit < 0.5 ? 8 : 12);
     const auto middle = [&] { return frame * placed(x + width / 2, 0.005, 0, 0); };
-    if (choice < 2) {
+    // The deeper the room, the more furniture stands among the pictures.
+    const uint32_t choice = random_.below(depth_limit < 0.25 ? 6 : depth_limit < 0.5 ? 14 : 18);
+    if (choice < 3) {
       width = std::min(left - 0.05, random_.uniform(0.8, 1.4));
       on_wall(x, x + width, 0.35, 1.2);
       on_wall(x, x + width, 1.25, 2.25);
-    } else if (choice == 2 && left > 1.7) {
+    } else if (choice == 3 && left > 1.7) {
       width = 1.6;
       picture_on_wall(frame, x + 0.05, 1.0, 1.5, 1.0, Material::whiteboard);
       on_wall(x, x + width, 0.2, 0.9);
-    } else if (choice == 3 && left > 1.1) {
+    } else if (choice == 4 && left > 1.1) {
       width = 1.0;
       picture_on_wall(frame, x + 0.03, 0.0, 0.94, 2.05, Material::door);
-    } else if (choice <= 6 && choice > 3 && left > 1.05) {
+    } else if (choice >= 6 && choice <= 10 && left > 1.05) {
       width = random_.uniform(0.8, 1.0);
       shelf(middle(), width, std::min(0.3, depth_limit), random_.uniform(1.5, 2.05));
-    } else if (choice == 7 && left > 0.9) {
+    } else if (choice >= 11 && choice <= 12 && left > 0.9) {
       width = 0.8;
       const double height = random_.uniform(0.7, 1.25);
       cabinet(middle(), width, std::min(0.4, depth_limit), height);
       on_wall(x, x + width, height + 0.3, 2.3);
-    } else if (choice <= 9 && choice > 7 && left > 1.5) {
-      width = 1.4;
-      desk(middle(), width, std::min(0.7, depth_limit), true);
-      on_wall(x, x + width, 1.3, 2.3);
-    } else if (choice == 10) {
-      plant(middle());
-      on_wall(x, x + width, 1.4, 2.3);
-    } else if (choice == 11 && left > 0.6) {
+    } else if (choice == 13 && left > 0.6) {
       width = 0.55;
       cartons(middle(), width, std::min(0.45, depth_limit));
       on_wall(x, x + width, 1.5, 2.3);
+    } else if (choice >= 14 && choice <= 16 && left > 1.5) {
+      width = 1.4;
+      desk(middle(), width, std::min(0.7, depth_limit), Clutter::monitors);
+      on_wall(x, x + width, 1.3, 2.3);
+    } else if (choice == 17) {
+      plant(middle());
+      on_wall(x, x + width, 1.4, 2.3);
     } else {
-      on_wall(x, x + width, 0.9, 2.2);
+      on_wall(x, x + width, 0.3, 1.2);
+      on_wall(x, x + width, 1.25, 2.25);
     }
     x += width + random_.uniform(0.03, 0.15);
   }

@@ -24,6 +24,9 @@ struct Furnishing {
   std::vector<Footprint> footprints;
 };
 
+// What lies on a desk: nothing higher than 0.15 m, or than 0.3 m, or monitors as well.
+enum class Clutter { low, normal, monitors };
+
 // Where an item stands: origin at the floor (or table), +x to its right as seen from behind, +y to its front.
 Rigid3 placed(double x, double y, double z, double yaw);
 
@@ -44,7 +47,7 @@ class Furnisher {
   // depth_limit [m]: nothing stands out further; below 0.25 only things on the wall.
   void line_wall(const Eigen::Vector2d& start, const Eigen::Vector2d& along, double length, double depth_limit);
 
-  void desk(const Rigid3& at, double width, double depth, bool tall_things);
+  void desk(const Rigid3& at, double width, double depth, Clutter clutter);
   void shelf(const Rigid3& at, double width, double depth, double height);
   void cabinet(const Rigid3& at, double width, double depth, double height);
   void chair(const Rigid3& at);
@@ -52,7 +55,7 @@ class Furnisher {
   void cartons(const Rigid3& at, double width, double depth);
   void picture_on_wall(const Rigid3& wall, double x, double z, double width, double height, Material material);
   // Things lying on a surface of that size whose centre is `at`.
-  void clutter(const Rigid3& at, double width, double depth, bool tall_things);
+  void clutter(const Rigid3& at, double width, double depth, Clutter kind);
 
   // An office chair on its own, in its own frame.
   static Surfaces make_chair(Materials* materials, uint64_t seed);

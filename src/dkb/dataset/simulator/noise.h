@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace dkb::sim {
 
@@ -28,6 +30,15 @@ inline float normal_from_bits(uint64_t h) {
   return static_cast<float>(sum - 131070) * (1.7320508F / 65536.0F);
 }
 
+// The random value of a lattice point, in [-1, 1).
+inline float lattice_value(uint32_t ix, uint32_t iy, uint64_t seed) {
+  uint32_t h = ix * 0x85EBCA6BU ^ iy * 0xC2B2AE35U ^ static_cast<uint32_t>(seed);
+  h = (h ^ (h >> 15)) * 0x2C1B3C6DU;
+  h = (h ^ (h >> 12)) * 0x297A2D39U;
+  h ^= h >> 15;
+  return static_cast<float>(h) * 0x1.0p-31F - 1.0F;
+}
+
 // Smooth noise in [-1, 1] with features of size 1.
 inline float lattice_noise(float x, float y, uint64_t seed) {
   const float fx = std::floor(x), fy = std::floor(y);
@@ -35,23 +46,38 @@ inline float lattice_noise(float x, float y, uint64_t seed) {
   float u = x - fx, v = y - fy;
   u = u * u * (3 - 2 * u);
   v = v * v * (3 - 2 * v);
-  const auto at = [&](uint32_t dx, uint32_t dy) {
-    uint32_t h = (ix + dx) * 0x85EBCA6BU ^ (iy + dy) * 0xC2B2AE35U ^ static_cast<uint32_t>(seed);
-    h = (h ^ (h >> 15)) * 0x2C1B3C6DU;
-    h = (h ^ (h >> 12)) * 0x297A2D39U;
-    h ^= h >> 15;
-    return static_cast<float>(h) * 0x1.0p-31F - 1.0F;
-  };
+  const auto at = [&](uint32_t dx, uint32_t dy) { return lattice_value(ix + dx, iy + dy, seed); };
   const float a = at(0, 0) * (1 - u) + at(1, 0) * u, b = at(0, 1) * (1 - u) + at(1, 1) * u;
   return a * (1 - v) + b * v;
 }
 
-// Octaves of it, each half as large and half as strong; in about [-1, 1].
-inline float fractal_noise(float x, float y, int octaves, uint64_t seed) {
-  float sum = 0, weight = 0.5F;
-  for (int i = 0; i < octaves; ++i, x *= 2, y *= 2, weight *= 0.5F)
-    sum += weight * lattice_noise(x, y, seed + static_cast<uint64_t>(i) * 0x632BE5ABU);
-  return sum;
+// Octaves of it along a row, each half as large and half as strong: (*row)[i] is the noise at (step * i, y), in about
+// [-1, 1]. Columns of the lattice are blended once for all the pixels between them.
+inline void fractal_noise_row(float step, float y, int octaves, uint64_t seed, std::vector<float>* row) {
+  std::fill(row->begin(), row->end(), 0.0F);
+  float weight = 0.5F;
+  for (int octave = 0; octave < octaves; ++octave, step *= 2, y *= 2, weight *= 0.5F) {
+    const uint64_t own = seed + static_cast<uint64_t>(octave) * 0x632BE5ABU;
+    const float fy = std::floor(y);
+    const auto iy = static_cast<uint32_t>(static_cast<int32_t>(fy));
+    float v = y - fy;
+    v = v * v * (3 - 2 * v);
+    const auto column = [&](uint32_t ix) { return lattice_value(ix, iy, own) * (1 - v) + lattice_value(ix, iy + 1, own) * v; };
+    uint32_t cell = 0;
+    float left = column(0), right = column(1);
+    for (size_t i = 0; i < row->size(); ++i) {
+      const float x = step * static_cast<float>(i);
+      const auto ix = static_cast<uint32_t>(x);
+      if (ix != cell) {
+        left = ix == cell + 1 ? right : column(ix);
+        right = column(ix + 1);
+        cell = ix;
+      }
+      float u = x - static_cast<float>(ix);
+      u = u * u * (3 - 2 * u);
+      (*row)[i] += weight * (left * (1 - u) + right * u);
+    }
+  }
 }
 
 }  // namespace dkb::sim

@@ -277,7 +277,6 @@ bool Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x, int
 void Rasteriser::add_colour(const DrawList& list, const Materials& materials, const GeometryImage& geometry, float level_shift,
                             std::vector<uint64_t>* sum) const {
   const auto n_patches = static_cast<int32_t>(list.patches.size());
-  // Lambert shading needs normals in the world; lights are folded into camera axes through to_local instead.
   for (int y = 0; y < camera_.height; ++y) {
     const int32_t* ids = geometry.id.row(y);
     const float* depth = geometry.inverse_depth.row(y);

@@ -52,16 +52,18 @@ void place_desks(const std::vector<View>& views, const Footprint& room, Furnishe
       if (x < room.x0 + 0.5 || y < room.y0 + 0.5) continue;
       const Footprint cell{x, y, x + kDeskWidth, y + kDeskDepth};
       size_t hits = 0;
-      bool free = true, tall = true;
+      bool free = true, tall = true, low = false;
       for (const View& v : views) {
         const Vector2d p = looked_at(v);
         hits += cell.distance(p.x(), p.y()) < 0.35;
         const double near = cell.distance(v.eye.x(), v.eye.y()), above = v.eye.z() - kDeskHeight;
-        free = free && (near > 0.45 || above > 0.5);
+        free = free && (near > 0.45 || above > 0.4);
         tall = tall && near > 0.55;
+        low = low || (near < 0.45 && above < 0.75);
       }
       if (!free || hits * 50 < views.size()) continue;
-      furnisher->desk(placed(x + kDeskWidth / 2, y + kDeskDepth, 0, 3.141592653589793), kDeskWidth - 0.02, kDeskDepth - 0.01, tall);
+      furnisher->desk(placed(x + kDeskWidth / 2, y + kDeskDepth, 0, 3.141592653589793), kDeskWidth - 0.02, kDeskDepth - 0.01,
+                      low ? Clutter::low : tall ? Clutter::monitors : Clutter::normal);
     }
 }
 

@@ -43,7 +43,7 @@ void line_room(const Footprint& r, const std::array<double, 4>& depth_limit, Fur
   f->line_wall({r.x0, r.y1 - corner}, {0, -1}, d - 2 * corner, depth_limit[3]);
 }
 
-void desk_facing_south(double x, double y, Furnisher* f) { f->desk(placed(x, y + 0.75, 0, kPi), 1.4, 0.75, true); }
+void desk_facing_south(double x, double y, Furnisher* f) { f->desk(placed(x, y + 0.75, 0, kPi), 1.4, 0.75, Clutter::monitors); }
 
 int frames_of(const SceneRequest& request, int usual) { return request.frames > 0 ? request.frames : usual; }
 int people_of(const SceneRequest& request, int usual) { return request.people >= 0 ? request.people : usual; }
@@ -145,10 +145,10 @@ Scene build_rush(const SceneRequest& request) {
 Scene build_straight(const SceneRequest& request) {
   Scene scene;
   scene.frames = frames_of(request, 300);
-  scene.inside = {-1.6, -2.2, 8.4, 2.2};
+  scene.inside = {-1.6, -2.0, 7.8, 2.0};
   Furnisher f(&scene.materials, &scene.furnishing, hash64(request.seed, 0xF00D));
   f.shell(scene.inside.x0, scene.inside.y0, scene.inside.x1, scene.inside.y1, 2.6, Material::planks);
-  line_room(scene.inside, {0.4, 0.6, 0.4, 0.2}, &f);
+  line_room(scene.inside, {0.49, 0.6, 0.49, 0.2}, &f);
   // Half a metre a second; with more frames than that needs, slower.
   const double duration = (std::max(scene.frames, 300) - 1) / request.fps;
   scene.path = [duration](double t) { return camera_pose({5.0 * eased(t / duration, 0.06), 0, 1.05}, 0, -0.08); };
@@ -158,7 +158,7 @@ Scene build_straight(const SceneRequest& request) {
   const double end = scene.frames / request.fps;
   area.next_target = [duration, end](Random& random) {
     const double cart = 5.0 * eased(random.uniform(0, end) / duration, 0.06);
-    return Vector2d(cart + random.uniform(0.8, 3.8), random.uniform(-1.5, 1.5));
+    return Vector2d(cart + random.uniform(0.8, 3.6), random.uniform(-1.3, 1.3));
   };
   add_walkers(&scene, area, people_of(request, 4), end, request.seed);
   return scene;
@@ -177,7 +177,7 @@ Scene build_cover(const SceneRequest& request) {
       const Rigid3 camera = path(t);
       const Vector3d ahead = camera.rotation * Vector3d::UnitZ();
       // Follows the camera half-way, sways on its own.
-      const double x = 0.8 * camera.translation.x() + 0.3 * ahead.x() + 0.05 * std::sin(1.3 * t), y = camera.translation.y() + 0.64 + 0.03 * std::sin(0.7 * t);
+      const double x = 0.8 * camera.translation.x() + 0.3 * ahead.x() + 0.05 * std::sin(1.3 * t), y = camera.translation.y() + 0.62 + 0.03 * std::sin(0.7 * t);
       const double in = eased((t - (arrive - 1.4)) / 1.4, 0.3), out = eased((t - leave) / 1.4, 0.3);
       return {x + 2.4 * (1 - in) - 2.4 * out, y + 0.25 * (1 - in) + 0.25 * out};
     };
@@ -193,7 +193,7 @@ Scene build_cover(const SceneRequest& request) {
       track.push(s);
     }
     add_mover(&scene, "person", track, request.seed);
-    scene.movers.back().look.girth = 1.15;
+    scene.movers.back().look.girth = 1.25;
     scene.movers.back().look.arms_out = 0.12;
   }
   if (request.people > 1) {
@@ -265,7 +265,7 @@ Scene build_loop(const SceneRequest& request) {
         f.line_wall({x1, y - 0.05}, {-1, 0}, x1 - x0, 0.1);
       }
     }
-  f.desk(placed(-0.4, -3.05, 0, kPi), 1.4, 0.75, true);
+  f.desk(placed(-0.4, -3.05, 0, kPi), 1.4, 0.75, Clutter::monitors);
 
   const uint64_t seed = hash64(request.seed, 8);
   const double duration = (std::max(scene.frames, 900) - 1) / request.fps;
@@ -314,7 +314,7 @@ Scene build_twins(const SceneRequest& request) {
     f.shell(x0, south, x1, north, h, Material::planks);
     f.line_wall({x1 - 0.1, north}, {-1, 0}, width - 0.2, 0.6);
     f.line_wall({x0 + 0.6, south}, {1, 0}, width - 1.2, 0.4);
-    f.desk(placed(x0 + 2.3, 1.6, 0, kPi), 1.4, 0.65, true);
+    f.desk(placed(x0 + 2.3, 1.6, 0, kPi), 1.4, 0.65, Clutter::monitors);
   }
   Furnisher f(&scene.materials, &scene.furnishing, hash64(request.seed, 0x7713));
   f.shell(width + 0.1, south, width + 0.1 + corridor, 1.7, h, Material::planks);

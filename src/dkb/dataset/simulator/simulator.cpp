@@ -21,7 +21,7 @@ namespace {
 // Ray positions in a pixel and moments of the exposure, one each per drawing: the two do not follow each other, so that
 // neither direction of motion is favoured. 1/16 px.
 constexpr std::array<std::array<int, 2>, 8> kRays{{{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
-constexpr double kLensBlur = 1.3;     // rays spread over that many pixels
+constexpr double kLensBlur = 1.7;     // rays spread over that many pixels
 constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth
 
 std::string stamp_text(int64_t microseconds) {

@@ -93,21 +93,23 @@ void Canvas::triangle(const std::array<double, 6>& p, Colour c) {
 }
 
 void Canvas::grain(double size_x, double size_y, float strength, int octaves, uint64_t seed) {
-  for (int y = 0; y < height_; ++y)
+  std::vector<float> noise(static_cast<size_t>(width_));
+  for (int y = 0; y < height_; ++y) {
+    fractal_noise_row(static_cast<float>(1 / sx_ / size_x), static_cast<float>(y / sy_ / size_y), octaves, seed, &noise);
     for (int x = 0; x < width_; ++x) {
-      const float n = fractal_noise(static_cast<float>(x / sx_ / size_x), static_cast<float>(y / sy_ / size_y), octaves, seed);
       Colour& p = pixel(x, y);
-      const float k = 1 + strength * n;
+      const float k = 1 + strength * noise[static_cast<size_t>(x)];
       p = {clamp255(p.r * k), clamp255(p.g * k), clamp255(p.b * k)};
     }
+  }
 }
 
 void Canvas::stain(double size, Colour c, float amount, uint64_t seed) {
-  for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x) {
-      const float n = fractal_noise(static_cast<float>(x / sx_ / size), static_cast<float>(y / sy_ / size), 4, seed);
-      blend(x, y, c, amount * std::clamp(0.5F + 1.2F * n, 0.0F, 1.0F));
-    }
+  std::vector<float> noise(static_cast<size_t>(width_));
+  for (int y = 0; y < height_; ++y) {
+    fractal_noise_row(static_cast<float>(1 / sx_ / size), static_cast<float>(y / sy_ / size), 4, seed, &noise);
+    for (int x = 0; x < width_; ++x) blend(x, y, c, amount * std::clamp(0.5F + 1.2F * noise[static_cast<size_t>(x)], 0.0F, 1.0F));
+  }
 }
 
 void Canvas::text(double x, double y, double x_end, double size, Colour c, uint64_t seed) {
