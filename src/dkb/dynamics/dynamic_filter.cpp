@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/dynamic_filter.h"
+
+#include <cmath>
+
+namespace dkb {
+namespace {
+
+// Distance [px] of the current pixel from the epipolar line of the previous one; 0 when the camera did not move.
+double epipolar_distance(const FilterFeature& f, const CameraModel& camera, const Rigid3& current_from_previous) {
+  if (current_from_previous.translation.norm() < 1e-6) return 0;
+  const Eigen::Vector3d ray = camera.unproject(f.previous_pixel, 1.0);
+  const Eigen::Vector3d line = skew(current_from_previous.translation) * (current_from_previous.rotation * ray);
+  const Eigen::Vector3d line_px(line.x() / camera.fx, line.y() / camera.fy,
+                                line.z() - line.x() * camera.cx / camera.fx - line.y() * camera.cy / camera.fy);
+  const double norm = line_px.head<2>().norm();
+  if (norm < 1e-12) return 0;
+  return std::abs(line_px.x() * f.pixel.x() + line_px.y() * f.pixel.y() + line_px.z()) / norm;
+}
+
+// DKB eq. 9 after compensation of the camera's motion.
+double flow_residual(const FilterFeature& f, const CameraModel& camera, const Rigid3& current_from_previous) {
+  if (!(f.previous_depth > 0)) return epipolar_distance(f, camera, current_from_previous);
+  const Eigen::Vector3d expected = current_from_previous * camera.unproject(f.previous_pixel, f.previous_depth);
+  if (expected.z() < 0.05) return 0;
+  return (camera.project(expected) - f.pixel).norm();
+}
+
+}  // namespace
+
+std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<const Detection> boxes) {
+  std::vector<int> box(features.size(), -1);
+  for (size_t i = 0; i < features.size(); ++i)
+    for (size_t b = 0; b < boxes.size(); ++b) {
+      if (!boxes[b].box.contains(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y())))
+        continue;
+      if (box[i] < 0 || boxes[b].box.area() < boxes[static_cast<size_t>(box[i])].box.area()) box[i] = static_cast<int>(b);
+    }
+  return box;
+}
+
+std::vector<uint8_t> box_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes) {
+  std::vector<uint8_t> dynamic(features.size(), 0);
+  const auto box = box_of_each(features, boxes);
+  for (size_t i = 0; i < features.size(); ++i) dynamic[i] = box[i] >= 0;
+  return dynamic;
+}
+
+std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
+                                  const CameraModel& camera, const Rigid3& current_from_previous, const PaperFilterOptions& options) {
+  std::vector<uint8_t> dynamic(features.size(), 0);
+  const auto box = box_of_each(features, boxes);
+  for (size_t i = 0; i < features.size(); ++i) {
+    if (box[i] < 0 || !features[i].flowed) continue;
+    const double distance = options.compensate ? flow_residual(features[i], camera, current_from_previous)
+                                               : (features[i].pixel - features[i].previous_pixel).norm();
+    dynamic[i] = distance > options.flow_threshold;
+  }
+  for (size_t b = 0; b < boxes.size(); ++b) {
+    std::vector<double> depths;
+    std::vector<size_t> index;
+    for (size_t i = 0; i < features.size(); ++i)
+      if (box[i] == static_cast<int>(b) && !dynamic[i] && features[i].depth > 0) {
+        depths.push_back(features[i].depth);
+        index.push_back(i);
+      }
+    const auto verdict = depth_test(depths, options);
+    for (size_t k = 0; k < index.size(); ++k) dynamic[index[k]] = verdict[k];
+  }
+  return dynamic;
+}
+
+std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
+                                     const CameraModel& camera, const Rigid3& current_from_previous,
+                                     const EpipolarFilterOptions& options) {
+  std::vector<uint8_t> dynamic(features.size(), 0);
+  const auto box = box_of_each(features, boxes);
+  for (size_t i = 0; i < features.size(); ++i)
+    dynamic[i] = box[i] >= 0 && features[i].flowed && epipolar_distance(features[i], camera, current_from_previous) > options.threshold;
+  return dynamic;
+}
+
+std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features, std::span<const Eigen::Vector3d> seen_in_camera,
+                                      const CameraModel& camera, const DepthImage& depth, const MultiviewFilterOptions& options) {
+  struct Spot {
+    Eigen::Vector2d image_pixel;
+    double depth;
+  };
+  std::vector<Spot> spots;
+  for (const Eigen::Vector3d& p : seen_in_camera) {
+    if (p.z() < 0.1) continue;
+    const Eigen::Vector2d at = camera.distort(camera.project(p));
+    const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+    if (!depth.contains(x, y)) continue;
+    const double z = depth(x, y);
+    if (z > 0 && p.z() - z > options.depth_step) spots.push_back({at, z});
+  }
+  std::vector<uint8_t> dynamic(features.size(), 0);
+  for (size_t i = 0; i < features.size(); ++i)
+    for (const Spot& s : spots) {
+      if ((s.image_pixel - features[i].image_pixel).squaredNorm() > options.radius * options.radius) continue;
+      if (features[i].depth > 0 && std::abs(features[i].depth - s.depth) > 0.5 * options.depth_step) continue;
+      dynamic[i] = 1;
+      break;
+    }
+  return dynamic;
+}
+
+std::vector<uint8_t> mask_filter(std::span<const FilterFeature> features, const MoverMask& mask) {
+  std::vector<uint8_t> dynamic(features.size(), 0);
+  for (size_t i = 0; i < features.size(); ++i)
+    dynamic[i] = mask.at(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y()));
+  return dynamic;
+}
+
+}  // namespace dkb

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/silhouette.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+struct CellRange {
+  int x0, y0, x1, y1;  // half open
+};
+
+CellRange cells_of(const Box& box, int cell, int columns, int rows) {
+  const auto cut = [](float v, int n) { return std::clamp(static_cast<int>(std::floor(v)), 0, n); };
+  const float c = static_cast<float>(cell);
+  return {cut(box.x / c, columns), cut(box.y / c, rows), cut((box.x + box.w) / c + 1, columns), cut((box.y + box.h) / c + 1, rows)};
+}
+
+Box scaled(const Box& b, double factor) {
+  const float w = b.w * static_cast<float>(factor), h = b.h * static_cast<float>(factor);
+  return {b.x + 0.5f * (b.w - w), b.y + 0.5f * (b.h - h), w, h};
+}
+
+// Nearest valid depth in the cell; 0 where there is none.
+float cell_depth(const DepthImage& depth, int cx, int cy, int cell) {
+  const int x = cx * cell + cell / 2, y = cy * cell + cell / 2;
+  for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {1, 0}, {0, 1}, {-1, -1}, {1, 1}}) {
+    if (!depth.contains(x + dx, y + dy)) continue;
+    if (const float d = depth(x + dx, y + dy); d > 0) return d;
+  }
+  return 0;
+}
+
+// Depth of the nearest layer that fills enough of the core, weighted toward the centre; 0 when the core has no depth.
+float object_depth(const Image<float>& grid, const CellRange& core, const SilhouetteOptions& options) {
+  struct Sample {
+    float depth, weight;
+  };
+  std::vector<Sample> samples;
+  const float mx = 0.5f * static_cast<float>(core.x0 + core.x1 - 1), my = 0.5f * static_cast<float>(core.y0 + core.y1 - 1);
+  const float sx = std::max(1.0f, 0.5f * static_cast<float>(core.x1 - core.x0)), sy = std::max(1.0f, 0.5f * static_cast<float>(core.y1 - core.y0));
+  float total = 0;
+  for (int y = core.y0; y < core.y1; ++y)
+    for (int x = core.x0; x < core.x1; ++x) {
+      const float d = grid(x, y);
+      if (!(d > 0)) continue;
+      const float u = (static_cast<float>(x) - mx) / sx, v = (static_cast<float>(y) - my) / sy;
+      const float w = std::exp(-(u * u + 0.5f * v * v));
+      samples.push_back({d, w});
+      total += w;
+    }
+  if (samples.empty()) return 0;
+  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.depth < b.depth; });
+  // Slide a window of the layer's relative width from near to far; the first local maximum that is heavy enough wins.
+  const float ratio = static_cast<float>((1 + options.layer) / (1 - options.layer));
+  const float needed = static_cast<float>(options.least_share) * total;
+  float weight = 0, best_weight = 0, best_depth = samples[samples.size() / 2].depth;
+  size_t end = 0;
+  for (size_t begin = 0; begin < samples.size(); ++begin) {
+    while (end < samples.size() && samples[end].depth <= samples[begin].depth * ratio) weight += samples[end++].weight;
+    if (weight > best_weight) {
+      best_weight = weight;
+      best_depth = 0.5f * (samples[begin].depth + samples[end - 1].depth);
+    } else if (best_weight >= needed && samples[begin].depth > best_depth) {
+      break;  // past the nearest heavy layer
+    }
+    weight -= samples[begin].weight;
+  }
+  return best_depth;
+}
+
+}  // namespace
+
+void SilhouetteOptions::check() const {
+  require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
+  require_option(core > 0 && core <= 1, "core", core, "greater than 0, at most 1");
+  require_option(least_share > 0 && least_share <= 1, "least_share", least_share, "greater than 0, at most 1");
+  require_option(layer > 0 && layer < 1, "layer", layer, "between 0 and 1");
+  require_option(step > 0, "step", step, "greater than 0");
+  require_option(reach > 0, "reach", reach, "greater than 0 m");
+  require_option(margin >= 0, "margin", margin, "at least 0");
+  require_option(rim >= 0, "rim", rim, "at least 0");
+}
+
+MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const SilhouetteOptions& options) {
+  MoverMask mask;
+  mask.cell = options.cell;
+  if (boxes.empty()) return mask;
+  const int columns = (depth.width() + options.cell - 1) / options.cell, rows = (depth.height() + options.cell - 1) / options.cell;
+  mask.cells = Image<uint8_t>(columns, rows);
+  Image<float> grid(columns, rows);
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, options.cell);
+
+  for (const Detection& detection : boxes) {
+    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * options.margin), options.cell, columns, rows);
+    const CellRange core = cells_of(scaled(detection.box, options.core), options.cell, columns, rows);
+    const float layer = object_depth(grid, core, options);
+    if (!(layer > 0)) {
+      for (int y = range.y0; y < range.y1; ++y)
+        for (int x = range.x0; x < range.x1; ++x) mask.cells(x, y) = 255;
+      continue;
+    }
+    Image<uint8_t> mine(columns, rows);
+    std::vector<std::pair<int, int>> front;
+    const auto near_layer = [&](float d, double tolerance) { return std::fabs(d - layer) <= static_cast<float>(tolerance); };
+    for (int y = core.y0; y < core.y1; ++y)
+      for (int x = core.x0; x < core.x1; ++x)
+        if (grid(x, y) > 0 && near_layer(grid(x, y), options.layer * layer)) {
+          mine(x, y) = 255;
+          front.emplace_back(x, y);
+        }
+    while (!front.empty()) {
+      const auto [x, y] = front.back();
+      front.pop_back();
+      const float d = grid(x, y);
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        const int nx = x + dx, ny = y + dy;
+        if (nx < range.x0 || ny < range.y0 || nx >= range.x1 || ny >= range.y1 || mine(nx, ny)) continue;
+        const float nd = grid(nx, ny);
+        if (!(nd > 0) || std::fabs(nd - d) > static_cast<float>(options.step) * d || !near_layer(nd, options.reach)) continue;
+        mine(nx, ny) = 255;
+        front.emplace_back(nx, ny);
+      }
+    }
+    // Holes of the depth image: a cell without depth belongs to the object when more of its known neighbours do.
+    for (int y = range.y0; y < range.y1; ++y)
+      for (int x = range.x0; x < range.x1; ++x) {
+        if (grid(x, y) > 0 || mine(x, y)) continue;
+        int in = 0, out = 0;
+        for (int ny = std::max(range.y0, y - 3); ny < std::min(range.y1, y + 4); ++ny)
+          for (int nx = std::max(range.x0, x - 3); nx < std::min(range.x1, x + 4); ++nx)
+            if (grid(nx, ny) > 0) ++(mine(nx, ny) ? in : out);
+        if (in > out) mask.cells(x, y) = 255;
+      }
+    for (int y = range.y0; y < range.y1; ++y)
+      for (int x = range.x0; x < range.x1; ++x)
+        if (mine(x, y)) mask.cells(x, y) = 255;
+  }
+  dilate(mask, options.rim);
+  return mask;
+}
+
+}  // namespace dkb
