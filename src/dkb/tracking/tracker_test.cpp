@@ -1,0 +1,428 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/tracking/test_scene.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kFrameTime = 1.0 / 30;  // [s]
+
+const ViewOptions kNoisy{
+    .pixel_noise = 0.5, .depth_noise = 0.01, .depth_share = 0.8, .flipped_bits = 20, .clutter = 200, .misplaced = 0.1};
+
+class TrackerTest : public ::testing::Test {
+ protected:
+  TrackOutcome track(const Rigid3& cam_from_world, ViewOptions options = {}, const std::vector<uint8_t>& usable = {}) {
+    ++index;
+    options.seed = options.seed * 1000 + static_cast<uint64_t>(index);
+    view = scene.look(cam_from_world, options);
+    if (black) view.features = std::make_shared<RgbdFeatures>();
+    return tracker.track(
+        index, index * kFrameTime, [&](const Vector6d&) { return view.features; }, usable);
+  }
+  // The first frame and its keyframe.
+  KeyframePacket start(const Rigid3& cam_from_world = {}, const ViewOptions& options = {}) {
+    TrackOutcome first = track(cam_from_world, options);
+    EXPECT_TRUE(first.wants_first_keyframe);
+    first.frame.cam_from_world = cam_from_world;
+    return insert(first.frame);
+  }
+  KeyframePacket insert(const TrackedFrame& frame, const std::vector<uint8_t>& usable = {}) {
+    keyframe_shows.push_back(view.shows);
+    return tracker.make_keyframe(static_cast<KeyframeId>(keyframe_shows.size()) - 1, frame, usable);
+  }
+  // What mapping would do, without any refinement.
+  void work_in(const KeyframePacket& packet) {
+    Keyframe k;
+    k.id = packet.id;
+    k.features = packet.features;
+    k.points = packet.points;
+    k.parent = packet.reference;
+    k.cam_from_world = packet.reference == kNoKeyframe
+                           ? packet.cam_from_reference
+                           : packet.cam_from_reference * map.cam_from_world(packet.reference);
+    const Rigid3 world_from_cam = k.cam_from_world.inverse();
+    map.add_keyframe(std::move(k));
+    for (const ProvisionalPoint& n : packet.new_points) {
+      MapPoint p;
+      p.id = n.id;
+      p.position = world_from_cam * n.point_in_keyframe;
+      p.reference_distance = static_cast<float>(n.point_in_keyframe.norm());
+      p.reference_scale = n.scale;
+      p.descriptor = n.descriptor;
+      map.add_point(p);
+      map.observe(n.id, packet.id, n.feature);
+    }
+    map.update_covisibility(packet.id, 1);
+  }
+  Rigid3 publish() { return tracker.take_view(map.snapshot()); }
+  Rigid3 publish(const KeyframePacket& packet) {
+    work_in(packet);
+    return publish();
+  }
+  // The scene's point behind a map point, by the keyframe and feature that it is named after.
+  int scene_point(PointId id) const {
+    return keyframe_shows[static_cast<size_t>(birth_keyframe(id))][static_cast<size_t>(birth_feature(id))];
+  }
+  // Hand-held: 0.6 m/s to the right, 0.3 rad/s about the vertical axis.
+  static Rigid3 on_path(double frames) {
+    return TestScene::camera_at({0.02 * frames, 0.005 * frames, 0}, {0, 0.01 * frames, 0});
+  }
+
+  TestScene scene{700};
+  Tracker tracker{scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1};
+  Map map;
+  View view;  // of the last frame
+  std::vector<std::vector<int>> keyframe_shows;
+  FrameIndex index = -1;
+  bool black = false;
+};
+
+TEST_F(TrackerTest, AMapStartsOnceEnoughFeaturesHaveDepth) {
+  const TrackOutcome blind = track({}, {.depth_share = 0});
+  EXPECT_EQ(blind.state, TrackingState::initialising);
+  EXPECT_FALSE(blind.wants_first_keyframe);
+  const TrackOutcome first = track({});
+  EXPECT_EQ(first.state, TrackingState::tracking);
+  EXPECT_TRUE(first.wants_first_keyframe);
+}
+
+TEST_F(TrackerTest, UnusableDepthsStartNoMap) {
+  const std::vector<uint8_t> none(scene.look({}).shows.size(), 0);
+  EXPECT_EQ(track({}, {}, none).state, TrackingState::initialising);
+}
+
+TEST_F(TrackerTest, FollowsASteadyMotionThroughNoiseAndOutliers) {
+  publish(start(on_path(0), kNoisy));
+  for (int f = 1; f <= 30; ++f) {
+    const TrackOutcome o = track(on_path(f), kNoisy);
+    ASSERT_EQ(o.state, TrackingState::tracking) << "frame " << f;
+    EXPECT_GT(o.frame.inliers, 50);
+    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 0.015) << "frame " << f;
+    EXPECT_LT(turn_between(o.frame.cam_from_world, on_path(f)), 0.3) << "frame " << f;
+    int inliers = 0;
+    for (size_t i = 0; i < o.frame.points.size(); ++i) {
+      if (o.frame.points[i] == kNoPoint) continue;
+      ++inliers;
+      EXPECT_FALSE(o.frame.outlier[i]);
+      ASSERT_EQ(scene_point(o.frame.points[i]), view.shows[i]) << "frame " << f << " feature " << i;
+    }
+    EXPECT_EQ(inliers, o.frame.inliers);
+  }
+}
+
+TEST_F(TrackerTest, ExactViewsGiveExactPoses) {
+  publish(start());
+  for (int f = 1; f <= 5; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-5);
+    EXPECT_LT(turn_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+  }
+}
+
+TEST_F(TrackerTest, ProvisionalPointsMatchBeforeMappingPublishes) {
+  start(on_path(0));
+  for (int f = 1; f <= 3; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    EXPECT_GT(o.frame.inliers, 150);
+    EXPECT_EQ(o.frame.reference, 0);
+  }
+}
+
+TEST_F(TrackerTest, ProvisionalPointsOfALaterKeyframeAddToTheMapBeforeMappingPublishes) {
+  publish(start(on_path(0)));
+  TrackOutcome o;
+  for (int f = 1; f <= 25; ++f) o = track(on_path(f));
+  const KeyframePacket packet = insert(o.frame);
+  EXPECT_GT(packet.new_points.size(), 30U);
+  o = track(on_path(26));
+  int of_the_new_one = 0;
+  for (PointId p : o.frame.points) of_the_new_one += p != kNoPoint && birth_keyframe(p) == 1;
+  EXPECT_GT(of_the_new_one, static_cast<int>(packet.new_points.size()) / 2);
+}
+
+TEST_F(TrackerTest, TheFirstKeyframeMayStandAnywhere) {
+  const Rigid3 mounted = TestScene::camera_at({0.3, -0.2, 0.4}, {0.1, 0.2, -0.1});
+  start(mounted);
+  const Rigid3 next = TestScene::camera_at({0.31, -0.2, 0.4}, {0.1, 0.2, -0.1});
+  const TrackOutcome o = track(next);
+  ASSERT_EQ(o.state, TrackingState::tracking);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, next), 1e-5);
+  const Rigid3 moved = tracker.take_view(std::make_shared<const Map>());
+  EXPECT_LT(moved.translation.norm(), 1e-9) << "nothing moved the world";
+}
+
+TEST_F(TrackerTest, UnusableFeaturesAreNeverMatchedAndMakeNoPoints) {
+  const auto odd = [](const View& v) {
+    std::vector<uint8_t> usable;
+    for (int shows : v.shows) usable.push_back(shows % 2 != 0);
+    return usable;
+  };
+  TrackOutcome first = track(on_path(0), {}, odd(scene.look(on_path(0))));
+  const KeyframePacket packet = insert(first.frame, odd(view));
+  for (const ProvisionalPoint& p : packet.new_points) EXPECT_TRUE(scene_point(p.id) % 2) << "feature " << p.feature;
+  publish(packet);
+  for (int f = 1; f <= 4; ++f) {
+    std::vector<uint8_t> half(scene.look(on_path(f)).shows.size(), 0);
+    for (size_t i = 0; i < half.size(); i += 2) half[i] = 1;
+    const TrackOutcome o = track(on_path(f), {}, half);
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    for (size_t i = 1; i < half.size(); i += 2) {
+      EXPECT_EQ(o.frame.points[i], kNoPoint);
+      EXPECT_FALSE(o.frame.outlier[i]);
+    }
+  }
+  EXPECT_EQ(track(on_path(5), {}, std::vector<uint8_t>(scene.look(on_path(5)).shows.size(), 0)).state,
+            TrackingState::lost);
+}
+
+TEST_F(TrackerTest, UnusableFeaturesAreNotMatchedByALostTrackerEither) {
+  publish(start());
+  black = true;
+  track({});
+  black = false;
+  auto half = std::vector<uint8_t>(scene.look({}).shows.size(), 0);
+  for (size_t i = 0; i < half.size(); i += 2) half[i] = 1;
+  const TrackOutcome o = track({}, {}, half);
+  ASSERT_EQ(o.state, TrackingState::relocalised);
+  for (size_t i = 1; i < half.size(); i += 2) EXPECT_EQ(o.frame.points[i], kNoPoint);
+}
+
+TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
+  publish(start(on_path(0), kNoisy));
+  for (int f = 1; f <= 5; ++f) track(on_path(f), kNoisy);
+  black = true;
+  for (int f = 0; f < 5; ++f) {
+    const TrackOutcome o = track(on_path(5));
+    EXPECT_EQ(o.state, TrackingState::lost);
+    EXPECT_TRUE(tracker.velocity().isZero());
+  }
+  black = false;
+  const Rigid3 elsewhere = on_path(12);
+  TrackOutcome o = track(elsewhere, kNoisy);
+  EXPECT_EQ(o.state, TrackingState::relocalised);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, elsewhere), 0.015);
+  o = track(on_path(13), kNoisy);
+  EXPECT_EQ(o.state, TrackingState::tracking);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(13)), 0.015);
+}
+
+TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
+  publish(start());
+  const TestScene other(700, 99);
+  for (int f = 0; f < 3; ++f) {
+    ++index;
+    const View there = other.look(on_path(f));
+    EXPECT_EQ(tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return there.features; }, {}).state,
+              TrackingState::lost);
+  }
+}
+
+TEST_F(TrackerTest, LostBeforeTheFirstMapArrivesItWaitsForIt) {
+  const KeyframePacket packet = start();
+  black = true;
+  EXPECT_EQ(track({}).state, TrackingState::lost);
+  black = false;
+  EXPECT_EQ(track({}).state, TrackingState::lost);
+  publish(packet);
+  EXPECT_EQ(track({}).state, TrackingState::relocalised);
+}
+
+TEST_F(TrackerTest, ATakenViewMovesPoseVelocityAndPendingKeyframesWithTheWorld) {
+  publish(start(on_path(0)));
+  TrackOutcome o;
+  for (int f = 1; f <= 6; ++f) o = track(on_path(f));
+  const KeyframePacket pending = insert(o.frame);  // mapping is still at it
+  o = track(on_path(7));
+  const Vector6d velocity = tracker.velocity();
+  const Rigid3 pending_before = tracker.keyframe_pose(1);
+  const PointId provisional = pending.new_points.front().id;
+  const Eigen::Vector3d point_before = *tracker.position(provisional);
+
+  const Rigid3 new_from_old(rotation_from_vector({0.02, -0.5, 0.3}), {0.4, 1.5, -0.2});
+  map.set_pose(0, map.keyframe(0)->cam_from_world * new_from_old.inverse());
+  for (PointId p : map.live_points()) map.edit_point(p).position = new_from_old * map.point(p)->position;
+  const Rigid3 moved = publish();
+  EXPECT_LT((moved.translation - new_from_old.translation).norm(), 1e-9);
+  EXPECT_LT(moved.rotation.angularDistance(new_from_old.rotation), 1e-9);
+  EXPECT_LT(distance_between(tracker.keyframe_pose(1), pending_before * new_from_old.inverse()), 1e-9);
+  EXPECT_LT((*tracker.position(provisional) - new_from_old * point_before).norm(), 1e-9);
+  EXPECT_TRUE(tracker.velocity().isApprox(velocity)) << "it is measured in camera axes";
+
+  o = track(on_path(8));
+  ASSERT_EQ(o.state, TrackingState::tracking);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(8) * new_from_old.inverse()), 1e-4);
+}
+
+TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
+  const KeyframePacket packet = start(on_path(0));
+  track(on_path(1));
+  work_in(packet);
+  const PointId dropped = packet.new_points[0].id, fused = packet.new_points[1].id, survivor = packet.new_points[2].id;
+  map.remove_point(dropped);
+  map.fuse(fused, survivor);
+  publish();
+  EXPECT_FALSE(tracker.position(dropped));
+  EXPECT_FALSE(tracker.position(fused));
+  EXPECT_TRUE(tracker.position(survivor));
+  const TrackOutcome o = track(on_path(2));
+  ASSERT_EQ(o.state, TrackingState::tracking);
+  for (PointId p : o.frame.points) EXPECT_TRUE(p != dropped && p != fused);
+}
+
+TEST_F(TrackerTest, VelocityIsThatOfTheCameraPerSecond) {
+  publish(start(on_path(0)));
+  EXPECT_TRUE(tracker.velocity().isZero());
+  for (int f = 1; f <= 3; ++f) track(on_path(f));
+  const Rigid3 step = on_path(3) * on_path(2).inverse();
+  Vector6d per_second;
+  per_second << step.translation, vector_from_rotation(step.rotation);
+  per_second /= kFrameTime;
+  EXPECT_LT((tracker.velocity() - per_second).norm(), 1e-3);
+  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.3, 1e-3);  // [rad/s] as the path turns
+  const Rigid3 two_steps = tracker.expected_motion(2 * kFrameTime);
+  EXPECT_NEAR(vector_from_rotation(two_steps.rotation).norm(), 0.02, 1e-4);
+}
+
+TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredOne) {
+  publish(start(on_path(0)));
+  for (int f = 1; f <= 3; ++f) track(on_path(f));
+  const Vector6d expected = tracker.velocity();
+  ++index;
+  const View seen = scene.look(on_path(5));  // twice as fast as before
+  std::vector<Vector6d> asked;
+  tracker.track(index, index * kFrameTime,
+                [&](const Vector6d& velocity) {
+                  asked.push_back(velocity);
+                  return seen.features;
+                },
+                {});
+  ASSERT_EQ(asked.size(), 2U);
+  EXPECT_TRUE(asked[0].isApprox(expected));
+  EXPECT_GT(asked[1].tail<3>().norm(), 0.55);  // at least the 0.6 rad/s of this step, up to rounding
+  EXPECT_LT(asked[1].tail<3>().norm(), 0.80);
+  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.6, 0.01);
+}
+
+TEST_F(TrackerTest, PosesHangOnTheirReferenceKeyframe) {
+  publish(start(on_path(0)));
+  TrackOutcome o;
+  for (int f = 1; f <= 6; ++f) o = track(on_path(f));
+  EXPECT_EQ(o.frame.reference, 0);
+  insert(o.frame);
+  o = track(on_path(7));
+  EXPECT_LT(
+      distance_between(o.frame.cam_from_reference * tracker.keyframe_pose(o.frame.reference), o.frame.cam_from_world),
+      1e-12);
+}
+
+TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
+  publish(start());
+  const int hidden = scene_point(map.live_points()[3]);
+  TrackOutcome o;
+  for (int f = 0; f < 10; ++f) {
+    std::vector<uint8_t> usable;
+    for (int shows : scene.look({}).shows) usable.push_back(shows != hidden);
+    o = track({}, {}, usable);
+  }
+  const KeyframePacket packet = insert(o.frame);
+  ASSERT_GT(packet.sightings.size(), 100U);
+  for (size_t i = 0; i < packet.sightings.size(); ++i) {
+    const PointSighting& s = packet.sightings[i];
+    if (i > 0) {
+      EXPECT_LT(packet.sightings[i - 1].point, s.point);
+    }
+    EXPECT_LE(s.found, s.visible);
+    if (scene_point(s.point) == hidden) {
+      EXPECT_EQ(s.found, 0);
+      EXPECT_GE(s.visible, 9);
+    } else {
+      EXPECT_EQ(s.found, 10);
+    }
+  }
+  EXPECT_TRUE(insert(track({}).frame).sightings.size() < 2 * packet.sightings.size());
+}
+
+TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {
+  scene = TestScene(900, 2, 5.0, 9.0);  // all beyond the close depth of 4 m
+  const KeyframePacket far = start();
+  EXPECT_EQ(far.new_points.size(), 100U);
+  double farthest = 0;
+  for (const ProvisionalPoint& p : far.new_points) farthest = std::max(farthest, p.point_in_keyframe.z());
+  std::vector<double> depths;
+  for (const Keypoint& k : view.features->keypoints) depths.push_back(k.depth);
+  std::sort(depths.begin(), depths.end());
+  EXPECT_NEAR(farthest, depths[99], 1e-5) << "the nearest ones";
+}
+
+TEST_F(TrackerTest, AllCloseDepthsMakePoints) {
+  const KeyframePacket close = start();
+  EXPECT_EQ(close.new_points.size(), view.shows.size());
+  for (const ProvisionalPoint& p : close.new_points) {
+    EXPECT_EQ(p.id, make_point_id(0, p.feature));
+    EXPECT_LT((p.point_in_keyframe - scene.points[static_cast<size_t>(scene_point(p.id))]).norm(), 1e-4);
+  }
+}
+
+TEST_F(TrackerTest, CountsTheReferencesPoints) {
+  const KeyframePacket packet = start();
+  const int points = static_cast<int>(packet.new_points.size());
+  EXPECT_EQ(tracker.reference_point_count(0, 1), points) << "provisional ones";
+  publish(packet);
+  EXPECT_EQ(tracker.reference_point_count(0, 1), points);
+  EXPECT_EQ(tracker.reference_point_count(0, 2), 0) << "one keyframe sees them";
+  EXPECT_EQ(tracker.reference_point_count(7, 1), 0);
+}
+
+TEST_F(TrackerTest, AfterAResetOfMotionTheFrameIsFoundAnew) {
+  tracker.reset_motion();
+  publish(start(on_path(0)));
+  track(on_path(1));
+  tracker.reset_motion();
+  const TrackOutcome o = track(on_path(8));
+  EXPECT_EQ(o.state, TrackingState::relocalised);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(8)), 1e-4);
+}
+
+TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
+  std::vector<Rigid3> runs[2];
+  for (auto& poses : runs) {
+    tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1);
+    map = Map();
+    keyframe_shows.clear();
+    index = -1;
+    publish(start(on_path(0), kNoisy));
+    for (int f = 1; f <= 12; ++f) {
+      black = f == 6;
+      poses.push_back(track(on_path(f), kNoisy).frame.cam_from_world);
+    }
+  }
+  for (size_t i = 0; i < runs[0].size(); ++i) {
+    EXPECT_EQ(runs[0][i].translation, runs[1][i].translation);
+    EXPECT_EQ(runs[0][i].rotation.coeffs(), runs[1][i].rotation.coeffs());
+  }
+}
+
+TEST(TrackingOptions, AreChecked) {
+  const auto rejects = [](auto change) {
+    TrackingOptions options;
+    change(options);
+    EXPECT_THROW(options.check(), InvalidOption);
+  };
+  rejects([](auto& o) { o.initial_points = 9; });
+  rejects([](auto& o) { o.least_matches = 5; });
+  rejects([](auto& o) { o.close_depth = 0; });
+  rejects([](auto& o) { o.radius_local_map = -1; });
+  rejects([](auto& o) { o.match_distance = 257; });
+  rejects([](auto& o) { o.match_ratio = 1.5; });
+  rejects([](auto& o) { o.local_map.keyframes = 0; });
+  EXPECT_NO_THROW(TrackingOptions().check());
+}
+
+}  // namespace
+}  // namespace dkb
