@@ -13,19 +13,21 @@
 //         culled: cam_from_parent 7 x f64; live: features varint, covisible varint, per covisible: keyframe varint,
 //         shared varint
 //   DESC  the descriptors of all features of the live keyframes in turn: 4 x u64 each
-//   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats; per live keyframe u8:
-//         1 = the pixels follow from the image pixels by the camera's UndistortionTable; pixel x, y packed floats of
-//         the others; depth, angle, response packed floats; octave packed, as difference to the feature before; colour
-//         g, r - g, b - g packed; point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and
-//         packed; birth features u16 of those that see one (minus the own index where the age is 0), low and high bytes
-//         packed
-//   POIN  live: count varint; id varint minus the one before; position 3 x f64; packed: normal x, y, z and
-//         reference distance, scale floats, colour as above; length u64 and packed: per point found zigzag, visible
-//         zigzag, born_at - birth zigzag, number of the first observation with the same descriptor counted from 1, 0 =
-//         none: then the descriptor follows: 4 x u64 removed: count varint; per point id varint minus the one before, 0
-//         or 1 + zigzag (replaced_by - id)
+//   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats; pixel x, y as
+//   distance, in
+//         floats, from where the camera's UndistortionTable puts the image pixel: words (sign in the low bit), packed;
+//         depth, angle, response packed floats; octave packed, as difference to the feature before; colour g, r - g, b
+//         - g packed; point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and packed; birth
+//         features u16 of those that see one (minus the own index where the age is 0), low and high bytes packed
+//   POIN  live: count varint; per point id varint minus the one before, position 3 x f64; packed: normal x, y, z,
+//   reference
+//         distance and scale floats; colour as above; length u64 and packed: per point found zigzag, visible zigzag,
+//         born_at - birth zigzag, number of the first observation with the same descriptor counted from 1, 0 = none:
+//         then the descriptor follows: 4 x u64 fused: count varint; per point id varint minus the one before, survivor
+//         - id zigzag
 //
-// Observations are not stored: they are the keyframes' points turned round.
+// Observations are not stored: they are the keyframes' points turned round. Of the points that are no more, those are
+// stored that were fused into one that lives, which is all that Map::resolve() can tell of them.
 #include "dkb/map/map_file.h"
 
 #include "dkb/map/byte_stream.h"

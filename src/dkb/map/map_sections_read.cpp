@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nothing is allocated from a number in the file before it is known that the file is long enough to mean it.
+#include <bit>
+#include <cmath>
 #include <limits>
 
 #include "dkb/map/byte_stream.h"
@@ -44,6 +46,10 @@ Descriptor read_descriptor(ByteReader& in) {
   Descriptor d;
   for (uint64_t& word : d) word = in.u64();
   return d;
+}
+
+float stepped(float prediction, uint32_t step) {
+  return std::bit_cast<float>(std::bit_cast<uint32_t>(prediction) + (step >> 1 ^ (0u - (step & 1))));
 }
 
 std::string read_sized_packed(ByteReader& in, size_t items, size_t most_bytes_each) {
@@ -133,13 +139,7 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
   const UndistortionTable undistort(camera);
   const size_t n = keyframes.features;
   const auto image_x = read_packed_floats(in, n), image_y = read_packed_floats(in, n);
-  const std::string_view follows = in.raw(keyframes.feature_counts.size());
-  size_t explicit_pixels = 0;
-  for (size_t k = 0; k < follows.size(); ++k) {
-    if (static_cast<uint8_t>(follows[k]) > 1) in.fail("has a damaged flag");
-    if (follows[k] == 0) explicit_pixels += keyframes.feature_counts[k];
-  }
-  const auto x = read_packed_floats(in, explicit_pixels), y = read_packed_floats(in, explicit_pixels);
+  const auto step_x = read_packed_words(in, n), step_y = read_packed_words(in, n);
   const auto depth = read_packed_floats(in, n), angle = read_packed_floats(in, n), response = read_packed_floats(in, n);
   const std::string octave = read_packed(in, n);
   const ColourColumns colour(in, n);
@@ -147,11 +147,10 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
 
   std::vector<std::shared_ptr<RgbdFeatures>> result;
   uint8_t octave_before = 0;
-  size_t i = 0, e = 0;
+  size_t i = 0;
   std::vector<float> xs, ys;
-  for (size_t k = 0; k < follows.size(); ++k) {
+  for (size_t count : keyframes.feature_counts) {
     auto features = std::make_shared<RgbdFeatures>();
-    const size_t count = keyframes.feature_counts[k];
     features->keypoints.resize(count);
     features->descriptors.resize(count);
     xs.resize(count);
@@ -161,12 +160,8 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
       p.image_pixel = {image_x[i], image_y[i]};
       if (!(std::abs(image_x[i]) <= 1e6f && std::abs(image_y[i]) <= 1e6f))
         in.fail("has a feature far outside its image");
-      if (follows[k] == 1) {
-        p.pixel = undistort(image_x[i], image_y[i]);
-      } else {
-        p.pixel = {x[e], y[e]};
-        ++e;
-      }
+      const Eigen::Vector2f prediction = undistort(image_x[i], image_y[i]);
+      p.pixel = {stepped(prediction.x(), step_x[i]), stepped(prediction.y(), step_y[i])};
       p.depth = depth[i];
       p.angle = angle[i];
       p.response = response[i];
@@ -280,13 +275,10 @@ Points read_points(std::string_view bytes) {
   for (size_t i = 0; i < points.removed.size(); ++i) {
     RemovedPoint& r = points.removed[i];
     r.id = before = next_id(in, before, i == 0);
-    const uint64_t code = in.varint();
-    if (code > 0) {
-      const int64_t step = signed_of(code - 1);
-      if (step < -static_cast<int64_t>(r.id) || step >= static_cast<int64_t>(kNoPoint) - static_cast<int64_t>(r.id))
-        in.fail("has a point replaced by one that cannot be");
-      r.replaced_by = static_cast<PointId>(static_cast<int64_t>(r.id) + step);
-    }
+    const int64_t step = in.zigzag();
+    if (step < -static_cast<int64_t>(r.id) || step >= static_cast<int64_t>(kNoPoint) - static_cast<int64_t>(r.id))
+      in.fail("has a point replaced by one that cannot be");
+    r.replaced_by = static_cast<PointId>(static_cast<int64_t>(r.id) + step);
   }
   in.expect_end();
   return points;

@@ -23,9 +23,10 @@ bool sound(const Eigen::Vector2f& pixel) {
   return std::abs(pixel.x()) <= kFarthestPixel && std::abs(pixel.y()) <= kFarthestPixel;  // false for NaN
 }
 
-bool same_bits(const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
-  return std::bit_cast<uint32_t>(a.x()) == std::bit_cast<uint32_t>(b.x()) &&
-         std::bit_cast<uint32_t>(a.y()) == std::bit_cast<uint32_t>(b.y());
+// How far `pixel` lies from its prediction, counted in floats; 0 when they are equal, small when they are near.
+uint32_t step_from(float prediction, float pixel) {
+  const uint32_t step = std::bit_cast<uint32_t>(pixel) - std::bit_cast<uint32_t>(prediction);
+  return step << 1 ^ (0u - (step >> 31));
 }
 
 void write_pose(ByteWriter& out, const Rigid3& pose) {
@@ -128,36 +129,31 @@ void write_points_seen(ByteWriter& out, const Map& map) {
 
 std::string feature_section(const Map& map, const MapFileContext& context) {
   const UndistortionTable undistort(context.camera);
-  std::vector<float> image_x, image_y, x, y, depth, angle, response;
-  std::string follows, octave;
+  std::vector<float> image_x, image_y, depth, angle, response;
+  std::vector<uint32_t> step_x, step_y;
+  std::string octave;
   ColourColumns colour;
   uint8_t octave_before = 0;
-  for (KeyframeId id : map.live_keyframes()) {
-    const auto& keypoints = map.keyframe(id)->features->keypoints;
-    bool pixels_follow = true;
-    for (const Keypoint& k : keypoints) {
+  for (KeyframeId id : map.live_keyframes())
+    for (const Keypoint& k : map.keyframe(id)->features->keypoints) {
+      const Eigen::Vector2f prediction = undistort(k.image_pixel.x(), k.image_pixel.y());
       image_x.push_back(k.image_pixel.x());
       image_y.push_back(k.image_pixel.y());
+      step_x.push_back(step_from(prediction.x(), k.pixel.x()));
+      step_y.push_back(step_from(prediction.y(), k.pixel.y()));
       depth.push_back(k.depth);
       angle.push_back(k.angle);
       response.push_back(k.response);
       octave.push_back(static_cast<char>(k.octave - octave_before));
       octave_before = k.octave;
       colour.add(k.colour);
-      pixels_follow = pixels_follow && same_bits(k.pixel, undistort(k.image_pixel.x(), k.image_pixel.y()));
     }
-    follows.push_back(pixels_follow ? 1 : 0);
-    if (pixels_follow) continue;
-    for (const Keypoint& k : keypoints) {
-      x.push_back(k.pixel.x());
-      y.push_back(k.pixel.y());
-    }
-  }
   ByteWriter out;
   write_packed_floats(out, image_x);
   write_packed_floats(out, image_y);
-  out.raw(follows);
-  for (const auto* column : {&x, &y, &depth, &angle, &response}) write_packed_floats(out, *column);
+  write_packed_words(out, step_x);
+  write_packed_words(out, step_y);
+  for (const auto* column : {&depth, &angle, &response}) write_packed_floats(out, *column);
   write_packed(out, octave);
   colour.write(out);
   write_points_seen(out, map);
@@ -203,17 +199,17 @@ std::string point_section(const Map& map) {
   colour.write(out);
   write_sized_packed(out, numbers.bytes());
 
-  const std::vector<RemovedPoint> removed = map.removed_points();
-  out.varint(removed.size());
+  std::vector<RemovedPoint> forwarded;
+  for (const RemovedPoint& r : map.removed_points())
+    if (const PointId survivor = map.resolve(r.id); survivor != kNoPoint) forwarded.push_back({r.id, survivor});
+  out.varint(forwarded.size());
   before = 0;
-  for (const RemovedPoint& r : removed) {
+  for (const RemovedPoint& r : forwarded) {
     if (birth_keyframe(r.id) >= map.keyframe_count())
       throw std::logic_error("map: point " + std::to_string(r.id) + " was born at a keyframe that is not there");
     out.varint(r.id - before);
     before = r.id;
-    const int64_t step = static_cast<int64_t>(r.replaced_by) - static_cast<int64_t>(r.id);
-    out.varint(r.replaced_by == kNoPoint ? 0
-                                         : 1 + (static_cast<uint64_t>(step) << 1 ^ static_cast<uint64_t>(step >> 63)));
+    out.zigzag(static_cast<int64_t>(r.replaced_by) - static_cast<int64_t>(r.id));
   }
   return out.bytes();
 }

@@ -13,7 +13,8 @@ namespace {
 // A point that is there, or was; kNoPoint in an empty map.
 PointId any_point(const Map& map, Random& random) {
   const auto live = map.live_points();
-  const auto removed = map.removed_points();
+  auto removed = map.removed_points();
+  std::erase_if(removed, [&](const RemovedPoint& r) { return map.resolve(r.id) == kNoPoint; });
   if (random.below(8) == 0 && !removed.empty()) return removed[random.below(static_cast<uint32_t>(removed.size()))].id;
   if (live.empty()) return kNoPoint;
   return live[random.below(static_cast<uint32_t>(live.size()))];
@@ -151,7 +152,7 @@ std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, c
     k.image_pixel = {static_cast<float>(random.uniform(16, camera.width - 16)),
                      static_cast<float>(random.uniform(16, camera.height - 16))};
     k.pixel = undistort(k.image_pixel.x(), k.image_pixel.y());
-    if (!follow) k.pixel.x() += 0.25f;
+    if (!follow) k.pixel += Eigen::Vector2f(static_cast<float>(random.normal()), static_cast<float>(random.normal()));
     k.depth = random.below(5) == 0 ? 0.0f : static_cast<float>(random.below(20000)) / 5000.0f;
     k.angle = static_cast<float>(random.uniform(0, 6.28));
     k.response = static_cast<float>(random.uniform(20, 200));
@@ -299,8 +300,9 @@ std::string fingerprint(const Map& map) {
     }
   }
   for (const RemovedPoint& r : map.removed_points()) {
+    if (map.resolve(r.id) == kNoPoint) continue;
     out.u32(r.id);
-    out.u32(r.replaced_by);
+    out.u32(map.resolve(r.id));
   }
   return out.bytes();
 }

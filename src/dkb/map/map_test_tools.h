@@ -13,7 +13,7 @@ namespace dkb::test {
 CameraModel distorted_camera();
 
 // Features at random places with random descriptors; most have depth. `follow`: the ideal pixels are those of the
-// camera's table, as extraction makes them.
+// camera's table, else they lie a pixel or so away, as where the camera moved.
 std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, const CameraModel& camera, bool follow);
 
 // Adds a keyframe that sees some of the points of its predecessors and gives birth to `born` points.
@@ -28,7 +28,7 @@ Map random_map(uint64_t seed, int keyframes, int features, int edits_per_keyfram
 // What holds of every map and does not hold of this one; empty when all is well.
 std::string broken_invariant(const Map& map);
 
-// Every field of every part, bit for bit, features included.
+// Every field of every part, bit for bit, features included; of the points that are no more, where they resolve to.
 std::string fingerprint(const Map& map);
 
 }  // namespace dkb::test
