@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "dkb/keyframes/keyframe_policy.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// A frame that just calls for a keyframe: 179 of the reference's 200 points are tracked, the limit being 0.9 * 200 =
+// 180.
+KeyframeQuery due() {
+  KeyframeQuery q;
+  q.frame = 100;
+  q.last_keyframe_frame = 90;
+  q.mapper_idle = true;
+  q.tracked_points = 179;
+  q.reference_points = 200;
+  q.tracked_close_points = 150;
+  q.creatable_close_points = 0;
+  return q;
+}
+
+KeyframeDecision decide(const KeyframeQuery& q) {
+  const Map map;
+  return BaselineKeyframePolicy({}).decide(q, map);
+}
+
+TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
+  KeyframeQuery q = due();
+  const KeyframeDecision decision = decide(q);
+  EXPECT_TRUE(decision.insert);
+  EXPECT_EQ(decision.rule, KeyframeRule::baseline);
+  q.tracked_points = 180;
+  EXPECT_FALSE(decide(q).insert);
+  EXPECT_EQ(decide(q).rule, KeyframeRule::none);
+}
+
+TEST(BaselineKeyframes, AreMadeWhenCloseDepthsAreWasted) {
+  KeyframeQuery q = due();
+  q.tracked_points = 200;  // the view has not been left
+  q.tracked_close_points = 99;
+  q.creatable_close_points = 70;
+  EXPECT_TRUE(decide(q).insert);
+  q.tracked_close_points = 100;
+  EXPECT_FALSE(decide(q).insert) << "enough close points";
+  q.tracked_close_points = 99;
+  q.creatable_close_points = 69;
+  EXPECT_FALSE(decide(q).insert) << "too few new ones";
+}
+
+TEST(BaselineKeyframes, WaitForTheMapperButNotForEver) {
+  KeyframeQuery q = due();
+  q.mapper_idle = false;
+  EXPECT_FALSE(decide(q).insert);
+  q.last_keyframe_frame = 80;  // 20 frames ago
+  EXPECT_FALSE(decide(q).insert);
+  q.last_keyframe_frame = 79;
+  EXPECT_TRUE(decide(q).insert);
+}
+
+TEST(BaselineKeyframes, WaitAfterARelocalisation) {
+  KeyframeQuery q = due();
+  q.last_relocalisation_frame = 80;
+  EXPECT_FALSE(decide(q).insert);
+  q.last_relocalisation_frame = 79;
+  EXPECT_TRUE(decide(q).insert);
+}
+
+TEST(BaselineKeyframes, NeedEnoughTrackedPoints) {
+  KeyframeQuery q = due();
+  q.tracked_points = 50;
+  EXPECT_TRUE(decide(q).insert);
+  q.tracked_points = 49;
+  EXPECT_FALSE(decide(q).insert);
+}
+
+TEST(BaselineKeyframes, EveryNumberIsAnOption) {
+  BaselineKeyframeOptions options;
+  options.reference_ratio = 0.5;
+  const Map map;
+  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);  // 179 of 200 is more than half
+  options = {};
+  options.least_tracked = 180;
+  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);
+  options = {};
+  options.frames_between = 5;
+  KeyframeQuery q = due();
+  q.mapper_idle = false;
+  EXPECT_TRUE(BaselineKeyframePolicy(options).decide(q, map).insert);  // 10 frames since the last one
+}
+
+TEST(BaselineKeyframes, AnOptionOutOfRangeIsNamed) {
+  const auto message = [](auto change) -> std::string {
+    BaselineKeyframeOptions options;
+    change(options);
+    try {
+      BaselineKeyframePolicy policy(options);
+    } catch (const InvalidOption& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message([](auto& o) { o.frames_between = 0; }).find("frames_between"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.least_tracked = -1; }).find("least_tracked"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.reference_ratio = 1.1; }).find("reference_ratio"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.few_close = -1; }).find("few_close"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.many_creatable = -1; }).find("many_creatable"), std::string::npos);
+}
+
+TEST(BaselineKeyframes, RulesHaveTheNamesOfTheStatistics) {
+  EXPECT_STREQ(name_of(KeyframeRule::first), "first");
+  EXPECT_STREQ(name_of(KeyframeRule::baseline), "baseline");
+  EXPECT_STREQ(name_of(KeyframeRule::adaptive), "adaptive");
+  EXPECT_STREQ(name_of(KeyframeRule::floor), "floor");
+  EXPECT_STREQ(name_of(KeyframeRule::none), "none");
+}
+
+}  // namespace
+}  // namespace dkb
