@@ -43,7 +43,7 @@ class ImageModel {
 
 std::array<BriefTest, kTests> make_brief_tests() {
   constexpr size_t kCandidates = 6000;
-  constexpr double kSigma = 31.0 / 5.0;  // [px]
+  constexpr double kSigma = 9.0;  // [px]; matched best on real frames, of 5.2, 6.2, 7.5, 9 and 12
   const ImageModel model;
   Random random(20);
   struct Candidate {
