@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
@@ -21,6 +23,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
 #include "dkb/util/settings.h"
+#include "detector_choice.h"
 #include "run_outputs.h"
 
 namespace dkb {
@@ -35,6 +38,8 @@ struct RunArguments {
   uint64_t seed = 1;
   bool has_seed = false;
   int threads = 0;
+  DetectorArguments detection;
+  std::string filter, disable;
   bool realtime = false, dump_features = false, quiet = false;
 };
 
@@ -79,11 +84,25 @@ fs::path default_output(const fs::path& dataset) {
 }
 
 void append_features(std::string& csv, const std::string& stamp, const SlamSystem& slam) {
-  const RgbdFeatures& features = *slam.features();
-  const auto& states = slam.feature_states();
-  for (size_t f = 0; f < features.size(); ++f)
-    csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, features.keypoints[f].image_pixel.x(),
-                       features.keypoints[f].image_pixel.y(), name_of(states[f]));
+  for (const FeatureReport& f : slam.features())
+    csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
+}
+
+// --disable dr,kf,ba,loop
+void disable_parts(const std::string& list, SlamOptions& options, DetectorArguments& detection) {
+  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
+  std::istringstream parts(list);
+  for (std::string part; std::getline(parts, part, ',');) {
+    if (part == "dr") {
+      options.dynamics.filter = FilterKind::none;
+      detection = {};
+      detection.detector = "none";
+    } else if (part == "ba") {
+      options.mapping.ba.weighted = false;
+    } else if (std::find(known.begin(), known.end(), part) == known.end()) {
+      throw InputError("--disable: there is no part \"" + part + "\"" + did_you_mean(part, known) + "; parts: dr, kf, ba, loop");
+    }
+  }
 }
 
 int run(const RunArguments& args) {
@@ -93,6 +112,9 @@ int run(const RunArguments& args) {
   bind_settings(settings, options);
   if (!args.config.empty()) settings.load_yaml(args.config);
   for (const std::string& assignment : args.set) settings.set_assignment(assignment, "--set");
+  if (!args.filter.empty()) settings.set("dynamics.filter", args.filter, "--filter");
+  DetectorArguments detection = args.detection;
+  disable_parts(args.disable, options, detection);
   if (args.has_seed) options.seed = args.seed;
   options.pipeline.threaded = args.threads != 1;
   options.pipeline.realtime = args.realtime;
@@ -104,6 +126,11 @@ int run(const RunArguments& args) {
   RgbdReaderOptions reading;
   reading.threaded = options.pipeline.threaded || args.realtime;
   RgbdReader reader(dataset.pairs, camera.camera, reading, &warnings);
+  std::vector<double> stamps;
+  for (const DatasetPair& pair : dataset.pairs) stamps.push_back(pair.timestamp);
+  const Stopwatch loading;
+  DetectorSet detectors = make_detectors(detection, camera.camera, stamps, options.pipeline.threaded, args.realtime);
+  const double loading_s = loading.ms() / 1000;
   const fs::path out = args.out.empty() ? default_output(args.dataset) : fs::path(args.out);
   make_output_folder(out);
   if (!args.quiet)
@@ -112,7 +139,7 @@ int run(const RunArguments& args) {
   interrupted = false;
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
-  SlamSystem slam(camera.camera, options);
+  SlamSystem slam(camera.camera, options, std::move(detectors));
   RunFacts facts;
   facts.offered = static_cast<int>(dataset.pairs.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
@@ -124,7 +151,7 @@ int run(const RunArguments& args) {
   while (!interrupted) {
     const std::optional<DatasetFrame> frame = paced ? paced->next() : reader.next();
     if (!frame) break;
-    if (first) facts.startup_s = seconds_since_process_start();
+    if (first) facts.startup_s = seconds_since_process_start() - loading_s;
     first = false;
     if (frame->image == nullptr) {
       ++facts.skipped;
@@ -133,6 +160,7 @@ int run(const RunArguments& args) {
     }
     facts.stamps.push_back(frame->stamp);
     const FrameResult result = slam.process(frame->image);
+    if (const auto warning = slam.take_warning()) warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
     if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
     progress.frame(frame->index + 1, &result);
   }
@@ -172,6 +200,16 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--set", args->set, "key=value, any setting of config.yaml; may be repeated");
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
   command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) { args->has_seed = true; });
+  DetectorArguments& detection = args->detection;
+  command->add_option("--detector", detection.detector, "auto, yolo, motion, file, none; several joined by +");
+  command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
+  command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
+  command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)");
+  command->add_option("--detect-latency", detection.latency, "[frames] until a detection is used (default: by the model's size)");
+  command->add_option("--boxes", detection.boxes, "Boxes of the file detector: stamp class x y w h [score] per line");
+  command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
+  command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
+  command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
   command->add_option("--start", args->selection.start, "[s] after the first pair");
   command->add_option("--end", args->selection.end, "[s] after the first pair");
   command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");

@@ -65,6 +65,8 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
     const auto it = s.keyframe_rules.find(rule);
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
+  j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.mapping.points_retracted}};
+  j["detector"] = {{"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
   j["mapping"] = {{"points_created", s.mapping.points_created},
                   {"points_culled", s.mapping.points_culled},
                   {"points_fused", s.mapping.points_fused},

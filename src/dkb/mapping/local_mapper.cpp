@@ -31,7 +31,8 @@ LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, do
 
 MapView LocalMapper::process(const KeyframePacket& packet) {
   const Stopwatch whole;
-  apply_sightings(packet);
+  apply_reports(packet);
+  if (packet.id == kNoKeyframe) return map_.snapshot();
   insert(packet);
   cull_points(packet.id);
   const auto triangulated = triangulate_new_points(map_, packet.id, camera_, noise_, scale_factor_, options_.creation);
@@ -52,7 +53,13 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   return map_.snapshot();
 }
 
-void LocalMapper::apply_sightings(const KeyframePacket& packet) {
+void LocalMapper::apply_reports(const KeyframePacket& packet) {
+  for (PointId retracted : packet.retracted) {
+    const PointId id = map_.resolve(retracted);
+    if (id == kNoPoint) continue;
+    map_.remove_point(id);
+    ++report_.points_retracted;
+  }
   for (const PointSighting& s : packet.sightings) {
     const PointId id = map_.resolve(s.point);
     if (id == kNoPoint) continue;

@@ -28,7 +28,7 @@ struct MappingOptions {
 };
 
 struct MappingReport {
-  int points_created = 0, points_culled = 0, points_fused = 0, keyframes_culled = 0;
+  int points_created = 0, points_culled = 0, points_fused = 0, points_retracted = 0, keyframes_culled = 0;
 };
 
 // Turns keyframe packets into map: inserts, culls, creates, fuses, adjusts (DKB sections 3, 3.3). The only writer of the map.
@@ -46,7 +46,7 @@ class LocalMapper {
 
  private:
   void insert(const KeyframePacket& packet);
-  void apply_sightings(const KeyframePacket& packet);
+  void apply_reports(const KeyframePacket& packet);
   void cull_points(KeyframeId newest);
   void fuse_neighbours(KeyframeId id);
   int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points);

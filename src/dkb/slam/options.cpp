@@ -17,6 +17,8 @@ void SlamOptions::check() const {
   tracking.check();
   baseline_keyframes.check();
   mapping.check();
+  dynamics.check();
+  evidence.check();
   pipeline.check();
 }
 
@@ -92,6 +94,30 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("mapping.ba.weighted", &m.ba.weighted, "geometric weights of points (DKB section 3.3)");
   s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points (DKB Table 1)");
   s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals instead");
+
+  DynamicsOptions& d = o.dynamics;
+  s.bind("dynamics.filter", &d.filter,
+         {{"none", FilterKind::none}, {"box", FilterKind::box}, {"epipolar", FilterKind::epipolar}, {"multiview", FilterKind::multiview},
+          {"paper", FilterKind::paper}, {"default", FilterKind::standard}},
+         "which features are kept from tracking");
+  s.bind("dynamics.paper.flow_threshold", &d.paper.flow_threshold, "[px] d_th (DKB eq. 9)");
+  s.bind("dynamics.paper.compensate", &d.paper.compensate, "flow against the camera's own motion; false = raw eq. 9");
+  s.bind("dynamics.epipolar.threshold", &d.epipolar.threshold, "[px] distance to the epipolar line");
+  s.bind("dynamics.multiview.depth_step", &d.multiview.depth_step, "[m] before what earlier keyframes saw");
+  s.bind("dynamics.multiview.radius", &d.multiview.radius, "[px] around such a spot");
+  s.bind("dynamics.multiview.keyframes", &d.multiview.keyframes, "earlier keyframes compared");
+  s.bind("dynamics.silhouette.cell", &d.silhouette.cell, "[px] grid on which depth is looked at");
+  s.bind("dynamics.silhouette.core", &d.silhouette.core, "share of a box in which the object is sought");
+  s.bind("dynamics.silhouette.least_share", &d.silhouette.least_share, "of the core's weight that the object's depth layer needs");
+  s.bind("dynamics.silhouette.layer", &d.silhouette.layer, "half-width of that layer relative to its depth");
+  s.bind("dynamics.silhouette.step", &d.silhouette.step, "relative depth step within one surface");
+  s.bind("dynamics.silhouette.reach", &d.silhouette.reach, "[m] parts of an object before or behind its layer");
+  s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
+  s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
+  s.bind("dynamics.flow.window", &d.flow.window, "[px] of optical flow");
+  s.bind("dynamics.points_per_box", &d.points_per_box, "features followed to carry a box");
+  s.bind("dynamics.missed_results", &d.missed_results, "detector results that may miss an object before its box is dropped");
+  s.bind("dynamics.evidence_sightings", &o.evidence.sightings, "times on a mover before a map point is retracted");
 
   s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency, "[frames] after which a keyframe's mapping becomes visible");
   s.bind("pipeline.mapper_queue", &o.pipeline.mapper_queue, "[keyframes] outstanding at most in a real-time run");

@@ -11,6 +11,8 @@
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/tracking/tracker.h"
+#include "dkb/dynamics/point_evidence.h"
+#include "dkb/slam/dynamic_stage.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -31,6 +33,8 @@ struct SlamOptions {
   TrackingOptions tracking;
   BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
+  DynamicsOptions dynamics;
+  PointEvidenceOptions evidence;
   PipelineOptions pipeline;
   uint64_t seed = 1;         // reaches every source of randomness
   Rigid3 base_from_cam;      // mount: the world is the robot's base at the first tracked frame

@@ -2,6 +2,7 @@
 #include "dkb/slam/slam_system.h"
 
 #include <algorithm>
+#include <deque>
 #include <optional>
 
 #include "dkb/slam/mapping_stage.h"
@@ -21,14 +22,18 @@ const char* name_of(FeatureState state) {
 
 class SlamSystem::Impl {
  public:
-  Impl(const CameraModel& camera, const SlamOptions& options)
-      : camera_(camera), options_(options), undistort_(camera), extractor_(options.features) {
+  Impl(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
+      : camera_(camera),
+        options_(options),
+        undistort_(camera),
+        extractor_(options.features),
+        dynamics_(camera, options.dynamics, std::move(detectors)) {
     camera_.check();
     options_.check();
     start();
   }
 
-  FrameResult process(const RgbdImage& image);
+  FrameResult process(std::shared_ptr<const RgbdImage> image);
   void finish();
   void start();
 
@@ -36,10 +41,14 @@ class SlamSystem::Impl {
   SlamOptions options_;
   UndistortionTable undistort_;
   OrbExtractor extractor_;
-  OrbFeatures orb_;  // of the frame at hand
+  OrbFeatures orb_;                         // of the frame at hand
+  std::shared_ptr<const RgbdImage> image_;  // likewise
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<MappingStage> mapping_;
+  DynamicStage dynamics_;
+  DynamicScene scene_;               // of the last frame
+  std::optional<PointEvidence> evidence_;
 
   // A frame of the trajectory hangs on a keyframe, since the world may still move.
   struct Record {
@@ -56,14 +65,25 @@ class SlamSystem::Impl {
   FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
   Rigid3 world_from_odom_;
   bool localise_only_ = false;
-  std::shared_ptr<const RgbdFeatures> features_;
-  std::vector<FeatureState> feature_states_;
+  std::vector<size_t> kept_;                   // features that may be tracked, as indices of all
+  std::vector<FeatureReport> feature_reports_;  // all features of the last frame
+  struct RecentKeyframe {
+    FrameIndex frame;
+    KeyframeId id;
+    std::shared_ptr<const RgbdFeatures> features;
+  };
+  std::deque<RecentKeyframe> recent_keyframes_;  // whose detections may still be out
   SlamStatistics statistics_;
   StageTimes times_;
 
  private:
   void take_map(bool wait);
   void extract(const RgbdImage& image);
+  void filter_dynamic(std::shared_ptr<const RgbdImage> image);
+  void report_features(const TrackedFrame& frame);
+  void weigh_evidence();
+  void retract_late();
+  std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
   KeyframeDecision decide(const TrackOutcome& outcome) const;
   void insert_keyframe(TrackedFrame& frame);
 };
@@ -81,8 +101,10 @@ void SlamSystem::Impl::start() {
   world_from_odom_ = {};
   last_keyframe_frame_ = 0;
   last_relocalisation_frame_ = -1000000;
-  features_.reset();
-  feature_states_.clear();
+  feature_reports_.clear();
+  scene_ = {};
+  evidence_.emplace(options_.evidence);
+  recent_keyframes_.clear();
   statistics_ = {};
   times_ = {};
 }
@@ -96,6 +118,87 @@ void SlamSystem::Impl::extract(const RgbdImage& image) {
   const Stopwatch watch;
   orb_ = extractor_.extract(image.grey);
   times_.add("features", watch.ms());
+}
+
+std::vector<Eigen::Vector3d> SlamSystem::Impl::keyframe_points_in_camera(const Rigid3& cam_from_world) const {
+  std::vector<Eigen::Vector3d> points;
+  const Map& map = tracker_->view();
+  const auto keyframes = map.live_keyframes();
+  const size_t count = std::min(keyframes.size(), static_cast<size_t>(options_.dynamics.multiview.keyframes));
+  for (size_t n = keyframes.size() - count; n < keyframes.size(); ++n) {
+    const Keyframe& k = *map.keyframe(keyframes[n]);
+    const Rigid3 cam_from_keyframe = cam_from_world * k.cam_from_world.inverse();
+    for (const Keypoint& p : k.features->keypoints)
+      if (p.depth > 0) points.push_back(cam_from_keyframe * camera_.unproject(p.pixel.cast<double>(), p.depth));
+  }
+  return points;
+}
+
+// Corners on movers go no further (DKB section 3.1): neither tracking nor the map ever sees them.
+void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
+  DynamicStage::Context context;
+  context.frame = next_frame_;
+  context.orb = &orb_;
+  context.undistort = &undistort_;
+  const auto& last = tracker_->last_frame();
+  context.current_from_previous = last ? tracker_->expected_motion(image->timestamp - last->timestamp) : Rigid3();
+  if (last && dynamics_.wants_keyframe_points())
+    context.keyframe_points_in_camera = keyframe_points_in_camera(context.current_from_previous * last->cam_from_world);
+  context.image = std::move(image);
+  scene_ = dynamics_.process(context);
+  kept_.clear();
+  feature_reports_.resize(orb_.corners.size());
+  OrbFeatures kept;
+  for (size_t i = 0; i < orb_.corners.size(); ++i) {
+    feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y, scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
+    if (scene_.dynamic[i]) continue;
+    kept_.push_back(i);
+    kept.corners.push_back(orb_.corners[i]);
+    kept.descriptors.push_back(orb_.descriptors[i]);
+  }
+  statistics_.features_removed += static_cast<long>(orb_.corners.size() - kept_.size());
+  orb_ = std::move(kept);
+}
+
+void SlamSystem::Impl::report_features(const TrackedFrame& frame) {
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    if (frame.points[f] != kNoPoint) feature_reports_[kept_[f]].state = FeatureState::used;
+    if (frame.outlier[f]) feature_reports_[kept_[f]].state = FeatureState::outlier;
+  }
+}
+
+// Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
+void SlamSystem::Impl::weigh_evidence() {
+  if (scene_.mask.empty()) return;
+  const auto& last = *tracker_->last_frame();
+  for (PointId p : last.points)
+    if (p != kNoPoint) evidence_->fits_still_world(p);
+  const DepthImage& depth = image_->depth;
+  tracker_->visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double z) {
+    // The table undoes the distortion at image pixels; its negative at the ideal pixel is near enough for cells.
+    const Eigen::Vector2f ideal = pixel.cast<float>();
+    const Eigen::Vector2f at = 2 * ideal - undistort_(ideal.x(), ideal.y());
+    if (!scene_.mask.at(at.x(), at.y())) return;
+    const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+    if (!depth.contains(x, y) || !(depth(x, y) > 0)) return;
+    const double surface = depth(x, y);
+    if (std::abs(surface - z) < 0.05 * surface + 0.05) evidence_->on_mover(id);
+  });
+  tracker_->retract(evidence_->take_convicted());
+}
+
+// Detections that came after their keyframe: what it made on movers goes.
+void SlamSystem::Impl::retract_late() {
+  for (const LateMask& late : dynamics_.take_late_masks())
+    for (const RecentKeyframe& k : recent_keyframes_) {
+      if (k.frame != late.frame) continue;
+      std::vector<PointId> points;
+      for (size_t f = 0; f < k.features->size(); ++f) {
+        const Keypoint& p = k.features->keypoints[f];
+        if (late.mask.at(p.image_pixel.x(), p.image_pixel.y())) points.push_back(make_point_id(k.id, static_cast<int>(f)));
+      }
+      tracker_->retract(points);
+    }
 }
 
 KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
@@ -128,8 +231,12 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
 
 void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
   const KeyframeId id = next_keyframe_++;
-  KeyframePacket packet = tracker_->make_keyframe(id, frame, {});
-  for (const ProvisionalPoint& p : packet.new_points) feature_states_[static_cast<size_t>(p.feature)] = FeatureState::used;
+  KeyframePacket packet = tracker_->make_keyframe(id, frame);
+  for (const ProvisionalPoint& p : packet.new_points) feature_reports_[kept_[static_cast<size_t>(p.feature)]].state = FeatureState::used;
+  dynamics_.note_keyframe();
+  recent_keyframes_.push_back({frame.index, id, frame.features});
+  const DetectionSchedule& schedule = dynamics_.schedule();
+  while (recent_keyframes_.front().frame < frame.index - 2 * (schedule.latency + schedule.every)) recent_keyframes_.pop_front();
   mapping_->push(std::move(packet), frame.index + options_.pipeline.mapper_latency);
   last_keyframe_frame_ = frame.index;
   frame.reference = id;
@@ -138,7 +245,9 @@ void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
 }
 
 // One frame, as in DKB section 3: features, pose, keyframe decision; mapping happens beside it.
-FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
+FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_pointer) {
+  image_ = std::move(image_pointer);
+  const RgbdImage& image = *image_;
   if (image.grey.width() != camera_.width || image.grey.height() != camera_.height ||
       image.depth.width() != camera_.width || image.depth.height() != camera_.height)
     throw InputError("frame " + std::to_string(next_frame_) + ": its images are not of the camera's size, " +
@@ -155,19 +264,16 @@ FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
 
   const Stopwatch tracking;
   extract(image);
+  filter_dynamic(image_);
+  retract_late();
   const auto features_at = [&](const Vector6d& velocity) {
     return std::make_shared<const RgbdFeatures>(
         make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth));
   };
-  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, {});
+  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at);
   TrackedFrame& frame = outcome.frame;
-  features_ = frame.features;
   if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
-  feature_states_.assign(features_->size(), FeatureState::unused);
-  for (size_t f = 0; f < frame.points.size(); ++f) {
-    if (frame.points[f] != kNoPoint) feature_states_[f] = FeatureState::used;
-    if (frame.outlier[f]) feature_states_[f] = FeatureState::outlier;
-  }
+  report_features(frame);
 
   result.frame = next_frame_++;
   result.timestamp = image.timestamp;
@@ -178,6 +284,7 @@ FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
       last_relocalisation_frame_ = frame.index;
       ++statistics_.relocalisations;
     }
+    weigh_evidence();
     const Stopwatch deciding;
     const KeyframeDecision decision = decide(outcome);
     times_.add("keyframe_decision", deciding.ms());
@@ -203,14 +310,17 @@ FrameResult SlamSystem::Impl::process(const RgbdImage& image) {
 }
 
 void SlamSystem::Impl::finish() {
+  KeyframePacket report = tracker_->make_report();
+  if (next_keyframe_ > 0) mapping_->push(std::move(report), next_frame_);
   const auto view = mapping_->drain();
   if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
 }
 
-SlamSystem::SlamSystem(const CameraModel& camera, const SlamOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
+SlamSystem::SlamSystem(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
+    : impl_(std::make_unique<Impl>(camera, options, std::move(detectors))) {}
 SlamSystem::~SlamSystem() = default;
 
-FrameResult SlamSystem::process(std::shared_ptr<const RgbdImage> image) { return impl_->process(*image); }
+FrameResult SlamSystem::process(std::shared_ptr<const RgbdImage> image) { return impl_->process(std::move(image)); }
 
 FrameResult SlamSystem::process(double timestamp, const uint8_t* colour, int channels, const uint16_t* depth) {
   if (channels != 1 && channels != 3) throw InputError("frame: colour images have 1 or 3 channels");
@@ -229,7 +339,7 @@ FrameResult SlamSystem::process(double timestamp, const uint8_t* colour, int cha
   }
   const float metres = static_cast<float>(1.0 / camera.depth_factor);
   for (size_t i = 0; i < pixels; ++i) image->depth.data()[i] = metres * static_cast<float>(depth[i]);
-  return impl_->process(*image);
+  return impl_->process(std::move(image));
 }
 
 void SlamSystem::finish() { impl_->finish(); }
@@ -260,8 +370,10 @@ std::vector<TrajectoryFrame> SlamSystem::keyframes() const {
 }
 
 MapView SlamSystem::map() const { return impl_->tracker_->shared_view(); }
-const std::vector<FeatureState>& SlamSystem::feature_states() const { return impl_->feature_states_; }
-const RgbdFeatures* SlamSystem::features() const { return impl_->features_.get(); }
+const std::vector<FeatureReport>& SlamSystem::features() const { return impl_->feature_reports_; }
+const MoverMask& SlamSystem::mover_mask() const { return impl_->scene_.mask; }
+const std::vector<Detection>& SlamSystem::detections() const { return impl_->scene_.boxes; }
+std::optional<std::string> SlamSystem::take_warning() { return impl_->dynamics_.take_warning(); }
 const CameraModel& SlamSystem::camera() const { return impl_->camera_; }
 const SlamOptions& SlamSystem::options() const { return impl_->options_; }
 
@@ -270,7 +382,12 @@ SlamStatistics SlamSystem::statistics() const {
   const Map& map = impl_->tracker_->view();
   s.keyframes = map.live_keyframe_count();
   s.map_points = map.point_count();
+  s.detector = impl_->dynamics_.detector_kind();
+  s.detector_rate_hz = impl_->dynamics_.detector_rate_hz();
+  s.detector_latency_frames = impl_->dynamics_.detector_latency();
   StageTimes times = impl_->times_;
+  times.merge(impl_->dynamics_.times());
+  times.merge(impl_->dynamics_.detector_times());
   if (impl_->mapping_->outstanding() == 0) {  // the mapper is idle, nothing writes what we read
     s.mapping = impl_->mapping_->mapper().report();
     times.merge(impl_->mapping_->mapper().times());

@@ -3,12 +3,14 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "dkb/geometry/camera.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/map.h"
+#include "dkb/slam/dynamic_stage.h"
 #include "dkb/slam/options.h"
 #include "dkb/util/timing.h"
 
@@ -35,6 +37,12 @@ struct FrameResult {
 enum class FeatureState : uint8_t { unused, used, outlier, dynamic };
 const char* name_of(FeatureState state);
 
+// What became of one feature that a frame extracted.
+struct FeatureReport {
+  float image_x = 0, image_y = 0;  // [px] of the image as read
+  FeatureState state = FeatureState::unused;
+};
+
 // A frame of the finished trajectory.
 struct TrajectoryFrame {
   FrameIndex frame = 0;
@@ -48,6 +56,10 @@ struct SlamStatistics {
   size_t map_points = 0;
   MappingReport mapping;
   std::map<std::string, int> keyframe_rules;
+  long features_removed = 0;           // features that the filter kept from tracking
+  std::string detector = "none";
+  double detector_rate_hz = 0;
+  int detector_latency_frames = 0;
   std::map<std::string, StageSummary> stages;
 };
 
@@ -57,7 +69,7 @@ struct SlamStatistics {
 class SlamSystem {
  public:
   // Throws InvalidOption.
-  SlamSystem(const CameraModel& camera, const SlamOptions& options = {});
+  explicit SlamSystem(const CameraModel& camera, const SlamOptions& options = {}, DetectorSet detectors = {});
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
@@ -68,9 +80,12 @@ class SlamSystem {
   // units of 1 / camera.depth_factor metres, 0 = no data. Rows are packed.
   FrameResult process(double timestamp, const uint8_t* colour, int channels, const uint16_t* depth);
 
+  // A warning that a person should see, once each: the detector failed and the run goes on without it.
+  std::optional<std::string> take_warning();
+
   // Waits for all outstanding mapping and takes its result. process() may go on afterwards.
   void finish();
-  // Forgets everything; the next frame starts a new world.
+  // Forgets everything but what the detector has in hand; the next frame starts a new world.
   void reset();
   // While localise-only, the map is not changed: no keyframes are made.
   void set_localise_only(bool on);
@@ -82,9 +97,11 @@ class SlamSystem {
   // Keyframes of the map, by id.
   std::vector<TrajectoryFrame> keyframes() const;
   MapView map() const;
-  // What became of the features of the last frame, in its features' order.
-  const std::vector<FeatureState>& feature_states() const;
-  const RgbdFeatures* features() const;  // of the last frame; null before the first
+  // All features of the last frame, those on movers included.
+  const std::vector<FeatureReport>& features() const;
+  // Where movers are in the last image.
+  const MoverMask& mover_mask() const;
+  const std::vector<Detection>& detections() const;
   SlamStatistics statistics() const;     // stages of other threads are complete after finish()
   const CameraModel& camera() const;
   const SlamOptions& options() const;

@@ -40,7 +40,7 @@ struct PointSighting {
   int visible = 0, found = 0;
 };
 
-// What tracking tells mapping of a new keyframe.
+// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of sightings and retractions.
 struct KeyframePacket {
   KeyframeId id = kNoKeyframe;
   FrameIndex frame = 0;
@@ -51,6 +51,7 @@ struct KeyframePacket {
   std::vector<PointId> points;         // per feature
   std::vector<ProvisionalPoint> new_points;
   std::vector<PointSighting> sightings;  // by increasing point id
+  std::vector<PointId> retracted;        // points that turned out to move
 };
 
 }  // namespace dkb

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dkb/features/matching.h"
 #include "dkb/util/errors.h"
@@ -62,6 +63,9 @@ Rigid3 Tracker::take_view(MapView view) {
   candidates_made_ = -1;
   std::erase_if(pending_, [&](const PendingKeyframe& p) { return view_->keyframe(p.id) != nullptr; });
   std::erase_if(provisional_, [&](const auto& p) { return view_->keyframe(p.second.keyframe) != nullptr; });
+  std::erase_if(retracted_, [&](PointId id) {
+    return view_->keyframe(birth_keyframe(id)) != nullptr && view_->point(id) == nullptr;
+  });
   if (!last_) return {};
   const Rigid3 moved = last_->cam_from_reference * keyframe_pose(last_->reference);
   const Rigid3 new_world_from_old = moved.inverse() * last_->cam_from_world;
@@ -119,12 +123,12 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<std::pair<
 }
 
 std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
-                                                const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const {
+                                                std::vector<PointId>& points) const {
   std::vector<Candidate> candidates;
   const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
-    if (id == kNoPoint) continue;
+    if (id == kNoPoint || is_retracted(id)) continue;
     const auto at = position(id);
     if (!at) continue;
     const Keypoint& k = last_->features->keypoints[f];
@@ -136,7 +140,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   match.max_distance = options_.match_distance;
   match.ratio = 0.9f;
   const auto matches =
-      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, &blocked, nullptr);
+      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
   std::vector<std::pair<int, Eigen::Vector3d>> pairs;
   for (const auto& m : matches) pairs.emplace_back(m.feature, candidates[static_cast<size_t>(m.candidate)].position);
@@ -149,7 +153,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
 }
 
 std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
-                                              const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const {
+                                              std::vector<PointId>& points) const {
   std::vector<Descriptor> descriptors;
   std::vector<PointId> ids;
   std::vector<Eigen::Vector3d> positions;
@@ -159,8 +163,7 @@ std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const Rg
       ids.push_back(p->id);
       positions.push_back(p->position);
     }
-  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
-  std::erase_if(matches, [&](const DescriptorMatch& m) { return blocked[static_cast<size_t>(m.b)] != 0; });
+  const std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   for (const DescriptorMatch& m : matches) {
@@ -188,11 +191,11 @@ void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex 
   candidates_made_ = index;
 }
 
-bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, const std::vector<uint8_t>& blocked,
-                              std::vector<PointId>& points, TrackedFrame& frame) {
+bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
+                              TrackedFrame& frame) {
   refresh_candidates(points, frame.index);
   const RgbdFeatures& features = *frame.features;
-  std::vector<uint8_t> taken = blocked;
+  std::vector<uint8_t> taken(features.size(), 0);
   std::vector<PointId> matched;
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) {
@@ -204,7 +207,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   candidates.reserve(candidates_.size() + provisional_.size());
   const auto is_matched = [&](PointId id) { return std::binary_search(matched.begin(), matched.end(), id); };
   for (const Candidate& c : candidates_)
-    if (!is_matched(c.id)) candidates.push_back(c);
+    if (!is_matched(c.id) && !is_retracted(c.id)) candidates.push_back(c);
   for (const auto& [id, p] : provisional_) {
     if (is_matched(id)) continue;
     Candidate c;
@@ -295,8 +298,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
   frame.inliers = pose.inliers;
 }
 
-TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at,
-                            const std::vector<uint8_t>& usable) {
+TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at) {
   TrackOutcome outcome;
   TrackedFrame& frame = outcome.frame;
   frame.index = index;
@@ -305,12 +307,10 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   const size_t n = frame.features->size();
   frame.points.assign(n, kNoPoint);
   frame.outlier.assign(n, 0);
-  std::vector<uint8_t> blocked(n, 0);
-  for (size_t f = 0; f < usable.size(); ++f) blocked[f] = usable[f] == 0;
 
   if (state_ == TrackingState::initialising) {
     int with_depth = 0;
-    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0 && !blocked[f];
+    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0;
     if (with_depth < options_.initial_points) return outcome;
     outcome.wants_first_keyframe = true;
     outcome.state = state_ = TrackingState::tracking;
@@ -324,11 +324,11 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   if (state_ != TrackingState::lost && last_) {
     const double dt = timestamp - last_->timestamp;
     std::optional<Rigid3> pose =
-        track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, *frame.features, blocked, points);
-    if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, *frame.features, blocked, points);
+        track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, *frame.features, points);
+    if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, *frame.features, points);
     if (!pose)
-      if (const Keyframe* k = view_->live_keyframe(last_->reference)) pose = match_keyframe(*k, *frame.features, blocked, points);
-    tracked = pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, blocked, points, frame);
+      if (const Keyframe* k = view_->live_keyframe(last_->reference)) pose = match_keyframe(*k, *frame.features, points);
+    tracked = pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
   }
   bool found_again = false;
   if (!tracked) {
@@ -336,10 +336,10 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
     const size_t tries = std::min(keyframes.size(), static_cast<size_t>(options_.recovery_keyframes));
     for (size_t i = 0; i < tries && !tracked; ++i) {
       std::fill(points.begin(), points.end(), kNoPoint);
-      const auto pose = match_keyframe(*view_->keyframe(keyframes[keyframes.size() - 1 - i]), *frame.features, blocked, points);
+      const auto pose = match_keyframe(*view_->keyframe(keyframes[keyframes.size() - 1 - i]), *frame.features, points);
       if (!pose) continue;
       candidates_made_ = -1;
-      tracked = track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, blocked, points, frame);
+      tracked = track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, points, frame);
       found_again = tracked;
     }
   }
@@ -365,7 +365,50 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   return outcome;
 }
 
-KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame, const std::vector<uint8_t>& usable) {
+void Tracker::take_reports(KeyframePacket& packet) {
+  for (auto& [point, sighting] : sightings_) {
+    sighting.point = point;
+    packet.sightings.push_back(sighting);
+  }
+  sightings_.clear();
+  packet.retracted = std::exchange(unreported_, {});
+}
+
+KeyframePacket Tracker::make_report() {
+  KeyframePacket packet;
+  take_reports(packet);
+  return packet;
+}
+
+bool Tracker::is_retracted(PointId id) const { return std::binary_search(retracted_.begin(), retracted_.end(), id); }
+
+void Tracker::retract(const std::vector<PointId>& points) {
+  for (PointId id : points) {
+    const auto at = std::lower_bound(retracted_.begin(), retracted_.end(), id);
+    if (at != retracted_.end() && *at == id) continue;
+    retracted_.insert(at, id);
+    unreported_.push_back(id);
+    provisional_.erase(id);
+    if (last_)
+      for (PointId& p : last_->points)
+        if (p == id) p = kNoPoint;
+  }
+}
+
+void Tracker::visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const {
+  if (!last_) return;
+  const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
+    const Eigen::Vector3d p = last_->cam_from_world * world;
+    if (p.z() < 0.1) return;
+    const Eigen::Vector2d pixel = camera_.project(p);
+    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height) visit(id, pixel, p.z());
+  };
+  for (const Candidate& c : candidates_)
+    if (!is_retracted(c.id)) offer(c.id, c.position);
+  for (const auto& [id, p] : provisional_) offer(id, *position(id));
+}
+
+KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) {
   KeyframePacket packet;
   packet.id = id;
   packet.frame = frame.index;
@@ -378,7 +421,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame, 
   std::vector<std::pair<float, int>> by_depth;
   for (size_t f = 0; f < frame.points.size(); ++f) {
     const float z = frame.features->keypoints[f].depth;
-    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f] && (usable.empty() || usable[f]))
+    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f])
       by_depth.emplace_back(z, static_cast<int>(f));
   }
   std::sort(by_depth.begin(), by_depth.end());
@@ -394,11 +437,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame, 
     p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
     packet.new_points.push_back(p);
   }
-  for (auto& [point, sighting] : sightings_) {
-    sighting.point = point;
-    packet.sightings.push_back(sighting);
-  }
-  sightings_.clear();
+  take_reports(packet);
 
   pending_.push_back({id, packet.reference, packet.cam_from_reference});
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);

@@ -63,14 +63,21 @@ class Tracker {
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
   Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
-  // `usable` (when not empty): per feature, 0 = must not be matched (it may move).
   // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once for
   // the expected velocity, and again for the one that the first pose shows.
   using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
-  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at, const std::vector<uint8_t>& usable);
+  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at);
 
   // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
-  KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame, const std::vector<uint8_t>& usable);
+  KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame);
+  // What is left to report when no keyframe follows.
+  KeyframePacket make_report();
+
+  // These points move: they are matched no more, and mapping is told with the next packet.
+  void retract(const std::vector<PointId>& points);
+  // Calls visit(id, ideal pixel, depth [m]) for each map point near the last frame that its pose puts in view.
+  void visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const;
+  const std::optional<TrackedFrame>& last_frame() const { return last_; }
 
   // Pose of a keyframe, also of one that mapping has not published yet.
   Rigid3 keyframe_pose(KeyframeId id) const;
@@ -85,11 +92,11 @@ class Tracker {
   PoseEstimate refine(const Rigid3& initial, const std::vector<std::pair<int, Eigen::Vector3d>>& pairs,
                       const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
-                                         const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
-                                       const std::vector<uint8_t>& blocked, std::vector<PointId>& points) const;
-  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, const std::vector<uint8_t>& blocked,
-                       std::vector<PointId>& points, TrackedFrame& frame);
+                                         std::vector<PointId>& points) const;
+  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features, std::vector<PointId>& points) const;
+  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points, TrackedFrame& frame);
+  bool is_retracted(PointId id) const;
+  void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
   Vector6d velocity_to(const TrackedFrame& frame) const;
   void refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const;
@@ -110,6 +117,8 @@ class Tracker {
   std::vector<PendingKeyframe> pending_;            // keyframes not in the view yet, by id
   std::map<PointId, ProvisionalPoint> provisional_;
   std::map<PointId, PointSighting> sightings_;
+  std::vector<PointId> retracted_;                  // increasing; until the view has dropped them
+  std::vector<PointId> unreported_;                 // of these, what mapping was not told yet
 
   TrackingState state_ = TrackingState::initialising;
   std::optional<TrackedFrame> last_;                // last frame with a pose

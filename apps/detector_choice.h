@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/slam/dynamic_stage.h"
+
+namespace dkb {
+
+// The options of `run` that choose detectors.
+struct DetectorArguments {
+  std::string detector = "auto";  // auto, none, or kinds joined by '+': yolo, motion, file
+  std::string model, labels, boxes, masks;
+  int every = 0, latency = 0;  // [frames] 0 = by the size of the model
+};
+
+// Makes them; every fault of a model or file is thrown here, before any frame (InputError).
+DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera, const std::vector<double>& stamps,
+                           bool threaded, bool realtime);
+
+}  // namespace dkb

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "dkb/map/ids.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+struct PointEvidenceOptions {
+  int sightings = 3;  // times that a point must be found on a mover, less the times it was found still, to be retracted, >= 1
+  void check() const { require_option(sightings >= 1, "dynamics.evidence.sightings", sightings, "at least 1"); }
+};
+
+// What the frames say of each map point over time: was it on a mover, or did it fit the still world?
+class PointEvidence {
+ public:
+  explicit PointEvidence(PointEvidenceOptions options) : options_(options) { options_.check(); }
+  void on_mover(PointId point) { ++suspicion_[point]; }
+  void fits_still_world(PointId point) {
+    const auto it = suspicion_.find(point);
+    if (it != suspicion_.end() && --it->second <= 0) suspicion_.erase(it);
+  }
+  // Points with enough against them, increasing; each once.
+  std::vector<PointId> take_convicted() {
+    std::vector<PointId> convicted;
+    for (auto it = suspicion_.begin(); it != suspicion_.end();) {
+      if (it->second >= options_.sightings) {
+        convicted.push_back(it->first);
+        it = suspicion_.erase(it);
+      } else {
+        ++it;
+      }
+    }
+    return convicted;
+  }
+
+ private:
+  PointEvidenceOptions options_;
+  std::map<PointId, int> suspicion_;
+};
+
+}  // namespace dkb

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/mapping/local_bundle_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "dkb/mapping/test_map.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+class LocalBa : public ::testing::Test {
+ protected:
+  // `keyframes` views 8 cm apart. Poses but the first and all points are off by some centimetres.
+  void build(int keyframes, const ViewOptions& options, double pose_error, double point_error) {
+    Random random(4);
+    const auto noise = [&](double sigma) {
+      return Eigen::Vector3d(sigma * random.normal(), sigma * random.normal(), sigma * random.normal());
+    };
+    std::vector<Rigid3> start;
+    for (int k = 0; k < keyframes; ++k) {
+      truth.push_back(TestScene::camera_at({0.08 * k, 0.02 * (k % 3), 0.03 * (k % 2)}, {0, 0.02 * k, 0}));
+      ViewOptions o = options;
+      o.seed = static_cast<uint64_t>(k) + 1;
+      views.push_back(scene.look(truth.back(), o));
+      Vector6d error;
+      error << noise(pose_error), noise(pose_error);
+      start.push_back(k == 0 ? truth.back() : rigid3_from_tangent(error) * truth.back());
+    }
+    SceneMap made(scene, views, start,
+                  [&](int i) { return Eigen::Vector3d(scene.points[static_cast<size_t>(i)] + noise(point_error)); });
+    map = std::move(made.map);
+    id_of = std::move(made.id_of);
+  }
+  LocalBaReport adjust(KeyframeId newest, const LocalBaOptions& options = {}) {
+    return local_bundle_adjustment(map, newest, scene.camera, {}, TestScene::kScaleFactor, options);
+  }
+  double worst_camera() const {
+    double worst = 0;
+    for (size_t k = 0; k < truth.size(); ++k)
+      worst = std::max(worst, distance_between(map.keyframe(static_cast<KeyframeId>(k))->cam_from_world, truth[k]));
+    return worst;
+  }
+  // [m] median over the points that at least three keyframes see
+  double median_point() const {
+    std::vector<double> errors;
+    for (size_t i = 0; i < id_of.size(); ++i)
+      if (const MapPoint* p = map.point(id_of[i]))
+        if (p->observations.size() >= 3) errors.push_back((p->position - scene.points[i]).norm());
+    std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2), errors.end());
+    return errors.at(errors.size() / 2);
+  }
+
+  TestScene scene{400};
+  std::vector<Rigid3> truth;
+  std::vector<View> views;
+  Map map;
+  std::vector<PointId> id_of;
+};
+
+TEST_F(LocalBa, APerturbedMapReturnsToTheTruth) {
+  build(6, {}, 0.01, 0.02);
+  const double before = median_point();
+  const LocalBaReport report = adjust(5);
+  EXPECT_LT(worst_camera(), 2e-4);
+  EXPECT_LT(median_point(), 1e-3);
+  EXPECT_GT(before, 0.02);
+  EXPECT_LT(report.final_cost, 1e-2 * report.initial_cost);
+  EXPECT_EQ(report.outliers, 0);
+  EXPECT_EQ(report.cameras, 5);
+  EXPECT_EQ(report.fixed, 1);
+}
+
+TEST_F(LocalBa, NoiseIsAveragedOut) {
+  build(8, {.pixel_noise = 0.5, .depth_noise = 0.01, .depth_share = 0.7}, 0.01, 0.02);
+  adjust(7);
+  EXPECT_LT(worst_camera(), 0.006);
+  EXPECT_LT(median_point(), 0.012);
+}
+
+TEST_F(LocalBa, TheFirstKeyframeOfTheMapNeverMoves) {
+  build(5, {.pixel_noise = 0.5}, 0.01, 0.02);
+  adjust(4);
+  EXPECT_EQ(map.keyframe(0)->cam_from_world.translation, truth[0].translation);
+  EXPECT_EQ(map.keyframe(0)->cam_from_world.rotation.coeffs(), truth[0].rotation.coeffs());
+}
+
+TEST_F(LocalBa, KeyframesOutsideTheWindowHoldItInPlace) {
+  build(8, {.pixel_noise = 0.3}, 0.005, 0.02);
+  LocalBaOptions options;
+  options.free_keyframes = 3;
+  std::vector<Rigid3> before;
+  for (KeyframeId k = 0; k < 8; ++k) before.push_back(map.keyframe(k)->cam_from_world);
+  const LocalBaReport report = adjust(7, options);
+  EXPECT_EQ(report.cameras, 3);
+  EXPECT_EQ(report.fixed, 5);
+  int moved = 0;
+  for (size_t k = 0; k < 8; ++k)
+    moved += map.keyframe(static_cast<KeyframeId>(k))->cam_from_world.translation != before[k].translation;
+  EXPECT_EQ(moved, 3);
+  EXPECT_NE(map.keyframe(7)->cam_from_world.translation, before[7].translation);
+}
+
+TEST_F(LocalBa, NoMoreFixedKeyframesThanAskedFor) {
+  build(8, {}, 0.005, 0.02);
+  LocalBaOptions options;
+  options.free_keyframes = 2;
+  options.fixed_keyframes = 3;
+  const LocalBaReport report = adjust(7, options);
+  EXPECT_EQ(report.cameras, 2);
+  EXPECT_EQ(report.fixed, 3);
+}
+
+TEST_F(LocalBa, OutlierObservationsAreForgotten) {
+  build(6, {.pixel_noise = 0.3, .misplaced = 0.05}, 0.003, 0.01);
+  // Which observations are wrong, by the truth.
+  struct Seen {
+    PointId point;
+    KeyframeId keyframe;
+    bool wrong;
+  };
+  std::vector<Seen> seen;
+  for (size_t k = 0; k < views.size(); ++k)
+    for (size_t f = 0; f < views[k].shows.size(); ++f) {
+      const auto i = static_cast<size_t>(views[k].shows[f]);
+      const Eigen::Vector2d at = scene.camera.project(truth[k] * scene.points[i]);
+      const bool wrong = (at - views[k].features->keypoints[f].pixel.cast<double>()).norm() > 15;
+      if (map.point(id_of[i])->observations.size() >= 4) seen.push_back({id_of[i], static_cast<KeyframeId>(k), wrong});
+    }
+  const LocalBaReport report = adjust(5);
+  int wrong = 0, wrong_kept = 0, right = 0, right_lost = 0;
+  for (const Seen& s : seen) {
+    const MapPoint* p = map.point(s.point);
+    const bool kept = p != nullptr && std::any_of(p->observations.begin(), p->observations.end(),
+                                                  [&](const Observation& o) { return o.keyframe == s.keyframe; });
+    (s.wrong ? wrong : right) += 1;
+    wrong_kept += s.wrong && kept;
+    right_lost += !s.wrong && !kept;
+  }
+  EXPECT_GT(wrong, 30);
+  EXPECT_LE(wrong_kept, wrong / 20);
+  EXPECT_LE(right_lost, right / 20);
+  EXPECT_GE(report.outliers, wrong - wrong_kept);
+  EXPECT_LT(worst_camera(), 0.01);
+}
+
+TEST_F(LocalBa, MovedPointsAreReportedByIncreasingId) {
+  build(4, {}, 0.005, 0.01);
+  const LocalBaReport report = adjust(3);
+  EXPECT_EQ(report.moved_points.size(), static_cast<size_t>(report.points));
+  EXPECT_TRUE(std::is_sorted(report.moved_points.begin(), report.moved_points.end()));
+  EXPECT_EQ(report.observations, static_cast<int>([&] {
+              size_t n = 0;
+              for (PointId p : report.moved_points) n += map.point(p)->observations.size();
+              return n;
+            }()));
+}
+
+TEST_F(LocalBa, TheSameMapGivesTheSameBits) {
+  build(5, {.pixel_noise = 0.5, .misplaced = 0.02}, 0.01, 0.02);
+  const Map copy = map;
+  adjust(4);
+  const Map first = map;
+  map = copy;
+  adjust(4);
+  for (KeyframeId k = 0; k < 5; ++k)
+    EXPECT_EQ(first.keyframe(k)->cam_from_world.translation, map.keyframe(k)->cam_from_world.translation);
+  EXPECT_EQ(first.live_points(), map.live_points());
+}
+
+TEST(LocalBaOptions, AreChecked) {
+  const auto rejects = [](auto change) {
+    LocalBaOptions options;
+    change(options);
+    EXPECT_THROW(options.check(), InvalidOption);
+  };
+  rejects([](auto& o) { o.free_keyframes = 0; });
+  rejects([](auto& o) { o.fixed_keyframes = 0; });
+  rejects([](auto& o) { o.iterations_first = 0; });
+  rejects([](auto& o) { o.iterations_second = 0; });
+  rejects([](auto& o) { o.weights.edge_weight = 0; });
+}
+
+}  // namespace
+}  // namespace dkb

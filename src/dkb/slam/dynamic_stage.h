@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/detection/carried_detections.h"
+#include "dkb/detection/detection_thread.h"
+#include "dkb/dynamics/dynamic_filter.h"
+#include "dkb/dynamics/mover_mask.h"
+#include "dkb/dynamics/silhouette.h"
+#include "dkb/features/features.h"
+#include "dkb/features/optical_flow.h"
+#include "dkb/features/rgbd_features.h"
+#include "dkb/geometry/camera.h"
+#include "dkb/image/rgbd_image.h"
+#include "dkb/map/ids.h"
+#include "dkb/util/timing.h"
+
+namespace dkb {
+
+struct DynamicsOptions {
+  FilterKind filter = FilterKind::standard;
+  PaperFilterOptions paper;
+  EpipolarFilterOptions epipolar;
+  MultiviewFilterOptions multiview;
+  SilhouetteOptions silhouette;
+  OpticalFlowOptions flow;
+  CarryOptions carry;
+  int points_per_box = 80;        // features followed to carry a box, >= 4
+  int points_outside = 200;       // features outside the boxes that tell the camera's own motion, >= 20
+  int missed_results = 2;         // detector results that may miss an object before its box is dropped, >= 0
+  void check() const;
+};
+
+// The detectors of a system; by default none.
+struct DetectorSet {
+  std::unique_ptr<Detector> slow;                 // with a thread and a latency of its own (networks)
+  DetectionSchedule schedule;                     // of the slow one
+  std::vector<std::unique_ptr<Detector>> prompt;  // answer at once (files)
+  bool motion = false;                            // the built-in motion segmentation
+};
+
+// What is known of movers in the current image.
+struct DynamicScene {
+  std::vector<uint8_t> dynamic;   // per corner: 1 = must not be used
+  std::vector<Detection> boxes;   // in the current image
+  MoverMask mask;                 // where movers are (filter `standard` only)
+};
+
+// A silhouette that came too late for the frame it belongs to.
+struct LateMask {
+  FrameIndex frame = 0;
+  MoverMask mask;
+};
+
+// The filter stage (DKB section 3.1): detections made beside tracking are carried to the current image by flow; the chosen
+// filter then says which corners move. Deterministic.
+class DynamicStage {
+ public:
+  DynamicStage(const CameraModel& camera, const DynamicsOptions& options, DetectorSet detectors);
+
+  // What tracking knows before it looks at the frame.
+  struct Context {
+    FrameIndex frame = 0;
+    std::shared_ptr<const RgbdImage> image;
+    const OrbFeatures* orb = nullptr;
+    const UndistortionTable* undistort = nullptr;
+    Rigid3 current_from_previous;                     // expected motion of the camera
+    std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes, expected pose
+  };
+  DynamicScene process(const Context& context);
+  // The frame just processed became a keyframe: its silhouette is given again once its own detections are in.
+  void note_keyframe();
+
+  // Silhouettes of keyframes that detections have shown since; each once.
+  std::vector<LateMask> take_late_masks();
+  // A warning for the user, once: the detector failed in mid-run.
+  std::optional<std::string> take_warning();
+  bool wants_keyframe_points() const { return options_.filter == FilterKind::multiview; }
+
+  std::string detector_kind() const;
+  double detector_rate_hz() const;
+  int detector_latency() const;
+  const DetectionSchedule& schedule() const { return schedule_; }
+  const StageTimes& times() const { return times_; }  // stages flow and filter
+  StageTimes detector_times() const;
+  void stop();
+
+ private:
+  struct PastFrame {
+    FrameIndex frame = 0;
+    std::shared_ptr<const RgbdImage> image;
+    std::shared_ptr<const ImagePyramid> pyramid;
+    std::vector<Eigen::Vector2f> corners;  // image pixels
+    bool keyframe = false;
+  };
+  std::vector<PointMotion> follow(const PastFrame& from, const ImagePyramid& to, const std::vector<Detection>& boxes) const;
+  void mark_keyframes(const PastFrame& source, const Detections& detections);
+  void receive(const Context& context, const std::shared_ptr<const ImagePyramid>& pyramid);
+  std::vector<FilterFeature> describe(const Context& context, const ImagePyramid& pyramid, bool with_flow) const;
+  Rigid3 own_motion(const std::vector<FilterFeature>& features, const Rigid3& expected) const;
+
+  CameraModel camera_;
+  DynamicsOptions options_;
+  OpticalFlow flow_;
+  DetectionSchedule schedule_;
+  std::unique_ptr<DetectionThread> slow_;
+  std::vector<std::unique_ptr<Detector>> prompt_;
+  std::deque<PastFrame> past_;         // newest last; as many as the detector's latency needs
+  struct Carried {
+    Detection detection;
+    int missed = 0;
+  };
+  std::vector<Carried> carried_;       // boxes of the slow detector in the newest image
+  std::vector<LateMask> late_;
+  StageTimes times_;
+};
+
+}  // namespace dkb
