@@ -9,12 +9,9 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "eval_command.h"
-#ifdef DKB_RUN
+#include "map_command.h"
 #include "run_command.h"
-#endif
-#ifdef DKB_SIMULATE
 #include "simulate_command.h"
-#endif
 
 namespace {
 
@@ -27,23 +24,28 @@ void print_error(std::string message) {
 
 // What is wrong with the command line, in one line, with the nearest name when one is misspelt.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const std::vector<CLI::App*> chosen = app.get_subcommands();
-  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  const CLI::App* command = &app;
+  std::string path = "dkb-slam ";
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    path += command->get_name() + " ";
+  }
+  const std::vector<const CLI::App*> below = command->get_subcommands([](const CLI::App*) { return true; });
   const std::vector<std::string> rest = app.remaining(true);
-  const std::string help = "; see dkb-slam " + (chosen.empty() ? "" : command.get_name() + " ") + "--help";
+  const std::string help = "; see " + path + "--help";
 
   const auto is_option = [](const std::string& word) { return word.size() > 1 && word[0] == '-'; };
   const auto option = std::find_if(rest.begin(), rest.end(), is_option);
   if (option != rest.end()) {
     const std::string name = option->substr(0, option->find('='));
     std::vector<std::string> known;
-    for (const CLI::Option* o : command.get_options())
+    for (const CLI::Option* o : command->get_options())
       for (const std::string& long_name : o->get_lnames()) known.push_back("--" + long_name);
     return "unknown option " + name + dkb::did_you_mean(name, known) + help;
   }
-  if (chosen.empty() && !rest.empty()) {
+  if (!below.empty() && !rest.empty()) {
     std::vector<std::string> known;
-    for (const CLI::App* c : app.get_subcommands({})) known.push_back(c->get_name());
+    for (const CLI::App* c : below) known.push_back(c->get_name());
     return "unknown command \"" + rest.front() + "\"" + dkb::did_you_mean(rest.front(), known) + help;
   }
   if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
@@ -58,13 +60,10 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   try {
-#ifdef DKB_RUN
     dkb::register_run(app, exit_code);
-#endif
     dkb::register_eval(app, exit_code);
-#ifdef DKB_SIMULATE
     dkb::register_simulate(app, exit_code);
-#endif
+    dkb::register_map(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version

@@ -11,7 +11,7 @@
 namespace dkb {
 namespace {
 
-constexpr const char* kTruth = "#8a8f98";
+constexpr const char* kTruth = "#b8bdc6";
 constexpr const char* kEstimate = "#1f6feb";
 constexpr const char* kError = "#d1495b";
 constexpr const char* kInk = "#24292f";
@@ -93,13 +93,21 @@ class Panel {
     return out;
   }
 
-  std::string path(const std::vector<double>& x, const std::vector<double>& y, const char* colour, double width) const {
-    std::string points;
-    for (size_t i = 0; i < x.size(); ++i)
-      points += fmt::format("{}{:.1f},{:.1f}", i == 0 ? "" : " ", px(x[i]), py(y[i]));
-    return fmt::format(
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"/>\n", points,
-        colour, width);
+  // `starts`: where a new stretch begins; between stretches nothing is drawn.
+  std::string path(const std::vector<double>& x, const std::vector<double>& y, const std::vector<size_t>& starts,
+                   const char* colour, double width) const {
+    std::string out;
+    for (size_t k = 0; k < starts.size(); ++k) {
+      const size_t end = k + 1 < starts.size() ? starts[k + 1] : x.size();
+      std::string points;
+      for (size_t i = starts[k]; i < end; ++i) points += fmt::format("{:.1f},{:.1f} ", px(x[i]), py(y[i]));
+      points.pop_back();
+      out += fmt::format(
+          "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\" "
+          "stroke-linecap=\"round\"/>\n",
+          points, colour, width);
+    }
+    return out;
   }
 
   std::string dot(double x, double y, const char* colour) const {
@@ -111,7 +119,7 @@ class Panel {
                "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" stroke-dasharray=\"5 "
                "4\"/>\n",
                left_, py(y), left_ + width_, py(y), kInk) +
-           label(left_ + width_ - 6, py(y) - 5, "end", 11, kInk, text);
+           label(left_ + width_, top_ - 6, "end", 12, kInk, text);
   }
 
  private:
@@ -128,6 +136,18 @@ class Panel {
   double left_, top_, width_, height_;
   Range x_, y_;
 };
+
+// Indices at which a stretch without gaps begins; a gap is ten usual steps between stamps.
+std::vector<size_t> stretches(const std::vector<double>& timestamps) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < timestamps.size(); ++i) steps.push_back(timestamps[i] - timestamps[i - 1]);
+  std::vector<double> sorted = steps;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<size_t> starts{0};
+  for (size_t i = 0; i < steps.size(); ++i)
+    if (const double usual = sorted[sorted.size() / 2]; usual > 0 && steps[i] > 10.0 * usual) starts.push_back(i + 1);
+  return starts;
+}
 
 // Ranges around two sets of coordinates with one scale for both axes of a panel, so that shapes are true.
 void frame_equally(double width, double height, Range* x, Range* y) {
@@ -174,6 +194,7 @@ std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
   out += fmt::format("<circle cx=\"{:.1f}\" cy=\"76\" r=\"4\" fill=\"{}\"/>\n", legend + 4, kEstimate);
   out += label(legend + 14, 80, "start", 12, kInk, "start");
 
+  const std::vector<size_t> starts = stretches(e.timestamps);
   static constexpr const char* kAxisName[] = {"x [m]", "y [m]", "z [m]"};
   for (size_t panel = 0; panel < 2; ++panel) {
     const size_t h = order[0], v = order[panel + 1];
@@ -182,8 +203,8 @@ std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
     frame_equally(kSide, kTall, &x, &y);
     const Panel p(70 + 470 * static_cast<double>(panel), 96, kSide, kTall, x, y);
     out += p.axes(kAxisName[h], kAxisName[v]);
-    out += p.path(truth[h], truth[v], kTruth, 3);
-    out += p.path(estimate[h], estimate[v], kEstimate, 1.5);
+    out += p.path(truth[h], truth[v], starts, kTruth, 5);
+    out += p.path(estimate[h], estimate[v], starts, kEstimate, 1.5);
     out += p.dot(estimate[h].front(), estimate[v].front(), kEstimate);
   }
 
@@ -192,8 +213,8 @@ std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
   const double duration = std::max(range_of(seconds).high, 1e-3), most = std::max(e.ape.translation.max, 1e-9);
   const Panel errors(70, 510, 855, 230, {0, duration}, {0, 1.1 * most});
   out += errors.axes("time since the first matched pose [s]", "APE [m]");
-  out += errors.path(seconds, e.ape.translation_m, kError, 1.5);
-  out += errors.level(e.ape.translation.rmse, fmt::format("rmse {:.4f} m", e.ape.translation.rmse));
+  out += errors.path(seconds, e.ape.translation_m, starts, kError, 1.2);
+  out += errors.level(e.ape.translation.rmse, fmt::format("dashed: rmse {:.4f} m", e.ape.translation.rmse));
   return out + "</svg>\n";
 }
 
