@@ -21,6 +21,7 @@ struct ViewOptions {
   int flipped_bits = 0;    // of every descriptor, at most
   int clutter = 0;         // features that show no point: random places, depths and descriptors
   double misplaced = 0;    // share of the features that are moved by 20 to 60 px: wrong matches
+  int hidden = -1;         // a point of the scene that is not seen
   uint64_t seed = 1;       // of all of it
 };
 
@@ -77,16 +78,17 @@ class TestScene {
     };
     for (size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d in_cam = cam_from_world * points[i];
-      if (in_cam.z() < 0.3) continue;
+      // Drawn for every point, in view or not, so that the same seed treats a point alike in every view.
+      const Eigen::Vector2d noise(random.normal(), random.normal());
+      const bool misplaced = random.uniform() < options.misplaced, deep = random.uniform() < options.depth_share;
+      const Eigen::Vector2d off(random.uniform(20, 60), -random.uniform(20, 60));
+      const double depth_noise = options.depth_noise * random.normal();
+      if (in_cam.z() < 0.3 || static_cast<int>(i) == options.hidden) continue;
       const int level = octave(static_cast<int>(i), in_cam.norm());
-      const double sigma = options.pixel_noise * std::pow(kScaleFactor, level);
-      Eigen::Vector2d pixel = camera.project(in_cam) + sigma * Eigen::Vector2d(random.normal(), random.normal());
-      if (random.uniform() < options.misplaced)
-        pixel += Eigen::Vector2d(random.uniform(20, 60), -random.uniform(20, 60));
+      Eigen::Vector2d pixel = camera.project(in_cam) + options.pixel_noise * std::pow(kScaleFactor, level) * noise;
+      if (misplaced) pixel += off;
       if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() >= camera.width || pixel.y() >= camera.height) continue;
-      const bool deep = random.uniform() < options.depth_share;
-      add(static_cast<int>(i), pixel, deep ? in_cam.z() + options.depth_noise * random.normal() : 0, level,
-          descriptors[i]);
+      add(static_cast<int>(i), pixel, deep ? in_cam.z() + depth_noise : 0, level, descriptors[i]);
     }
     for (int i = 0; i < options.clutter; ++i)
       add(-1, {random.uniform(0, camera.width), random.uniform(0, camera.height)}, random.uniform(1, 4),

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "dkb/tracking/test_scene.h"
 #include "dkb/util/errors.h"
 
@@ -16,13 +18,12 @@ const ViewOptions kNoisy{
 
 class TrackerTest : public ::testing::Test {
  protected:
-  TrackOutcome track(const Rigid3& cam_from_world, ViewOptions options = {}, const std::vector<uint8_t>& usable = {}) {
+  TrackOutcome track(const Rigid3& cam_from_world, ViewOptions options = {}) {
     ++index;
     options.seed = options.seed * 1000 + static_cast<uint64_t>(index);
     view = scene.look(cam_from_world, options);
     if (black) view.features = std::make_shared<RgbdFeatures>();
-    return tracker.track(
-        index, index * kFrameTime, [&](const Vector6d&) { return view.features; }, usable);
+    return tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return view.features; });
   }
   // The first frame and its keyframe.
   KeyframePacket start(const Rigid3& cam_from_world = {}, const ViewOptions& options = {}) {
@@ -31,9 +32,9 @@ class TrackerTest : public ::testing::Test {
     first.frame.cam_from_world = cam_from_world;
     return insert(first.frame);
   }
-  KeyframePacket insert(const TrackedFrame& frame, const std::vector<uint8_t>& usable = {}) {
+  KeyframePacket insert(const TrackedFrame& frame) {
     keyframe_shows.push_back(view.shows);
-    return tracker.make_keyframe(static_cast<KeyframeId>(keyframe_shows.size()) - 1, frame, usable);
+    return tracker.make_keyframe(static_cast<KeyframeId>(keyframe_shows.size()) - 1, frame);
   }
   // What mapping would do, without any refinement.
   void work_in(const KeyframePacket& packet) {
@@ -89,11 +90,6 @@ TEST_F(TrackerTest, AMapStartsOnceEnoughFeaturesHaveDepth) {
   const TrackOutcome first = track({});
   EXPECT_EQ(first.state, TrackingState::tracking);
   EXPECT_TRUE(first.wants_first_keyframe);
-}
-
-TEST_F(TrackerTest, UnusableDepthsStartNoMap) {
-  const std::vector<uint8_t> none(scene.look({}).shows.size(), 0);
-  EXPECT_EQ(track({}, {}, none).state, TrackingState::initialising);
 }
 
 TEST_F(TrackerTest, FollowsASteadyMotionThroughNoiseAndOutliers) {
@@ -157,40 +153,70 @@ TEST_F(TrackerTest, TheFirstKeyframeMayStandAnywhere) {
   EXPECT_LT(moved.translation.norm(), 1e-9) << "nothing moved the world";
 }
 
-TEST_F(TrackerTest, UnusableFeaturesAreNeverMatchedAndMakeNoPoints) {
-  const auto odd = [](const View& v) {
-    std::vector<uint8_t> usable;
-    for (int shows : v.shows) usable.push_back(shows % 2 != 0);
-    return usable;
+TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
+  publish(start(on_path(0)));
+  TrackOutcome o = track(on_path(1));
+  std::vector<PointId> moving;
+  for (PointId p : o.frame.points)
+    if (p != kNoPoint && scene_point(p) % 3 == 0) moving.push_back(p);
+  ASSERT_GT(moving.size(), 50U);
+  tracker.retract(moving);
+  const auto shows_a_retracted_one = [&] {
+    return std::any_of(o.frame.points.begin(), o.frame.points.end(),
+                       [&](PointId p) { return std::find(moving.begin(), moving.end(), p) != moving.end(); });
   };
-  TrackOutcome first = track(on_path(0), {}, odd(scene.look(on_path(0))));
-  const KeyframePacket packet = insert(first.frame, odd(view));
-  for (const ProvisionalPoint& p : packet.new_points) EXPECT_TRUE(scene_point(p.id) % 2) << "feature " << p.feature;
-  publish(packet);
-  for (int f = 1; f <= 4; ++f) {
-    std::vector<uint8_t> half(scene.look(on_path(f)).shows.size(), 0);
-    for (size_t i = 0; i < half.size(); i += 2) half[i] = 1;
-    const TrackOutcome o = track(on_path(f), {}, half);
+  for (int f = 2; f <= 5; ++f) {
+    o = track(on_path(f));
     ASSERT_EQ(o.state, TrackingState::tracking);
-    for (size_t i = 1; i < half.size(); i += 2) {
-      EXPECT_EQ(o.frame.points[i], kNoPoint);
-      EXPECT_FALSE(o.frame.outlier[i]);
-    }
+    EXPECT_FALSE(shows_a_retracted_one()) << "frame " << f;
   }
-  EXPECT_EQ(track(on_path(5), {}, std::vector<uint8_t>(scene.look(on_path(5)).shows.size(), 0)).state,
-            TrackingState::lost);
-}
-
-TEST_F(TrackerTest, UnusableFeaturesAreNotMatchedByALostTrackerEither) {
-  publish(start());
   black = true;
   track({});
   black = false;
-  auto half = std::vector<uint8_t>(scene.look({}).shows.size(), 0);
-  for (size_t i = 0; i < half.size(); i += 2) half[i] = 1;
-  const TrackOutcome o = track({}, {}, half);
+  o = track(on_path(6));
   ASSERT_EQ(o.state, TrackingState::relocalised);
-  for (size_t i = 1; i < half.size(); i += 2) EXPECT_EQ(o.frame.points[i], kNoPoint);
+  EXPECT_FALSE(shows_a_retracted_one()) << "found again";
+}
+
+TEST_F(TrackerTest, MappingIsToldOnceOfRetractedPoints) {
+  publish(start(on_path(0)));
+  const std::vector<PointId> live = map.live_points();
+  const std::vector<PointId> moving = {live[7], live[3]};
+  tracker.retract(moving);
+  tracker.retract({live[3]});
+  const TrackOutcome o = track(on_path(1));
+  EXPECT_EQ(insert(o.frame).retracted, moving);
+  tracker.retract({live[9]});
+  const KeyframePacket report = tracker.make_report();
+  EXPECT_EQ(report.id, kNoKeyframe);
+  EXPECT_EQ(report.retracted, std::vector<PointId>{live[9]});
+  EXPECT_TRUE(tracker.make_report().retracted.empty());
+}
+
+TEST_F(TrackerTest, ARetractedProvisionalPointIsGoneAtOnceAndAfterMappingPublishedIt) {
+  const KeyframePacket packet = start(on_path(0));
+  const PointId moving = packet.new_points[10].id;
+  tracker.retract({moving});
+  EXPECT_FALSE(tracker.position(moving));
+  publish(packet);  // mapping did not know yet
+  for (int f = 1; f <= 3; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    EXPECT_EQ(std::count(o.frame.points.begin(), o.frame.points.end(), moving), 0);
+  }
+}
+
+TEST_F(TrackerTest, VisitsThePointsThatItsPosePutsInView) {
+  publish(start(on_path(0)));
+  track(on_path(1));
+  const TrackOutcome o = track(on_path(2));
+  std::vector<PointId> seen;
+  tracker.visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double depth) {
+    const Eigen::Vector3d in_cam = on_path(2) * scene.points[static_cast<size_t>(scene_point(id))];
+    EXPECT_LT((scene.camera.project(in_cam) - pixel).norm(), 0.05);
+    EXPECT_NEAR(in_cam.z(), depth, 1e-3);
+    seen.push_back(id);
+  });
+  for (PointId p : o.frame.points) EXPECT_TRUE(p == kNoPoint || std::find(seen.begin(), seen.end(), p) != seen.end());
 }
 
 TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
@@ -218,7 +244,7 @@ TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
   for (int f = 0; f < 3; ++f) {
     ++index;
     const View there = other.look(on_path(f));
-    EXPECT_EQ(tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return there.features; }, {}).state,
+    EXPECT_EQ(tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return there.features; }).state,
               TrackingState::lost);
   }
 }
@@ -296,12 +322,10 @@ TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredO
   ++index;
   const View seen = scene.look(on_path(5));  // twice as fast as before
   std::vector<Vector6d> asked;
-  tracker.track(index, index * kFrameTime,
-                [&](const Vector6d& velocity) {
-                  asked.push_back(velocity);
-                  return seen.features;
-                },
-                {});
+  tracker.track(index, index * kFrameTime, [&](const Vector6d& velocity) {
+    asked.push_back(velocity);
+    return seen.features;
+  });
   ASSERT_EQ(asked.size(), 2U);
   EXPECT_TRUE(asked[0].isApprox(expected));
   EXPECT_GT(asked[1].tail<3>().norm(), 0.55);  // at least the 0.6 rad/s of this step, up to rounding
@@ -326,9 +350,7 @@ TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
   const int hidden = scene_point(map.live_points()[3]);
   TrackOutcome o;
   for (int f = 0; f < 10; ++f) {
-    std::vector<uint8_t> usable;
-    for (int shows : scene.look({}).shows) usable.push_back(shows != hidden);
-    o = track({}, {}, usable);
+    o = track({}, {.hidden = hidden});
   }
   const KeyframePacket packet = insert(o.frame);
   ASSERT_GT(packet.sightings.size(), 100U);
