@@ -2,3 +2,126 @@
 #include "dkb/dataset/camera_file.h"
 
 #include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+
+#include "dkb/dataset/mutation.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+namespace fs = std::filesystem;
+
+const std::string kCamera = "fx: 517.3\nfy: 516.5\ncx: 318.6\ncy: 255.3\nwidth: 640\nheight: 480\ndepth_factor: 5000\n";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+std::string message(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+std::string parse_message(const std::string& text) {
+  return message([&] { parse_camera(text, "camera.yaml"); });
+}
+
+TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
+  const CameraModel c = parse_camera(kCamera + "k1: -0.5\r\nfps: 15 # slow\ndepth_max: 4\n", "camera.yaml");
+  EXPECT_EQ(c.fx, 517.3);
+  EXPECT_EQ(c.cy, 255.3);
+  EXPECT_EQ(c.width, 640);
+  EXPECT_EQ(c.depth_factor, 5000);
+  EXPECT_EQ(c.k1, -0.5);
+  EXPECT_EQ(c.k2, 0);
+  EXPECT_EQ(c.fps, 15);
+  EXPECT_EQ(c.depth_max, 4);
+}
+
+TEST(CameraFile, MessagesSayWhereWhatAndWhatToDo) {
+  EXPECT_EQ(parse_message(replaced(kCamera, "depth_factor", "depth_factr")),
+            "camera.yaml:7: unknown key \"depth_factr\" (did you mean \"depth_factor\"?)");
+  EXPECT_EQ(parse_message(replaced(kCamera, "517.3", "-517.3")),
+            "camera.yaml:1: fx: -517.300000 is out of range; it must be greater than 0 px");
+  EXPECT_EQ(parse_message(replaced(kCamera, "cx: 318.6\n", "")),
+            "camera.yaml: key \"cx\" is missing; a camera file needs fx, fy, cx, cy, width, height, depth_factor");
+  EXPECT_EQ(parse_message(replaced(kCamera, "640", "640.5")), "camera.yaml:5: width: \"640.5\" is not a whole number");
+  EXPECT_EQ(parse_message(kCamera + "fx: 3\n"), "camera.yaml:8: key \"fx\" is given twice");
+  EXPECT_EQ(parse_message("{{{").substr(0, 32), "camera.yaml:1: is not valid YAML");
+  EXPECT_NE(parse_message(std::string("fx: 1\0", 6)), "no error");
+}
+
+TEST(CameraFile, WrittenCameraReadsBackTheSame) {
+  for (const char* name : {"fr1", "fr2", "fr3", "bonn"}) {
+    const CameraModel c = *builtin_camera(name), back = parse_camera(camera_to_yaml(c), "camera.yaml");
+    EXPECT_EQ(camera_to_yaml(back), camera_to_yaml(c));
+    EXPECT_EQ(back.k3, c.k3);
+  }
+}
+
+TEST(CameraFile, FilesInConfigAreTheBuiltInCameras) {
+  for (const char* name : {"fr1", "fr2", "fr3", "bonn"}) {
+    const CameraModel file = read_camera_file(fs::path(DKB_CONFIG) / ("camera_" + std::string(name) + ".yaml"));
+    EXPECT_EQ(camera_to_yaml(file), camera_to_yaml(*builtin_camera(name))) << name;
+  }
+}
+
+class ChooseCamera : public testing::Test {
+ protected:
+  ChooseCamera() : root(fs::path(testing::TempDir()) / "dkb_choose_camera") { fs::remove_all(root); }
+  ~ChooseCamera() override { fs::remove_all(root); }
+  fs::path folder(const std::string& name) const {
+    fs::create_directories(root / name);
+    return root / name;
+  }
+  const fs::path root;
+};
+
+TEST_F(ChooseCamera, PrefersOptionThenFileThenFolderName) {
+  const fs::path data = folder("rgbd_dataset_freiburg1_xyz");
+  EXPECT_EQ(choose_camera("", data).origin, "fr1 (from the folder's name)");
+  EXPECT_EQ(choose_camera("", data / "").camera.fx, 517.3);
+  write_file_atomically(data / "camera.yaml", replaced(kCamera, "517.3", "400"));
+  EXPECT_EQ(choose_camera("", data).camera.fx, 400);
+  EXPECT_EQ(choose_camera("", data).origin, (data / "camera.yaml").string());
+  EXPECT_EQ(choose_camera("fr3", data).camera.fx, 535.4);
+  EXPECT_EQ(choose_camera((data / "camera.yaml").string(), folder("else")).camera.fx, 400);
+}
+
+TEST_F(ChooseCamera, KnowsFolderNamesAsWords) {
+  EXPECT_EQ(choose_camera("", folder("fr2_desk")).camera.fx, 520.9);
+  EXPECT_EQ(choose_camera("", folder("TUM-Freiburg3-walking")).camera.fx, 535.4);
+  EXPECT_EQ(choose_camera("", folder("rgbd_bonn_balloon")).camera.fx, 542.822841);
+  EXPECT_THROW(choose_camera("", folder("bonnet")), InputError);
+  EXPECT_THROW(choose_camera("", folder("freiburg4_room")), InputError);
+}
+
+TEST_F(ChooseCamera, RefusalsNameTheFile) {
+  EXPECT_NE(message([&] { choose_camera("/no/none.yaml", folder("a")); }).find("/no/none.yaml"), std::string::npos);
+  EXPECT_NE(message([&] { choose_camera("fr4", folder("a")); }).find("did you mean"), std::string::npos);
+  EXPECT_NE(message([&] { choose_camera("", folder("a")); }).find("--camera"), std::string::npos);
+}
+
+TEST(CameraFile, MutatedFilesThrowNothingButInputErrors) {
+  Random random(21);
+  const std::string original = kCamera + "# comment\nk1: 0.5\nfps: 30\n";
+  int accepted = 0;
+  for (int i = 0; i < 4000; ++i) {
+    try {
+      parse_camera(mutated(original, random), "camera.yaml").check();
+      ++accepted;
+    } catch (const InputError& e) {
+      EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+    }
+  }
+  EXPECT_GT(accepted, 0);
+}
+
+}  // namespace
+}  // namespace dkb

@@ -12,8 +12,8 @@
 
 namespace dkb {
 
-// Hands the frames of a dataset over at the pace of their stamps, as a camera would. A consumer that falls behind finds up
-// to 30 frames waiting; only when these are full is the oldest dropped and counted.
+// Hands the frames of a dataset over at the pace of their stamps, as a camera would. A consumer that falls behind finds
+// up to 30 frames waiting; only when these are full is the oldest dropped and counted.
 class PacedSource {
  public:
   explicit PacedSource(RgbdReader& reader);

@@ -2,3 +2,81 @@
 #include "dkb/dataset/trajectory_file.h"
 
 #include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "dkb/dataset/mutation.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+std::string error(const std::string& text) {
+  try {
+    parse_trajectory(text, "t.txt");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(TrajectoryFile, ReadsRowsSortedByStampEqualStampsInOrder) {
+  const Trajectory t =
+      parse_trajectory("# header\r\n2.50 1 2 3 0 0 0 2\r\n\r\n1.5 4 5 6 0 0 1 0 extra\n2.5 7 8 9 0 0 0 1", "t.txt");
+  ASSERT_EQ(t.size(), 3u);
+  EXPECT_EQ(t[0].stamp, "1.5");
+  EXPECT_EQ(t[0].world_from_cam.rotation.z(), 1.0);
+  EXPECT_EQ(t[1].stamp, "2.50");
+  EXPECT_EQ(t[1].world_from_cam.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(t[1].world_from_cam.rotation.w(), 1.0) << "normalised";
+  EXPECT_EQ(t[2].world_from_cam.translation, Eigen::Vector3d(7, 8, 9));
+  EXPECT_TRUE(parse_trajectory("# nothing\n", "t.txt").empty());
+}
+
+TEST(TrajectoryFile, FaultsNameFileAndLine) {
+  EXPECT_EQ(error("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n"),
+            "t.txt:2: 7 of 8 columns; a row must be `timestamp tx ty tz qx qy qz qw`");
+  EXPECT_EQ(error("1 0 nan 0 0 0 0 1\n"), "t.txt:1: ty \"nan\" is not a finite number");
+  EXPECT_EQ(error("1 0 0 0 0 0 0 1,5\n"), "t.txt:1: qw \"1,5\" is not a number");
+  EXPECT_EQ(error("1 0 0 0 0 0 0 0\n"), "t.txt:1: the quaternion is not of length 1");
+}
+
+TEST(TrajectoryFile, WritesStampsAsReadAndNineDecimals) {
+  StampedPose a;
+  a.timestamp = 1.5, a.stamp = "1.500";
+  a.world_from_cam = Rigid3(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {1, -2.25, 1e-10});
+  StampedPose b;
+  b.timestamp = 1305031102.175304;
+  EXPECT_EQ(trajectory_to_text({a, b}),
+            "# timestamp tx ty tz qx qy qz qw\n"
+            "1.500 1.000000000 -2.250000000 0.000000000 -0.500000000 0.500000000 -0.500000000 0.500000000\n"
+            "1305031102.175304 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n");
+}
+
+TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "dkb_trajectory.txt";
+  const Trajectory t = parse_trajectory("1.25 0.1 0.2 0.3 0.5 0.5 0.5 0.5\n3 -1 -2 -3 0 0 0 1\n", "t.txt");
+  write_trajectory(path, t);
+  EXPECT_EQ(trajectory_to_text(read_trajectory(path)), trajectory_to_text(t));
+  std::filesystem::remove(path);
+  EXPECT_THROW(read_trajectory(path), InputError);
+  EXPECT_THROW(write_trajectory("/proc/none/t.txt", t), OutputError);
+}
+
+TEST(TrajectoryFile, MutatedFilesThrowNothingButInputErrors) {
+  Random random(41);
+  const std::string original =
+      "# timestamp\n1305031101.6759 1.4276 0.6365 1.7614 0.6610 0.5863 -0.2988 -0.3605\n"
+      "1305031101.6858 1.4271 0.6368 1.7611 0.6616 0.5862 -0.2974 -0.3607\n";
+  for (int i = 0; i < 4000; ++i) {
+    try {
+      for (const StampedPose& pose : parse_trajectory(mutated(original, random), "t.txt"))
+        EXPECT_NEAR(pose.world_from_cam.rotation.norm(), 1.0, 1e-9);
+    } catch (const InputError& e) {
+      EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dkb
