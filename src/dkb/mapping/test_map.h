@@ -52,4 +52,56 @@ struct SceneMap {
   }
 };
 
+// Makes the packets that tracking would send for views of a scene: each keyframe hangs on the one before it, shows the
+// points that the scene's points were named before, and makes points of the rest.
+struct PacketSource {
+  // `matched` tells which scene points tracking matched.
+  template <class Matched>
+  KeyframePacket packet(const Rigid3& truth, const Rigid3& estimate, const ViewOptions& options, Matched&& matched) {
+    KeyframePacket p;
+    p.id = static_cast<KeyframeId>(shows.size());
+    p.frame = 10 * p.id;
+    p.timestamp = p.frame / 30.0;
+    const View view = scene.look(truth, options);
+    shows.push_back(view.shows);
+    p.features = view.features;
+    p.reference = p.id - 1;
+    p.cam_from_reference = p.id == 0 ? estimate : estimate * estimates.back().inverse();
+    estimates.push_back(estimate);
+    p.points.assign(view.shows.size(), kNoPoint);
+    for (size_t f = 0; f < view.shows.size(); ++f) {
+      const int i = view.shows[f];
+      if (i < 0) continue;
+      if (id_of[static_cast<size_t>(i)] != kNoPoint && matched(i)) {
+        p.points[f] = id_of[static_cast<size_t>(i)];
+        continue;
+      }
+      const Keypoint& k = view.features->keypoints[f];
+      if (!(k.depth > 0)) continue;
+      ProvisionalPoint n;
+      n.id = make_point_id(p.id, static_cast<int>(f));
+      n.keyframe = p.id;
+      n.feature = static_cast<int>(f);
+      n.point_in_keyframe = scene.camera.unproject(k.pixel.cast<double>(), k.depth);
+      n.scale = static_cast<float>(std::pow(TestScene::kScaleFactor, k.octave));
+      n.descriptor = view.features->descriptors[f];
+      p.new_points.push_back(n);
+      if (id_of[static_cast<size_t>(i)] == kNoPoint) id_of[static_cast<size_t>(i)] = n.id;
+    }
+    return p;
+  }
+  KeyframePacket packet(const Rigid3& truth, const ViewOptions& options = {}) {
+    return packet(truth, truth, options, [](int) { return true; });
+  }
+  // The scene's point behind a map point, by the keyframe and feature that it is named after.
+  int shown_by(PointId id) const {
+    return shows[static_cast<size_t>(birth_keyframe(id))][static_cast<size_t>(birth_feature(id))];
+  }
+
+  TestScene scene{400};
+  std::vector<std::vector<int>> shows;
+  std::vector<Rigid3> estimates;
+  std::vector<PointId> id_of = std::vector<PointId>(400, kNoPoint);
+};
+
 }  // namespace dkb

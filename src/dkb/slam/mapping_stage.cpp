@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/mapping_stage.h"
 
+#include <limits>
+
 namespace dkb {
 namespace {
 // More than can ever be outstanding: tracking waits for each keyframe at its due time, or holds back new ones.
@@ -35,9 +37,7 @@ std::optional<MapView> MappingStage::take_due(FrameIndex now, bool wait) {
   return newest;
 }
 
-std::optional<MapView> MappingStage::drain() {
-  return due_.empty() ? std::nullopt : take_due(due_.back(), true);
-}
+std::optional<MapView> MappingStage::drain() { return take_due(std::numeric_limits<FrameIndex>::max(), true); }
 
 void MappingStage::stop() {
   packets_.close();
