@@ -31,7 +31,8 @@ void bind(Settings* settings, CameraModel* c) {
   settings->bind("depth_factor", &c->depth_factor, "[units per metre] of integer depth images");
   settings->bind("fps", &c->fps, "[1/s] nominal frame rate");
   settings->bind("depth_min", &c->depth_min, "[m] nearer depth is treated as missing");
-  settings->bind("readout", &c->readout, "[s] rolling shutter: first row's exposure to the last row's; 0 = global shutter");
+  settings->bind("readout", &c->readout,
+                 "[s] rolling shutter: first row's exposure to the last row's; 0 = global shutter");
   settings->bind("depth_max", &c->depth_max, "[m] farther depth is treated as missing");
 }
 

@@ -2,3 +2,228 @@
 #include "dkb/dataset/image_codecs.h"
 
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+
+#include "dkb/dataset/mutation.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+
+ColourImage colour_picture(int width = 37, int height = 23) {
+  ColourImage image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      image(x, y) = {static_cast<uint8_t>(5 * x), static_cast<uint8_t>(7 * y), static_cast<uint8_t>(100 + x - y)};
+  return image;
+}
+
+Image<float> float_depth(int width = 19, int height = 17) {
+  Image<float> image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) image(x, y) = 1.0f + 0.01f * static_cast<float>(x) + 0.1f * static_cast<float>(y);
+  return image;
+}
+
+std::string error(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+// Bytes of a .npy file of float32, little endian.
+std::string encode_npy(const Image<float>& image) {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + std::to_string(image.height()) + ", " +
+                       std::to_string(image.width()) + "), }";
+  header += std::string(64 - (header.size() + 11) % 64, ' ') + "\n";
+  std::string out("\x93NUMPY\x01\x00", 8);
+  out += static_cast<char>(header.size());
+  out += '\0';
+  const std::string tiff = encode_tiff(image);  // little-endian samples from byte 8 on
+  return out + header + tiff.substr(8, 4 * image.size());
+}
+
+TEST(Png, ColourAndGreyComeBackExactly) {
+  const ColourImage colour = colour_picture();
+  const Picture back = decode_picture(encode_png(colour), "a.png");
+  EXPECT_EQ(back.colour, colour);
+  EXPECT_EQ(back.grey, grey_from_colour(colour));
+  const Picture grey = decode_picture(encode_png(back.grey), "b.png");
+  EXPECT_EQ(grey.grey, back.grey);
+  EXPECT_TRUE(grey.colour.empty());
+}
+
+TEST(Png, SixteenBitPicturesAreScaledToEight) {
+  Image<uint16_t> image(3, 1);
+  image(0, 0) = 0, image(1, 0) = 257 * 100, image(2, 0) = 65535;  // 8-bit v stands for 257 v
+  const Picture back = decode_picture(encode_png(image), "a.png");
+  EXPECT_EQ(back.grey(0, 0), 0);
+  EXPECT_EQ(back.grey(1, 0), 100);
+  EXPECT_EQ(back.grey(2, 0), 255);
+}
+
+TEST(Png, DepthIsDividedByTheFactorAndLimited) {
+  Image<uint16_t> image(5, 1);
+  image(0, 0) = 0, image(1, 0) = 5000, image(2, 0) = 999, image(3, 0) = 1000, image(4, 0) = 50001;
+  CameraModel camera;  // 5000 units per metre, 0.2 ... 10 m
+  const DepthImage depth = decode_depth(encode_png(image), "d.png", camera);
+  EXPECT_EQ(depth(0, 0), 0.0f);
+  EXPECT_EQ(depth(1, 0), 1.0f);
+  EXPECT_EQ(depth(2, 0), 0.0f) << "0.1998 m is too near";
+  EXPECT_EQ(depth(3, 0), 0.2f) << "the limit itself is in";
+  EXPECT_EQ(depth(4, 0), 0.0f) << "10.0002 m is too far";
+  camera.depth_factor = 1000;
+  EXPECT_EQ(decode_depth(encode_png(image), "d.png", camera)(1, 0), 5.0f);
+}
+
+TEST(Png, HandMadePaletteAndInterlaceAreResolved) {
+  // 2 x 2 pixels of a palette, Adam7, made by hand: palette (1,2,3) (4,5,6), indices 0 1 / 1 0, one bit each.
+  static constexpr unsigned char kBytes[] = {0x89, 'P', 'N', 'G',  0x0D, 0x0A, 0x1A, 0x0A, 0,    0,    0,    13,  'I',
+                                             'H',  'D', 'R', 0,    0,    0,    2,    0,    0,    0,    2,    1,   3,
+                                             0,    0,   1,   0xD4, 0x37, 0xC3, 0x64, 0,    0,    0,    6,    'P', 'L',
+                                             'T',  'E', 1,   2,    3,    4,    5,    6,    0x92, 0x35, 0xF8, 0x3C};
+  const std::string prefix(reinterpret_cast<const char*>(kBytes), sizeof kBytes);
+  const ImageHeader header = read_image_header(prefix, "p.png");
+  EXPECT_TRUE(header.palette);
+  EXPECT_EQ(why_not_depth(header), "an 8-bit palette PNG");
+  EXPECT_EQ(why_not_picture(header), "");
+}
+
+TEST(Jpeg, ComesBackNearlyTheSame) {
+  const ColourImage colour = colour_picture(64, 48);
+  const Picture back = decode_picture(encode_jpeg(colour, 98), "a.jpg");
+  ASSERT_EQ(back.colour.width(), 64);
+  for (size_t i = 0; i < colour.size(); ++i) {
+    EXPECT_NEAR(back.colour.data()[i].r, colour.data()[i].r, 12);
+    EXPECT_NEAR(back.colour.data()[i].g, colour.data()[i].g, 12);
+    EXPECT_NEAR(back.colour.data()[i].b, colour.data()[i].b, 12);
+  }
+  EXPECT_EQ(back.grey, grey_from_colour(back.colour));
+  const Picture grey = decode_picture(encode_jpeg(GreyImage(40, 30, 77), 95), "g.jpg");
+  EXPECT_TRUE(grey.colour.empty());
+  EXPECT_EQ(grey.grey, GreyImage(40, 30, 77));
+}
+
+TEST(FloatDepth, EveryFormatGivesTheSameMetres) {
+  Image<float> image = float_depth();
+  image(3, 4) = std::numeric_limits<float>::quiet_NaN();
+  image(5, 4) = std::numeric_limits<float>::infinity();
+  image(6, 4) = -1.0f;
+  image(7, 4) = 0.1f;
+  CameraModel camera;
+  camera.depth_factor = 1000;  // of integers only
+  for (const std::string& bytes : {encode_tiff(image), encode_pfm(image), encode_npy(image)}) {
+    const DepthImage depth = decode_depth(bytes, "d", camera);
+    ASSERT_EQ(depth.width(), image.width());
+    ASSERT_EQ(depth.height(), image.height());
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < image.width(); ++x) {
+        const bool bad = y == 4 && (x == 3 || x == 5 || x == 6 || x == 7);
+        EXPECT_EQ(depth(x, y), bad ? 0.0f : image(x, y));
+      }
+  }
+}
+
+TEST(FloatDepth, BigEndianTiffInSeveralStripsIsRead) {
+  // 1 x 2 pixels, 1.0 and 2.0 m, one row a strip; the strips stand after the directory in reverse order.
+  std::string t("MM\0*\0\0\0\x08", 8);
+  const auto put = [&t](uint32_t value, int n) {
+    for (int i = n - 1; i >= 0; --i) t += static_cast<char>(value >> (8 * i) & 0xFF);
+  };
+  const auto field = [&](uint32_t tag, uint32_t count, uint32_t value) {
+    put(tag, 2), put(4, 2), put(count, 4), put(value, 4);
+  };
+  put(7, 2);
+  field(256, 1, 1), field(257, 1, 2), field(258, 1, 32), field(259, 1, 1), field(273, 2, 98), field(278, 1, 1),
+      field(339, 1, 3);
+  put(0, 4);                               // 8 + 2 + 7 * 12 + 4 = 98: here the offsets of the strips
+  put(110, 4), put(106, 4);                // of row 0 and row 1
+  put(0x40000000, 4), put(0x3F800000, 4);  // 2.0 at 106, 1.0 at 110
+  const DepthImage depth = decode_depth(t, "d.tiff", CameraModel());
+  EXPECT_EQ(depth(0, 0), 1.0f);
+  EXPECT_EQ(depth(0, 1), 2.0f);
+}
+
+TEST(ImageCodecs, WrongTypesAreCalledByName) {
+  const CameraModel camera;
+  const std::string ending = "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY";
+  EXPECT_EQ(error([&] { decode_depth(encode_png(GreyImage(20, 20)), "d.png", camera); }),
+            "d.png: is an 8-bit grey PNG" + ending);
+  EXPECT_EQ(error([&] { decode_depth(encode_jpeg(colour_picture()), "d.png", camera); }),
+            "d.png: is an 8-bit colour JPEG" + ending);
+  EXPECT_EQ(error([&] { decode_picture(encode_pfm(float_depth()), "a.png"); }),
+            "a.png: is a 32-bit float grey PFM; a picture must be PNG or JPEG");
+  EXPECT_EQ(error([&] { decode_picture("", "a.png"); }), "a.png: is empty");
+  EXPECT_EQ(error([&] { decode_picture("GIF89a", "a.png"); }),
+            "a.png: is not an image of a known kind (PNG, JPEG; depth also TIFF, PFM, NPY)");
+  EXPECT_NE(error([&] { read_picture("/no/a.png"); }).find("/no/a.png"), std::string::npos);
+}
+
+TEST(ImageCodecs, ContentDecidesNotTheName) {
+  EXPECT_EQ(decode_picture(encode_png(colour_picture()), "a.jpg").colour, colour_picture());
+}
+
+TEST(ImageCodecs, EveryTruncationIsAnInputError) {
+  Image<uint16_t> depth(30, 20);
+  for (size_t i = 0; i < depth.size(); ++i) depth.data()[i] = static_cast<uint16_t>(1000 + 37 * i);
+  const CameraModel camera;
+  for (const std::string& whole : {encode_png(colour_picture()), encode_jpeg(colour_picture(), 90), encode_png(depth),
+                                   encode_tiff(float_depth()), encode_pfm(float_depth()), encode_npy(float_depth())})
+    for (size_t length = 0; length + 4 < whole.size(); ++length) {  // a TIFF's last 4 bytes are of no use
+      const std::string part = whole.substr(0, length);
+      EXPECT_THROW(decode_picture(part, "a"), InputError) << length;
+      EXPECT_THROW(decode_depth(part, "a", camera), InputError) << length << " of " << whole.size();
+    }
+}
+
+TEST(ImageCodecs, SidesAreBounded) {
+  std::string png = encode_png(GreyImage(20, 20));
+  png[16] = 0x7F;  // width 0x7F000014
+  EXPECT_NE(error([&] { decode_picture(png, "a.png"); }).find("sides must be 1 ... 16384"), std::string::npos);
+  EXPECT_NE(error([&] { decode_depth("Pf\n0 5\n-1\n", "a", CameraModel()); }).find("sides must be"), std::string::npos);
+  EXPECT_EQ(error([&] { decode_depth("Pf\n16384 16384\n-1\n", "a", CameraModel()); }), "a: is truncated");
+}
+
+TEST(ImageCodecs, MutatedImagesThrowNothingButInputErrors) {
+  Image<uint16_t> depth(24, 18);
+  for (size_t i = 0; i < depth.size(); ++i) depth.data()[i] = static_cast<uint16_t>(1000 + 37 * i);
+  const CameraModel camera;
+  Random random(51);
+  for (const std::string& original :
+       {encode_png(colour_picture(24, 18)), encode_png(colour_picture(24, 18), 0),
+        encode_jpeg(colour_picture(24, 18), 90), encode_jpeg(GreyImage(24, 18, 9), 50), encode_png(depth),
+        encode_png(depth, 0), encode_tiff(float_depth()), encode_pfm(float_depth()), encode_npy(float_depth())})
+    for (int i = 0; i < 1500; ++i) {
+      const std::string bytes = mutated(original, random);
+      for (const bool is_depth : {false, true}) try {
+          if (is_depth)
+            decode_depth(bytes, "m", camera);
+          else
+            decode_picture(bytes, "m");
+        } catch (const InputError& e) {
+          EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+        }
+    }
+}
+
+TEST(ImageCodecs, FilesAreWrittenAndReadBack) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "dkb_codec.png";
+  write_image_file(path, encode_png(colour_picture()));
+  EXPECT_EQ(read_picture(path).colour, colour_picture());
+  EXPECT_EQ(read_grey(path), grey_from_colour(colour_picture()));
+  std::filesystem::remove(path);
+  EXPECT_THROW(write_image_file("/no/folder/a.png", "x"), OutputError);
+  EXPECT_THROW(encode_png(GreyImage(), 6), InputError);
+  EXPECT_THROW(encode_jpeg(GreyImage(8, 8), 101), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb

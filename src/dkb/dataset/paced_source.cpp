@@ -31,7 +31,8 @@ void PacedSource::run() {
       start = Clock::now();
       first_stamp = frame->timestamp;
     }
-    const auto due = *start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(frame->timestamp - first_stamp));
+    const auto due = *start + std::chrono::duration_cast<Clock::duration>(
+                                  std::chrono::duration<double>(frame->timestamp - first_stamp));
     {
       std::unique_lock lock(mutex_);
       if (wake_.wait_until(lock, due, [&] { return stopped_; })) break;
