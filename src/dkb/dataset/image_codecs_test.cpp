@@ -84,17 +84,21 @@ TEST(Png, DepthIsDividedByTheFactorAndLimited) {
   EXPECT_EQ(decode_depth(encode_png(image), "d.png", camera)(1, 0), 5.0f);
 }
 
-TEST(Png, HandMadePaletteAndInterlaceAreResolved) {
-  // 2 x 2 pixels of a palette, Adam7, made by hand: palette (1,2,3) (4,5,6), indices 0 1 / 1 0, one bit each.
-  static constexpr unsigned char kBytes[] = {0x89, 'P', 'N', 'G',  0x0D, 0x0A, 0x1A, 0x0A, 0,    0,    0,    13,  'I',
-                                             'H',  'D', 'R', 0,    0,    0,    2,    0,    0,    0,    2,    1,   3,
-                                             0,    0,   1,   0xD4, 0x37, 0xC3, 0x64, 0,    0,    0,    6,    'P', 'L',
-                                             'T',  'E', 1,   2,    3,    4,    5,    6,    0x92, 0x35, 0xF8, 0x3C};
-  const std::string prefix(reinterpret_cast<const char*>(kBytes), sizeof kBytes);
-  const ImageHeader header = read_image_header(prefix, "p.png");
-  EXPECT_TRUE(header.palette);
-  EXPECT_EQ(why_not_depth(header), "an 8-bit palette PNG");
-  EXPECT_EQ(why_not_picture(header), "");
+TEST(Png, PalettesAndInterlaceAreResolved) {
+  // 3 x 3 pixels of one bit in Adam7 order: indices 0 1 0 / 1 1 0 / 0 0 1 into the palette (1, 2, 3) (4, 5, 6).
+  static constexpr unsigned char kBytes[] = {
+      0x89, 0x50, 0x4E, 0x47, 0x0D, 0x0A, 0x1A, 0x0A, 0x00, 0x00, 0x00, 0x0D, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00, 0x00,
+      0x03, 0x00, 0x00, 0x00, 0x03, 0x01, 0x03, 0x00, 0x00, 0x01, 0x1B, 0xE1, 0x17, 0x6A, 0x00, 0x00, 0x00, 0x06, 0x50,
+      0x4C, 0x54, 0x45, 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x95, 0x53, 0x6F, 0x48, 0x00, 0x00, 0x00, 0x11, 0x49, 0x44,
+      0x41, 0x54, 0x78, 0x9C, 0x63, 0x60, 0x00, 0x02, 0x07, 0x86, 0x06, 0x20, 0x79, 0x00, 0x00, 0x05, 0x0C, 0x01, 0x81,
+      0x51, 0x91, 0x08, 0xF0, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4E, 0x44, 0xAE, 0x42, 0x60, 0x82};
+  const std::string bytes(reinterpret_cast<const char*>(kBytes), sizeof kBytes);
+  const Rgb a{1, 2, 3}, b{4, 5, 6};
+  const Rgb expected[3][3] = {{a, b, a}, {b, b, a}, {a, a, b}};
+  const Picture picture = decode_picture(bytes, "p.png");
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 3; ++x) EXPECT_EQ(picture.colour(x, y), expected[y][x]);
+  EXPECT_EQ(why_not_depth(read_image_header(bytes, "p.png")), "an 8-bit palette PNG");
 }
 
 TEST(Jpeg, ComesBackNearlyTheSame) {
