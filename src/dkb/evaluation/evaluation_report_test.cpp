@@ -1,2 +1,84 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "dkb/evaluation/evaluation_report.h"
+
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace dkb {
+namespace {
+
+Evaluation example(const char* delta = "1f") {
+  Trajectory truth, estimate;
+  for (int i = 0; i < 30; ++i) {
+    StampedPose p;
+    p.timestamp = 0.1 * i + (i >= 20 ? 5.0 : 0.0);  // a gap after the 20th
+    p.world_from_cam.translation = {0.1 * i, std::sin(0.3 * i), 0.01 * i};
+    truth.push_back(p);
+    p.world_from_cam.translation.z() += i % 2 == 0 ? 0.02 : -0.02;
+    estimate.push_back(p);
+  }
+  return evaluate(truth, estimate, {.rpe_delta = parse_rpe_delta(delta)});
+}
+
+size_t occurrences(const std::string& text, const std::string& what) {
+  size_t n = 0;
+  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+TEST(EvaluationReport, JsonHasEveryFigure) {
+  const Evaluation e = example();
+  const auto json = nlohmann::json::parse(evaluation_json(e));
+  EXPECT_EQ(json["matched"], 30);
+  EXPECT_EQ(json["estimated"], 30);
+  for (const char* kind : {"ape", "rpe"})
+    for (const char* part : {"translation_m", "rotation_deg"})
+      for (const char* figure : {"rmse", "mean", "median", "std", "min", "max"})
+        EXPECT_TRUE(json[kind][part][figure].is_number()) << kind << part << figure;
+  EXPECT_EQ(json["ape"]["translation_m"]["rmse"], e.ape.translation.rmse) << "to the last bit";
+  EXPECT_EQ(json["rpe"]["pairs"], 29);
+}
+
+TEST(EvaluationReport, WhatCouldNotBeMeasuredIsNull) {
+  const Evaluation e = example("1000m");
+  const auto json = nlohmann::json::parse(evaluation_json(e));
+  EXPECT_TRUE(json["rpe"]["translation_m"]["rmse"].is_null());
+  EXPECT_NE(evaluation_table(e).find("no pair of poses is that far apart"), std::string::npos);
+}
+
+TEST(EvaluationReport, TableNamesApeAndUnits) {
+  const std::string table = evaluation_table(example());
+  EXPECT_EQ(table.rfind("30 poses matched (30 estimated, 30 true, stamps within 0.02 s)\n", 0), 0u) << table;
+  EXPECT_NE(table.find("\nAPE translation     m "), std::string::npos) << table;
+  EXPECT_NE(table.find("\nRPE 1f rotation   deg "), std::string::npos) << table;
+}
+
+TEST(EvaluationReport, PictureIsWholeAndEscapesNames) {
+  const std::string svg = evaluation_svg(example(), {.title = "a<b> & \"c\""});
+  EXPECT_EQ(svg.rfind("<svg xmlns=", 0), 0u);
+  EXPECT_EQ(svg.substr(svg.size() - 7), "</svg>\n");
+  EXPECT_NE(svg.find("a&lt;b&gt; &amp; &quot;c&quot;"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+  // Truth and estimate in two projections, and the error, each in two stretches.
+  EXPECT_EQ(occurrences(svg, "<polyline"), 10u);
+  EXPECT_EQ(occurrences(svg, "<text"), occurrences(svg, "</text>"));
+}
+
+TEST(EvaluationReport, AStillCameraCanBeDrawn) {
+  Trajectory still;
+  for (int i = 0; i < 5; ++i) {
+    StampedPose p;
+    p.timestamp = i;
+    still.push_back(p);
+  }
+  const std::string svg = evaluation_svg(evaluate(still, still));
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+  EXPECT_LT(svg.size(), 50000u);
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,2 +1,192 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "dkb/evaluation/trajectory_error.h"
+
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+namespace fs = std::filesystem;
+using Pairs = std::vector<std::pair<size_t, size_t>>;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+StampedPose pose(double t, const Eigen::Vector3d& position, const Eigen::Vector3d& rotation_vector = {0, 0, 0}) {
+  return {t, "", Rigid3(rotation_from_vector(rotation_vector), position)};
+}
+
+Trajectory stamps(const std::vector<double>& times) {
+  Trajectory t;
+  for (const double time : times) t.push_back(pose(time, {time, 0, 0}));
+  return t;
+}
+
+Trajectory random_walk(int n, uint64_t seed) {
+  Random random(seed);
+  Trajectory t;
+  Eigen::Vector3d position(1, 2, 3), rotation(0, 0, 0);
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < 3; ++k) position[k] += 0.1 * random.normal(), rotation[k] += 0.1 * random.normal();
+    t.push_back(pose(100 + 0.1 * i, position, rotation));
+  }
+  return t;
+}
+
+TEST(ErrorStatistics, AreThoseOfThePopulation) {
+  // 1 2 3 6: mean 3, squares 1 + 4 + 9 + 36 = 50, deviations 4 + 1 + 0 + 9 = 14.
+  const ErrorStatistics s = error_statistics({3, 1, 6, 2});
+  EXPECT_EQ(s.mean, 3);
+  EXPECT_EQ(s.rmse, std::sqrt(12.5));
+  EXPECT_EQ(s.std, std::sqrt(3.5));
+  EXPECT_EQ(s.median, 2.5);
+  EXPECT_EQ(s.min, 1);
+  EXPECT_EQ(s.max, 6);
+  EXPECT_EQ(error_statistics({5, 1, 3}).median, 3);
+  EXPECT_EQ(error_statistics({}).count, 0u);
+}
+
+TEST(MatchStamps, WalksTheShorterAndMayTakeAPoseTwice) {
+  EXPECT_EQ(match_stamps(stamps({1.00, 1.01}), stamps({0.99, 1.002, 1.5}), 0.02), (Pairs{{0, 1}, {1, 1}}));
+  EXPECT_EQ(match_stamps(stamps({0.99, 1.002, 1.5}), stamps({1.00, 1.01}), 0.02), (Pairs{{1, 0}, {1, 1}}));
+  EXPECT_EQ(match_stamps(stamps({1.0, 1.01}), stamps({1.005, 3}), 0.02), (Pairs{{0, 0}}))
+      << "equally long: the second is walked";
+  EXPECT_EQ(match_stamps(stamps({1.0}), stamps({1.25, 1.5}), 0.25).size(), 1u) << "the limit itself is in";
+  EXPECT_TRUE(match_stamps(stamps({}), stamps({1.0}), 0.02).empty());
+}
+
+TEST(MatchStamps, TakesTheFirstOfEqualStampsAndOfEqualDistances) {
+  EXPECT_EQ(match_stamps(stamps({1.0}), stamps({0.5, 1.5, 2.0}), 1), (Pairs{{0, 0}}));
+  EXPECT_EQ(match_stamps(stamps({1.0}), stamps({0.25, 0.75, 0.75, 0.75, 2.0}), 1), (Pairs{{0, 1}}));
+  EXPECT_EQ(match_stamps(stamps({1.0}), stamps({0.0, 1.125, 1.125}), 1), (Pairs{{0, 1}}));
+}
+
+TEST(MatchStamps, EqualsTheExhaustiveSearch) {
+  Random random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<double> a, b;
+    for (int i = 0; i < 30; ++i) a.push_back(0.01 * random.below(200));
+    for (int i = 0; i < 60; ++i) b.push_back(0.01 * random.below(200));
+    std::sort(a.begin(), a.end());
+    std::sort(b.begin(), b.end());
+    Pairs expected;
+    for (size_t i = 0; i < a.size(); ++i) {
+      size_t best = 0;
+      for (size_t j = 1; j < b.size(); ++j)
+        if (std::abs(b[j] - a[i]) < std::abs(b[best] - a[i])) best = j;
+      if (std::abs(b[best] - a[i]) <= 0.02) expected.emplace_back(i, best);
+    }
+    EXPECT_EQ(match_stamps(stamps(a), stamps(b), 0.02), expected);
+  }
+}
+
+TEST(Evaluate, AMovedCopyHasNoError) {
+  const Trajectory truth = random_walk(200, 1);
+  const Rigid3 motion(rotation_from_vector({1, -2, 0.5}), {5, 6, 7});
+  Trajectory estimate = truth;
+  for (StampedPose& p : estimate) p.world_from_cam = motion * p.world_from_cam;
+  const Evaluation e = evaluate(truth, estimate);
+  EXPECT_LT(e.ape.translation.max, 1e-12);
+  EXPECT_LT(e.ape.rotation.max, 1e-10);
+  EXPECT_LT(e.rpe.translation.max, 1e-12);
+  EXPECT_LT(e.rpe.rotation.max, 1e-10);
+  EXPECT_EQ(e.timestamps.size(), 200u);
+}
+
+TEST(Evaluate, ScaleIsTakenOutOnlyWhenAsked) {
+  const Trajectory truth = random_walk(100, 2);
+  Trajectory estimate = truth;
+  for (StampedPose& p : estimate) p.world_from_cam.translation *= 0.5;
+  EXPECT_GT(evaluate(truth, estimate).ape.translation.rmse, 0.1);
+  const Evaluation e = evaluate(truth, estimate, {.rpe_delta = {}, .with_scale = true});
+  EXPECT_NEAR(e.truth_from_estimate.scale, 2.0, 1e-12);
+  EXPECT_LT(e.ape.translation.max, 1e-12);
+  EXPECT_LT(e.rpe.translation.max, 1e-12);
+}
+
+TEST(Evaluate, HandComputedErrors) {
+  // A square in the xy plane; the estimate's corners stand 0.1 m above and below it in turn, so that the best alignment
+  // is none, and its cameras are turned by 10 degrees about z.
+  Trajectory truth, estimate;
+  const Eigen::Vector3d corners[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  for (int i = 0; i < 4; ++i) {
+    truth.push_back(pose(i, corners[i]));
+    estimate.push_back(pose(i, corners[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 0.1 : -0.1), {0, 0, 10 * kDegree}));
+  }
+  const Evaluation e = evaluate(truth, estimate);
+  EXPECT_NEAR(e.ape.translation.rmse, 0.1, 1e-12);
+  EXPECT_NEAR(e.ape.translation.min, 0.1, 1e-12);
+  EXPECT_NEAR(e.ape.rotation.rmse, 10, 1e-9);
+  EXPECT_NEAR(e.ape.rotation.max, 10, 1e-9);
+  // A step (1, 0, 0) is seen as (cos 10, -sin 10, +-0.2) by cameras that are turned: the error is
+  // sqrt((1 - cos 10)^2 + sin^2 10 + 0.04) = sqrt(2 - 2 cos 10 + 0.04) for each of the three steps.
+  EXPECT_EQ(e.rpe.translation.count, 3u);
+  EXPECT_NEAR(e.rpe.translation.rmse, std::sqrt(2 - 2 * std::cos(10 * kDegree) + 0.04), 1e-12);
+  EXPECT_NEAR(e.rpe.rotation.max, 0, 1e-9);
+}
+
+TEST(Evaluate, RelativeErrorsAreOverStretchesThatDoNotOverlap) {
+  // Steps of 0.25 m every 0.1 s.
+  Trajectory t;
+  for (int i = 0; i < 10; ++i) t.push_back(pose(1305031102.1 + 0.1 * i, {0.25 * i, 0.0, 0}));
+  const auto pairs = [&](const char* delta) { return evaluate(t, t, {.rpe_delta = parse_rpe_delta(delta)}).rpe_pairs; };
+  EXPECT_EQ(pairs("1f").size(), 9u);
+  EXPECT_EQ(pairs("4f"), (Pairs{{0, 4}, {4, 8}}));
+  EXPECT_EQ(pairs("0.3s"), (Pairs{{0, 3}, {3, 6}, {6, 9}}));
+  // The path of the aligned estimate is the first to reach 0.6 m at pose 3, and again three poses later.
+  EXPECT_EQ(pairs("0.6m"), (Pairs{{3, 6}, {6, 9}}));
+  EXPECT_TRUE(pairs("100m").empty());
+  EXPECT_EQ(evaluate(t, t, {.rpe_delta = parse_rpe_delta("100f")}).rpe.translation.count, 0u);
+}
+
+TEST(Evaluate, TooFewMatchesAreAnInputError) {
+  EXPECT_THROW(evaluate(stamps({1, 2, 3}), stamps({11, 12})), InputError);
+  EXPECT_THROW(evaluate(stamps({1, 2, 3}), stamps({})), InputError);
+  EXPECT_THROW(evaluate(stamps({1}), stamps({1})), InputError);
+  EXPECT_THROW(evaluate(stamps({1, 2}), stamps({1, 2}), {.max_difference = -1, .rpe_delta = {}}), InvalidOption);
+  EXPECT_EQ(evaluate(stamps({1, 2}), stamps({1, 2})).ape.translation.count, 2u);
+}
+
+TEST(RpeDelta, IsANumberWithItsUnit) {
+  EXPECT_EQ(parse_rpe_delta("3f").unit, DeltaUnit::frames);
+  EXPECT_EQ(parse_rpe_delta("0.5m").value, 0.5);
+  EXPECT_EQ(parse_rpe_delta("2s").unit, DeltaUnit::seconds);
+  EXPECT_EQ(to_string(parse_rpe_delta("0.50m")), "0.5m");
+  for (const char* bad : {"", "f", "1", "1x", "-1f", "0m", "1.5f", "nanm", "infs", "1 f"})
+    EXPECT_THROW(parse_rpe_delta(bad), InputError) << bad;
+}
+
+TEST(Evaluate, AgreesWithTheReferenceOnARecordedTrajectory) {
+  const fs::path folder = fs::path(DKB_SHARED_DATA) / "trajectories";
+  if (!fs::exists(folder)) GTEST_SKIP() << "skipped: no recorded trajectories at hand";
+  const Evaluation e =
+      evaluate(read_trajectory(folder / "fr2_desk_groundtruth.txt"), read_trajectory(folder / "fr2_desk_ORB.txt"));
+  // Figures of an independent implementation (numpy) that agrees with evo.
+  EXPECT_EQ(e.ape.translation_m.size(), 2225u);
+  const auto agree = [](const ErrorStatistics& s, double rmse, double mean, double median, double std, double min,
+                        double max) {
+    EXPECT_NEAR(s.rmse, rmse, 1e-9);
+    EXPECT_NEAR(s.mean, mean, 1e-9);
+    EXPECT_NEAR(s.median, median, 1e-9);
+    EXPECT_NEAR(s.std, std, 1e-9);
+    EXPECT_NEAR(s.min, min, 1e-9);
+    EXPECT_NEAR(s.max, max, 1e-9);
+  };
+  agree(e.ape.translation, 0.008145956633364333, 0.007516934202181128, 0.007436574711424516, 0.003138838905189613,
+        0.0003377329022689524, 0.024337839618062147);
+  agree(e.ape.rotation, 0.9936337330112127, 0.9634514379694341, 0.952077986132852, 0.2430418113255973,
+        0.13396601079003995, 2.023574490832703);
+  agree(e.rpe.translation, 0.0035975930748651094, 0.003099502096405833, 0.0027861987150971986, 0.0018264070429926725,
+        0.00013196900558809174, 0.021168736300526982);
+  agree(e.rpe.rotation, 0.2866180875522621, 0.23407711422621247, 0.19066131963621424, 0.16540203356562722,
+        0.006038945781812774, 1.2594035027088464);
+}
+
+}  // namespace
+}  // namespace dkb
