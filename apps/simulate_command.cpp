@@ -26,9 +26,10 @@ void run_simulate(const SimulateArguments& arguments) {
     if (live) std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
   });
   if (live) std::fputs("\n", stderr);
-  std::printf("%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
-              arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),
-              static_cast<unsigned long long>(arguments.options.seed));
+  std::printf(
+      "%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
+      arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),
+      static_cast<unsigned long long>(arguments.options.seed));
 }
 
 }  // namespace
@@ -41,7 +42,8 @@ void register_simulate(CLI::App& app, int& exit_code) {
   SimulatorOptions& o = arguments->options;
   command->add_option("--out", arguments->out, "folder to write; files of the same names are replaced")->required();
   command->add_option("--scene", o.scene, scenes + ", or a YAML scene file")->capture_default_str();
-  command->add_option("--path", o.path, "trajectory (TUM format) that the camera follows, the room furnished around it");
+  command->add_option("--path", o.path,
+                      "trajectory (TUM format) that the camera follows, the room furnished around it");
   command->add_option("--frames", o.frames, "frames at 30 Hz; 0: as many as the scene needs (300; loop and twins 900)")
       ->capture_default_str();
   command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)");

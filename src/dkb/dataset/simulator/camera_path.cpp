@@ -22,7 +22,8 @@ Tremor hand_tremor(double t, double metres, double radians, uint64_t seed) {
   const auto wave = [&](uint64_t channel, double size) {
     double sum = 0;
     for (uint64_t k = 0; k < 5; ++k) {
-      const double f = 0.4 + 0.75 * static_cast<double>(k) + 0.5 * static_cast<double>(unit_float(hash64(seed, channel, k)));
+      const double f =
+          0.4 + 0.75 * static_cast<double>(k) + 0.5 * static_cast<double>(unit_float(hash64(seed, channel, k)));
       const double phase = 6.2832 * static_cast<double>(unit_float(hash64(seed, channel, k + 100)));
       sum += std::sin(6.283185307 * f * t + phase) / (1 + 0.9 * static_cast<double>(k));
     }
@@ -53,7 +54,8 @@ CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {
     const TimedPose& a = poses[j];
     const TimedPose& b = poses[std::min(j + 1, poses.size() - 1)];
     const double w = b.time > a.time ? std::clamp((t - a.time) / (b.time - a.time), 0.0, 1.0) : 0;
-    raw.p.emplace_back(a.world_from_cam.translation + w * (b.world_from_cam.translation - a.world_from_cam.translation));
+    raw.p.emplace_back(a.world_from_cam.translation +
+                       w * (b.world_from_cam.translation - a.world_from_cam.translation));
     Eigen::Quaterniond q = a.world_from_cam.rotation.slerp(w, b.world_from_cam.rotation);
     if (!raw.q.empty() && raw.q.back().dot(q) < 0) q.coeffs() = -q.coeffs();
     raw.q.push_back(q);

@@ -16,7 +16,9 @@ using Eigen::Vector3d;
 void box(Surfaces* s, const Vector3d& corner, const Vector3d& size, const std::array<int, 6>& t) {
   s->add_box(corner, Vector3d(size.x(), 0, 0), Vector3d(0, size.y(), 0), Vector3d(0, 0, size.z()), t);
 }
-std::array<int, 6> all(int t) { return {t, t, t, t, t, t}; }
+std::array<int, 6> all(int t) {
+  return {t, t, t, t, t, t};
+}
 
 void tube(Surfaces* s, const Vector3d& a, const Vector3d& b, double radius, int texture, double end_scale = 1) {
   const Vector3d side = std::abs((b - a).normalized().x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
@@ -37,7 +39,11 @@ Rigid3 placed(double x, double y, double z, double yaw) {
 }
 
 Furnisher::Furnisher(Materials* materials, Furnishing* target, uint64_t seed, uint64_t variation)
-    : materials_(materials), target_(target), seed_(hash64(seed, 77)), random_(hash64(seed, 1)), details_(hash64(seed, 2, variation)) {}
+    : materials_(materials),
+      target_(target),
+      seed_(hash64(seed, 77)),
+      random_(hash64(seed, 1)),
+      details_(hash64(seed, 2, variation)) {}
 
 int Furnisher::texture(Material material, uint32_t kinds, double width, double height) {
   return materials_->get(material, hash64(seed_, random_.below(kinds)), width, height);
@@ -103,7 +109,8 @@ void Furnisher::block(double x0, double y0, double x1, double y1, double height)
   target_->footprints.push_back({x0, y0, x1, y1});
 }
 
-void Furnisher::picture_on_wall(const Rigid3& wall_frame, double x, double z, double width, double height, Material material) {
+void Furnisher::picture_on_wall(const Rigid3& wall_frame, double x, double z, double width, double height,
+                                Material material) {
   Surfaces s;
   const int edge = materials_->get(Material::metal, 1, 0.1, 0.1), t = detail(material, 4096, width, height);
   const double thick = material == Material::poster || material == Material::page ? 0.002 : 0.02;
@@ -115,7 +122,8 @@ void Furnisher::books(const Rigid3& at, double length, double depth, double heig
   Surfaces s;
   double x = 0;
   while (true) {
-    const double w = random_.uniform(0.018, 0.055), h = height * random_.uniform(0.62, 0.95), d = depth * random_.uniform(0.6, 0.95);
+    const double w = random_.uniform(0.018, 0.055), h = height * random_.uniform(0.62, 0.95),
+                 d = depth * random_.uniform(0.6, 0.95);
     if (x + w > length) break;
     const bool gap = random_.below(12) == 0;
     if (!gap) {
@@ -151,7 +159,8 @@ void Furnisher::shelf(const Rigid3& at, double width, double depth, double heigh
                 width - 2 * thick - split, depth, Clutter::normal);
         break;
       }
-      default: books(row, width - 2 * thick, depth, room);
+      default:
+        books(row, width - 2 * thick, depth, room);
     }
   }
   add(s, at);
@@ -176,7 +185,8 @@ void Furnisher::desk(const Rigid3& at, double width, double depth, Clutter kind)
   const double half = width / 2, height = 0.74;
   box(&s, Vector3d(-half, 0, height - 0.03), Vector3d(width, depth, 0.03), {edge, edge, edge, edge, edge, top});
   for (const double x : {-half + 0.04, half - 0.09})
-    for (const double y : {0.04, depth - 0.09}) box(&s, Vector3d(x, y, 0), Vector3d(0.05, 0.05, height - 0.03), {leg, leg, leg, leg, -1, -1});
+    for (const double y : {0.04, depth - 0.09})
+      box(&s, Vector3d(x, y, 0), Vector3d(0.05, 0.05, height - 0.03), {leg, leg, leg, leg, -1, -1});
   const int drawer = texture(Material::drawers, 40, 0.4, 0.55);
   box(&s, Vector3d(half - 0.5, 0.06, 0.08), Vector3d(0.4, depth - 0.12, 0.55), all(drawer));
   add(s, at);
@@ -215,7 +225,8 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
       tube(&s, Vector3d(0, 0, 0), Vector3d(0, 0, 0.1), 0.04, t);
       for (int i = 0; i < 6; ++i) {
         const double a = random_.uniform(0, 6.28), lean = random_.uniform(0.01, 0.035);
-        tube(&s, Vector3d(0, 0, 0.02), Vector3d(lean * std::cos(a) * 1.6, lean * std::sin(a) * 1.6, random_.uniform(0.13, 0.19)), 0.005,
+        tube(&s, Vector3d(0, 0, 0.02),
+             Vector3d(lean * std::cos(a) * 1.6, lean * std::sin(a) * 1.6, random_.uniform(0.13, 0.19)), 0.005,
              texture(Material::plastic, 8, 0.05, 0.15));
       }
       break;
@@ -238,8 +249,10 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
       double z = 0;
       const int n = 1 + static_cast<int>(random_.below(3));
       for (int i = 0; i < n; ++i) {
-        const double w = random_.uniform(0.14, 0.2), d = w * 1.35, h = random_.uniform(0.015, 0.05), turn = random_.uniform(-0.3, 0.3);
-        const int cover = detail(Material::cover, 64, 0.17, 0.23), page = materials_->get(Material::page, seed_ % 7, 0.21, 0.05);
+        const double w = random_.uniform(0.14, 0.2), d = w * 1.35, h = random_.uniform(0.015, 0.05),
+                     turn = random_.uniform(-0.3, 0.3);
+        const int cover = detail(Material::cover, 64, 0.17, 0.23),
+                  page = materials_->get(Material::page, seed_ % 7, 0.21, 0.05);
         const int spine = texture(Material::spine, 96, 0.04, 0.24);
         Surfaces book;
         box(&book, Vector3d(-w / 2, -d / 2, 0), Vector3d(w, d, h), {spine, page, page, page, cover, cover});
@@ -270,7 +283,8 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
     default: {  // telephone-like: two boxes
       const int t = texture(Material::keyboard, 8, 0.2, 0.15);
       box(&s, Vector3d(-0.09, -0.08, 0), Vector3d(0.18, 0.16, 0.04), all(t));
-      box(&s, Vector3d(-0.09, -0.08, 0.04), Vector3d(0.05, 0.16, 0.03), all(materials_->get(Material::plastic, seed_ % 5, 0.2, 0.2)));
+      box(&s, Vector3d(-0.09, -0.08, 0.04), Vector3d(0.05, 0.16, 0.03),
+          all(materials_->get(Material::plastic, seed_ % 5, 0.2, 0.2)));
     }
   }
   add(s, at);
@@ -294,7 +308,8 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter he
       taken.push_back({x, y, 0.2});
       const double ky = y + 0.33;
       Surfaces s;
-      const int keys = texture(Material::keyboard, 8, 0.44, 0.15), edge = materials_->get(Material::rubber, 3, 0.5, 0.3);
+      const int keys = texture(Material::keyboard, 8, 0.44, 0.15),
+                edge = materials_->get(Material::rubber, 3, 0.5, 0.3);
       box(&s, Vector3d(-0.22, -0.075, 0), Vector3d(0.44, 0.15, 0.022), {edge, edge, edge, edge, -1, keys});
       TextureWindow mouse;
       mouse.texture = texture(Material::plastic, 8, 0.15, 0.1);
@@ -306,7 +321,8 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter he
   // Pages lie flat, one over the other.
   const int pages = depth < 0.45 ? 0 : static_cast<int>(width * depth * 6);
   for (int i = 0; i < pages; ++i) {
-    const double x = random_.uniform(-width / 2 + 0.18, width / 2 - 0.18), y = random_.uniform(-depth / 2 + 0.18, depth / 2 - 0.18);
+    const double x = random_.uniform(-width / 2 + 0.18, width / 2 - 0.18),
+                 y = random_.uniform(-depth / 2 + 0.18, depth / 2 - 0.18);
     Surfaces s;
     const int t = detail(Material::page, 48, 0.21, 0.297);
     box(&s, Vector3d(-0.105, -0.148, 0), Vector3d(0.21, 0.297, 0.0006 + 0.0004 * i), {-1, -1, -1, -1, -1, t});
@@ -314,11 +330,14 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter he
   }
   const int tries = static_cast<int>(width * depth * 60) + 4;
   for (int i = 0; i < tries; ++i) {
-    const uint32_t kind = height == Clutter::low ? std::array<uint32_t, 4>{0, 3, 4, 7}[random_.below(4)] : random_.below(8);
+    const uint32_t kind =
+        height == Clutter::low ? std::array<uint32_t, 4>{0, 3, 4, 7}[random_.below(4)] : random_.below(8);
     const double r = kind == 4 ? 0.13 : kind == 5 ? 0.11 : kind == 7 ? 0.12 : 0.06, margin = std::min(r, depth * 0.4);
     if (width < 2 * margin + 0.02 || depth < 2 * margin) continue;
-    const double x = random_.uniform(-width / 2 + margin, width / 2 - margin), y = random_.uniform(-depth / 2 + margin, depth / 2 - margin);
-    const double turn = random_.uniform(-3.1, 3.1), jx = details_.uniform(-0.015, 0.015), jy = details_.uniform(-0.015, 0.015);
+    const double x = random_.uniform(-width / 2 + margin, width / 2 - margin),
+                 y = random_.uniform(-depth / 2 + margin, depth / 2 - margin);
+    const double turn = random_.uniform(-3.1, 3.1), jx = details_.uniform(-0.015, 0.015),
+                 jy = details_.uniform(-0.015, 0.015);
     if (!free(x, y, r)) continue;
     taken.push_back({x, y, r});
     small_thing(at * placed(x + jx, y + jy, 0.0005, turn), kind);
@@ -327,9 +346,11 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter he
   for (int i = 0; i < 3; ++i) {  // cables
     Surfaces s;
     const int t = materials_->get(Material::rubber, 4, 0.05, 0.3);
-    double x = random_.uniform(-width / 2 + 0.2, width / 2 - 0.2), y = random_.uniform(-depth / 2 + 0.15, depth / 2 - 0.15), a = random_.uniform(0, 6.28);
+    double x = random_.uniform(-width / 2 + 0.2, width / 2 - 0.2),
+           y = random_.uniform(-depth / 2 + 0.15, depth / 2 - 0.15), a = random_.uniform(0, 6.28);
     for (int k = 0; k < 8; ++k) {
-      const double x1 = std::clamp(x + 0.05 * std::cos(a), -width / 2, width / 2), y1 = std::clamp(y + 0.05 * std::sin(a), -depth / 2, depth / 2);
+      const double x1 = std::clamp(x + 0.05 * std::cos(a), -width / 2, width / 2),
+                   y1 = std::clamp(y + 0.05 * std::sin(a), -depth / 2, depth / 2);
       if (std::hypot(x1 - x, y1 - y) > 0.01) tube(&s, Vector3d(x, y, 0.004), Vector3d(x1, y1, 0.004), 0.0035, t);
       x = x1;
       y = y1;
@@ -341,7 +362,8 @@ void Furnisher::clutter(const Rigid3& at, double width, double depth, Clutter he
 
 void Furnisher::plant(const Rigid3& at) {
   Surfaces s;
-  const int pot = texture(Material::plastic, 8, 0.8, 0.3), leaf = materials_->get(Material::leaves, 2, 0.4, 0.3), stem = materials_->get(Material::wood, 9, 1.0, 0.1);
+  const int pot = texture(Material::plastic, 8, 0.8, 0.3), leaf = materials_->get(Material::leaves, 2, 0.4, 0.3),
+            stem = materials_->get(Material::wood, 9, 1.0, 0.1);
   tube(&s, Vector3d(0, 0.2, 0), Vector3d(0, 0.2, 0.3), 0.13, pot, 1.25);
   tube(&s, Vector3d(0, 0.2, 0.25), Vector3d(0.02, 0.2, 1.0), 0.02, stem);
   TextureWindow look;
@@ -349,7 +371,8 @@ void Furnisher::plant(const Rigid3& at) {
   for (int i = 0; i < 34; ++i) {
     const double a = random_.uniform(0, 6.28), r = random_.uniform(0.03, 0.2);
     const Eigen::Quaterniond q = rotation_from_vector(Vector3d(random_.uniform(-1, 1), random_.uniform(-1, 1), a));
-    s.add_ellipsoid(Vector3d(r * std::cos(a), 0.22 + 0.8 * r * std::sin(a), random_.uniform(0.45, 1.25)), q.toRotationMatrix(), Vector3d(0.12, 0.045, 0.012), look);
+    s.add_ellipsoid(Vector3d(r * std::cos(a), 0.22 + 0.8 * r * std::sin(a), random_.uniform(0.45, 1.25)),
+                    q.toRotationMatrix(), Vector3d(0.12, 0.045, 0.012), look);
   }
   add(s, at);
   reserve(at, -0.22, 0, 0.22, 0.44);
@@ -359,7 +382,8 @@ void Furnisher::cartons(const Rigid3& at, double width, double depth) {
   Surfaces s;
   double z = 0;
   for (int i = 0; i < 4; ++i) {
-    const double w = width * random_.uniform(0.6, 0.98), d = depth * random_.uniform(0.6, 0.98), h = random_.uniform(0.2, 0.4);
+    const double w = width * random_.uniform(0.6, 0.98), d = depth * random_.uniform(0.6, 0.98),
+                 h = random_.uniform(0.2, 0.4);
     const int t = detail(Material::carton, 200, 0.5, 0.3), u = detail(Material::carton, 200, 0.5, 0.3);
     Surfaces one;
     box(&one, Vector3d(-w / 2, 0.01, 0), Vector3d(w, d, h), {u, t, -1, t, -1, u});
@@ -373,7 +397,8 @@ void Furnisher::cartons(const Rigid3& at, double width, double depth) {
 
 Surfaces Furnisher::make_chair(Materials* materials, uint64_t seed) {
   Surfaces s;
-  const int cloth = materials->get(Material::fabric, seed, 0.5, 0.5), metal = materials->get(Material::metal, 4, 0.1, 0.5), black = materials->get(Material::rubber, 5, 0.2, 0.2);
+  const int cloth = materials->get(Material::fabric, seed, 0.5, 0.5),
+            metal = materials->get(Material::metal, 4, 0.1, 0.5), black = materials->get(Material::rubber, 5, 0.2, 0.2);
   // A pattern that holds features: the seat's and the back's cushions.
   box(&s, Vector3d(-0.25, -0.25, 0.44), Vector3d(0.5, 0.5, 0.08), all(cloth));
   box(&s, Vector3d(-0.23, -0.27, 0.6), Vector3d(0.46, 0.07, 0.52), all(cloth));
@@ -384,7 +409,8 @@ Surfaces Furnisher::make_chair(Materials* materials, uint64_t seed) {
     tube(&s, Vector3d(0, 0, 0.11), Vector3d(0.28 * std::cos(a), 0.28 * std::sin(a), 0.07), 0.022, metal);
     TextureWindow look;
     look.texture = black;
-    s.add_ellipsoid(Vector3d(0.28 * std::cos(a), 0.28 * std::sin(a), 0.032), Eigen::Matrix3d::Identity(), Vector3d(0.03, 0.03, 0.032), look);
+    s.add_ellipsoid(Vector3d(0.28 * std::cos(a), 0.28 * std::sin(a), 0.032), Eigen::Matrix3d::Identity(),
+                    Vector3d(0.03, 0.03, 0.032), look);
   }
   for (const double side : {-1.0, 1.0}) {
     tube(&s, Vector3d(side * 0.27, -0.1, 0.48), Vector3d(side * 0.27, -0.05, 0.68), 0.015, black);
@@ -398,12 +424,14 @@ void Furnisher::chair(const Rigid3& at) {
   reserve(at, -0.33, -0.33, 0.33, 0.33);
 }
 
-void Furnisher::line_wall(const Eigen::Vector2d& start, const Eigen::Vector2d& along, double length, double depth_limit) {
+void Furnisher::line_wall(const Eigen::Vector2d& start, const Eigen::Vector2d& along, double length,
+                          double depth_limit) {
   // Wall frame: +x along the wall, +y into the room.
   const Rigid3 frame = placed(start.x(), start.y(), 0, std::atan2(along.y(), along.x()));
   const auto on_wall = [&](double x0, double x1, double z0, double z1) {
     for (double x = x0 + 0.05; x + 0.25 < x1;) {
-      const double w = std::min(random_.uniform(0.3, 0.75), x1 - x - 0.04), h = std::min(w * random_.uniform(1.0, 1.45), z1 - z0);
+      const double w = std::min(random_.uniform(0.3, 0.75), x1 - x - 0.04),
+                   h = std::min(w * random_.uniform(1.0, 1.45), z1 - z0);
       const Material material = random_.below(3) == 0 ? Material::picture : Material::poster;
       picture_on_wall(frame, x, z0 + random_.uniform(0, std::max(0.0, z1 - z0 - h)), w, h, material);
       x += w + random_.uniform(0.06, 0.25);

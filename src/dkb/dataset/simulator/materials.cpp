@@ -36,15 +36,22 @@ void shapes(Canvas& c, double x0, double y0, double x1, double y1, int count, Ra
     const double x = random.uniform(x0, x1), y = random.uniform(y0, y1), s = size * random.uniform(0.03, 0.22);
     const Colour colour = random.below(5) == 0 ? dark(random) : vivid(random);
     switch (random.below(4)) {
-      case 0: c.disc(x, y, s / 2, colour); break;
-      case 1: c.rect(std::max(x0, x - s / 2), std::max(y0, y - s / 3), std::min(x1, x + s / 2), std::min(y1, y + s / 3), colour); break;
+      case 0:
+        c.disc(x, y, s / 2, colour);
+        break;
+      case 1:
+        c.rect(std::max(x0, x - s / 2), std::max(y0, y - s / 3), std::min(x1, x + s / 2), std::min(y1, y + s / 3),
+               colour);
+        break;
       case 2: {
         const double a = random.uniform(0, 6.28);
         c.triangle({x + s * std::cos(a), y + s * std::sin(a), x + s * std::cos(a + 2.2), y + s * std::sin(a + 2.2),
-                    x + s * std::cos(a + 4.0), y + s * std::sin(a + 4.0)}, colour);
+                    x + s * std::cos(a + 4.0), y + s * std::sin(a + 4.0)},
+                   colour);
         break;
       }
-      default: c.line(x, y, random.uniform(x0, x1), random.uniform(y0, y1), size * 0.012, colour);
+      default:
+        c.line(x, y, random.uniform(x0, x1), random.uniform(y0, y1), size * 0.012, colour);
     }
   }
 }
@@ -63,7 +70,8 @@ void paint_planks(Canvas& c, Random& random) {
                {colour.r * 0.7F, colour.g * 0.68F, colour.b * 0.66F});
       }
       if (random.below(3) == 0)
-        c.disc(x + random.uniform(0.05, length), y + random.uniform(0.02, 0.1), random.uniform(0.006, 0.014), {60, 38, 24}, 0.8F);
+        c.disc(x + random.uniform(0.05, length), y + random.uniform(0.02, 0.1), random.uniform(0.006, 0.014),
+               {60, 38, 24}, 0.8F);
       c.rect(x, y, x + 0.004, y + plank, {48, 32, 22});
       x += length;
     }
@@ -166,7 +174,8 @@ void paint_carton(Canvas& c, Random& random) {
   c.fill(random.below(2) == 0 ? Colour{186, 146, 100} : pale(random));
   c.grain(0.04, 0.01, 0.10F, 3, random.next());
   c.rect(w * 0.44, 0, w * 0.56, h, {204, 178, 138}, 0.7F);
-  const double x = w * random.uniform(0.05, 0.3), y = h * random.uniform(0.1, 0.4), x1 = x + w * 0.55, y1 = y + h * 0.45;
+  const double x = w * random.uniform(0.05, 0.3), y = h * random.uniform(0.1, 0.4), x1 = x + w * 0.55,
+               y1 = y + h * 0.45;
   c.rect(x, y, x1, y1, pale(random));
   c.text(x + w * 0.03, y + h * 0.04, x1 - w * 0.02, h * 0.1, dark(random), random.next());
   c.paragraph(x + w * 0.03, y + h * 0.18, x1 - w * 0.02, y1, h * 0.045, dark(random), random.next());
@@ -182,8 +191,10 @@ void paint_keyboard(Canvas& c, Random& random) {
       if (col == 14 || (row == 0 && col % 5 == 1)) continue;
       const double x = (col + 0.35) * px, y = (row + 0.45) * py;
       c.rect(x, y, x + px * 0.86, y + py * 0.86, black ? Colour{66, 66, 72} : Colour{150, 148, 142});
-      c.rect(x + px * 0.06, y + py * 0.04, x + px * 0.78, y + py * 0.72, black ? Colour{30, 30, 34} : Colour{214, 212, 204});
-      c.text(x + px * 0.2, y + py * 0.16, x + px * 0.62, py * 0.34, black ? Colour{210, 210, 210} : Colour{50, 50, 50}, random.next());
+      c.rect(x + px * 0.06, y + py * 0.04, x + px * 0.78, y + py * 0.72,
+             black ? Colour{30, 30, 34} : Colour{214, 212, 204});
+      c.text(x + px * 0.2, y + py * 0.16, x + px * 0.62, py * 0.34, black ? Colour{210, 210, 210} : Colour{50, 50, 50},
+             random.next());
     }
 }
 
@@ -193,10 +204,12 @@ void paint_screen(Canvas& c, Random& random) {
   if (random.below(3) != 0) {  // switched on
     c.rect(0.015, 0.015, w - 0.015, h - 0.015, vivid(random));
     for (int i = 0; i < 3; ++i) {
-      const double x = random.uniform(0.02, w * 0.45), y = random.uniform(0.02, h * 0.4), x1 = x + w * 0.5, y1 = y + h * 0.5;
+      const double x = random.uniform(0.02, w * 0.45), y = random.uniform(0.02, h * 0.4), x1 = x + w * 0.5,
+                   y1 = y + h * 0.5;
       c.rect(x, y, x1, y1, i == 1 ? Colour{36, 38, 46} : pale(random));
       c.rect(x, y, x1, y + h * 0.05, vivid(random));
-      c.paragraph(x + 0.01, y + h * 0.07, x1 - 0.01, y1 - 0.005, 0.007, i == 1 ? vivid(random) : dark(random), random.next());
+      c.paragraph(x + 0.01, y + h * 0.07, x1 - 0.01, y1 - 0.005, 0.007, i == 1 ? vivid(random) : dark(random),
+                  random.next());
     }
   }
   const Colour frame{24, 24, 27};
@@ -301,7 +314,8 @@ void paint_drawers(Canvas& c, Random& random) {
     c.rect(w * 0.36, y + (y1 - y) * 0.45, w * 0.64, y + (y1 - y) * 0.75, {224, 224, 214});
     c.text(w * 0.38, y + (y1 - y) * 0.52, w * 0.62, (y1 - y) * 0.13, dark(random), random.next());
   }
-  for (int i = 0; i < 5; ++i) shapes(c, w * random.uniform(0, 0.7), h * random.uniform(0, 0.8), w * 0.98, h * 0.98, 1, random);
+  for (int i = 0; i < 5; ++i)
+    shapes(c, w * random.uniform(0, 0.7), h * random.uniform(0, 0.8), w * 0.98, h * 0.98, 1, random);
   c.grain(0.3, 0.3, 0.06F, 4, random.next());
 }
 
@@ -312,7 +326,8 @@ void paint_plain(Canvas& c, Material material, Random& random) {
       c.grain(1.2, 1.2, 0.10F, 3, random.next());
       c.grain(0.12, 0.12, 0.07F, 4, random.next());
       for (int i = 0; i < static_cast<int>(c.width_m() * c.height_m() * 3); ++i)
-        c.disc(random.uniform(0, c.width_m()), random.uniform(0, c.height_m()), random.uniform(0.004, 0.012), {120, 116, 108}, 0.5F);
+        c.disc(random.uniform(0, c.width_m()), random.uniform(0, c.height_m()), random.uniform(0.004, 0.012),
+               {120, 116, 108}, 0.5F);
       break;
     case Material::carpet:
       c.fill(vivid(random));
@@ -351,41 +366,63 @@ void paint_plain(Canvas& c, Material material, Random& random) {
 
 void paint(Canvas& c, Material material, Random& random) {
   switch (material) {
-    case Material::planks: return paint_planks(c, random);
-    case Material::wood: return paint_wood(c, random);
-    case Material::poster: return paint_poster(c, random);
-    case Material::picture: return paint_picture(c, random);
-    case Material::page: return paint_page(c, random);
-    case Material::cover: return paint_cover(c, random);
-    case Material::spine: return paint_spine(c, random);
-    case Material::carton: return paint_carton(c, random);
-    case Material::keyboard: return paint_keyboard(c, random);
-    case Material::screen: return paint_screen(c, random);
-    case Material::fabric: return paint_fabric(c, random);
-    case Material::skin: return paint_skin(c, random, false);
-    case Material::face: return paint_skin(c, random, true);
-    case Material::whiteboard: return paint_whiteboard(c, random);
-    case Material::door: return paint_door(c, random);
-    case Material::drawers: return paint_drawers(c, random);
-    default: return paint_plain(c, material, random);
+    case Material::planks:
+      return paint_planks(c, random);
+    case Material::wood:
+      return paint_wood(c, random);
+    case Material::poster:
+      return paint_poster(c, random);
+    case Material::picture:
+      return paint_picture(c, random);
+    case Material::page:
+      return paint_page(c, random);
+    case Material::cover:
+      return paint_cover(c, random);
+    case Material::spine:
+      return paint_spine(c, random);
+    case Material::carton:
+      return paint_carton(c, random);
+    case Material::keyboard:
+      return paint_keyboard(c, random);
+    case Material::screen:
+      return paint_screen(c, random);
+    case Material::fabric:
+      return paint_fabric(c, random);
+    case Material::skin:
+      return paint_skin(c, random, false);
+    case Material::face:
+      return paint_skin(c, random, true);
+    case Material::whiteboard:
+      return paint_whiteboard(c, random);
+    case Material::door:
+      return paint_door(c, random);
+    case Material::drawers:
+      return paint_drawers(c, random);
+    default:
+      return paint_plain(c, material, random);
   }
 }
 
 // [texels per metre]: a little finer than the camera resolves from where such things are usually seen.
 double density(Material material) {
   switch (material) {
-    case Material::plaster: return 180;
+    case Material::plaster:
+      return 180;
     case Material::planks:
-    case Material::carpet: return 350;
+    case Material::carpet:
+      return 350;
     case Material::page:
     case Material::cover:
     case Material::keyboard:
-    case Material::spine: return 1300;
+    case Material::spine:
+      return 1300;
     case Material::denim:
     case Material::hair:
     case Material::metal:
-    case Material::rubber: return 300;
-    default: return 750;
+    case Material::rubber:
+      return 300;
+    default:
+      return 750;
   }
 }
 
@@ -399,9 +436,10 @@ int texels(double metres, double per_metre) {
 }  // namespace
 
 const std::vector<std::string>& material_names() {
-  static const std::vector<std::string> names{
-      "plaster", "planks", "carpet", "wood",  "poster", "picture", "page",    "cover",  "spine", "carton",     "keyboard", "screen",
-      "fabric",  "denim",  "skin",   "face",  "hair",   "metal",   "plastic", "rubber", "door",  "whiteboard", "drawers",  "leaves"};
+  static const std::vector<std::string> names{"plaster", "planks", "carpet", "wood",       "poster",   "picture",
+                                              "page",    "cover",  "spine",  "carton",     "keyboard", "screen",
+                                              "fabric",  "denim",  "skin",   "face",       "hair",     "metal",
+                                              "plastic", "rubber", "door",   "whiteboard", "drawers",  "leaves"};
   return names;
 }
 
@@ -410,14 +448,26 @@ int Materials::get(Material material, uint64_t seed, double width_m, double heig
                                    static_cast<int>(std::lround(height_m * 50)));
   const auto found = known_.find(key);
   if (found != known_.end()) return found->second;
-  const double d = density(material);
-  Canvas canvas(texels(width_m, d), texels(height_m, d), width_m, height_m);
-  Random random(hash64(seed, static_cast<uint64_t>(material)));
-  paint(canvas, material, random);
-  textures_.emplace_back(canvas);
-  const int index = static_cast<int>(textures_.size()) - 1;
+  Entry& entry = entries_.emplace_back();
+  entry.material = material;
+  entry.seed = seed;
+  entry.width_m = width_m;
+  entry.height_m = height_m;
+  const int index = static_cast<int>(entries_.size()) - 1;
   known_.emplace(key, index);
   return index;
+}
+
+const Texture& Materials::texture(int index) const {
+  const Entry& entry = entries_[static_cast<size_t>(index)];
+  std::call_once(entry.painted, [&entry] {
+    const double d = density(entry.material);
+    Canvas canvas(texels(entry.width_m, d), texels(entry.height_m, d), entry.width_m, entry.height_m);
+    Random random(hash64(entry.seed, static_cast<uint64_t>(entry.material)));
+    paint(canvas, entry.material, random);
+    entry.texture = std::make_unique<const Texture>(canvas);
+  });
+  return *entry.texture;
 }
 
 }  // namespace dkb::sim

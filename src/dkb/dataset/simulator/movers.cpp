@@ -12,7 +12,9 @@ namespace {
 constexpr double kBody = 0.30;      // [m] kept from walls and furniture
 constexpr double kPersonal = 0.65;  // [m] kept between the middles of two people
 
-double wrapped(double a) { return std::remainder(a, 6.283185307179586); }
+double wrapped(double a) {
+  return std::remainder(a, 6.283185307179586);
+}
 
 // One planned stretch: a walk from a to b, or standing at a (b == a).
 struct Stretch {
@@ -24,7 +26,9 @@ struct Stretch {
     const double s = std::clamp((t - start) / (end - start), 0.0, 1.0), ramp = std::min(0.5, 0.35 / (end - start));
     // Trapezoid of speed with ramps of `ramp`.
     const double v = 1 / (1 - ramp);
-    const double way = s < ramp ? 0.5 * v * s * s / ramp : s > 1 - ramp ? 1 - 0.5 * v * (1 - s) * (1 - s) / ramp : v * (s - 0.5 * ramp);
+    const double way = s < ramp       ? 0.5 * v * s * s / ramp
+                       : s > 1 - ramp ? 1 - 0.5 * v * (1 - s) * (1 - s) / ramp
+                                      : v * (s - 0.5 * ramp);
     return a + way * (b - a);
   }
 };
@@ -51,17 +55,20 @@ class Planner {
   bool floor_free(const Eigen::Vector2d& p) const {
     const Footprint& in = area_.inside;
     if (p.x() < in.x0 + kBody || p.x() > in.x1 - kBody || p.y() < in.y0 + kBody || p.y() > in.y1 - kBody) return false;
-    return std::none_of(area_.obstacles.begin(), area_.obstacles.end(), [&](const Footprint& f) { return f.distance(p.x(), p.y()) < kBody; });
+    return std::none_of(area_.obstacles.begin(), area_.obstacles.end(),
+                        [&](const Footprint& f) { return f.distance(p.x(), p.y()) < kBody; });
   }
   bool may_stand(const Eigen::Vector2d& p) const {
-    return floor_free(p) && std::none_of(area_.no_stop.begin(), area_.no_stop.end(), [&](const Footprint& f) { return f.distance(p.x(), p.y()) < kBody; });
+    return floor_free(p) && std::none_of(area_.no_stop.begin(), area_.no_stop.end(),
+                                         [&](const Footprint& f) { return f.distance(p.x(), p.y()) < kBody; });
   }
   Eigen::Vector2d propose() {
     if (area_.next_target && random_.below(4) != 0) return area_.next_target(random_);
     return {random_.uniform(area_.inside.x0, area_.inside.x1), random_.uniform(area_.inside.y0, area_.inside.y1)};
   }
   static Eigen::Vector2d where(const std::vector<Stretch>& plan, double t) {
-    const auto it = std::upper_bound(plan.begin(), plan.end(), t, [](double time, const Stretch& s) { return time < s.end; });
+    const auto it =
+        std::upper_bound(plan.begin(), plan.end(), t, [](double time, const Stretch& s) { return time < s.end; });
     return it == plan.end() ? plan.back().b : it->at(t);
   }
   bool clear(const Stretch& s) const {
@@ -169,7 +176,8 @@ Track track_along(const std::vector<Waypoint>& points, double duration) {
       [&points](double t) -> Eigen::Vector2d {
         if (t <= points.front().time) return points.front().position;
         for (size_t i = 1; i < points.size(); ++i)
-          if (t < points[i].time) return Stretch{points[i - 1].position, points[i].position, points[i - 1].time, points[i].time}.at(t);
+          if (t < points[i].time)
+            return Stretch{points[i - 1].position, points[i].position, points[i - 1].time, points[i].time}.at(t);
         return points.back().position;
       },
       duration);

@@ -46,11 +46,11 @@ class Track {
 
 // Something that moves by itself; times are seconds from the start of the sequence.
 struct Mover {
-  int id = 0;                     // 1, 2, ...
-  std::string kind = "person";    // class
+  int id = 0;                   // 1, 2, ...
+  std::string kind = "person";  // class
   Track track;
-  PersonLook look;                // of persons
-  Surfaces rigid;                 // of others: in their own frame, front to +x, on the floor
+  PersonLook look;  // of persons
+  Surfaces rigid;   // of others: in their own frame, front to +x, on the floor
 
   Surfaces surfaces(double t) const;
 };
@@ -59,14 +59,14 @@ Surfaces person_surfaces(const PersonLook& look, const MoverState& state);
 
 // Where people may walk, and what they keep away from.
 struct WalkArea {
-  Footprint inside;                                         // walls
+  Footprint inside;  // walls
   std::vector<Footprint> obstacles;
-  std::function<Eigen::Vector2d(double)> camera;            // position on the floor at a time
-  double camera_distance = 0.8;                             // [m] they keep from it
-  std::vector<Footprint> no_stop;                           // where they walk through, but do not stand
-  std::function<Eigen::Vector2d(Random&)> next_target;      // proposes where to go; may be empty: anywhere
-  double speed_min = 0.7, speed_max = 1.4;                  // [m/s]
-  double pause_chance = 0.4, pause_max = 2.0;               // [s] stand between two walks
+  std::function<Eigen::Vector2d(double)> camera;        // position on the floor at a time
+  double camera_distance = 0.8;                         // [m] they keep from it
+  std::vector<Footprint> no_stop;                       // where they walk through, but do not stand
+  std::function<Eigen::Vector2d(Random&)> next_target;  // proposes where to go; may be empty: anywhere
+  double speed_min = 0.7, speed_max = 1.4;              // [m/s]
+  double pause_chance = 0.4, pause_max = 2.0;           // [s] stand between two walks
 };
 
 // Tracks of `count` people for `duration` seconds: straight walks with smooth starts, stops and turns, which keep clear

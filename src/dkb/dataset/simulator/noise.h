@@ -17,11 +17,17 @@ inline uint64_t hash64(uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
   return z ^ (z >> 31);
 }
-inline uint64_t hash64(uint64_t a, uint64_t b) { return hash64(hash64(a) ^ b); }
-inline uint64_t hash64(uint64_t a, uint64_t b, uint64_t c) { return hash64(hash64(a, b) ^ c); }
+inline uint64_t hash64(uint64_t a, uint64_t b) {
+  return hash64(hash64(a) ^ b);
+}
+inline uint64_t hash64(uint64_t a, uint64_t b, uint64_t c) {
+  return hash64(hash64(a, b) ^ c);
+}
 
 // Uniform in [0, 1).
-inline float unit_float(uint64_t h) { return static_cast<float>(h >> 40) * 0x1.0p-24F; }
+inline float unit_float(uint64_t h) {
+  return static_cast<float>(h >> 40) * 0x1.0p-24F;
+}
 
 // Nearly normal, mean 0, standard deviation 1, |value| < 3.5: the sum of four 16-bit uniforms.
 inline float normal_from_bits(uint64_t h) {
@@ -62,7 +68,9 @@ inline void fractal_noise_row(float step, float y, int octaves, uint64_t seed, s
     const auto iy = static_cast<uint32_t>(static_cast<int32_t>(fy));
     float v = y - fy;
     v = v * v * (3 - 2 * v);
-    const auto column = [&](uint32_t ix) { return lattice_value(ix, iy, own) * (1 - v) + lattice_value(ix, iy + 1, own) * v; };
+    const auto column = [&](uint32_t ix) {
+      return lattice_value(ix, iy, own) * (1 - v) + lattice_value(ix, iy + 1, own) * v;
+    };
     uint32_t cell = 0;
     float left = column(0), right = column(1);
     for (size_t i = 0; i < row->size(); ++i) {

@@ -49,7 +49,8 @@ Surfaces person_surfaces(const PersonLook& look, const MoverState& state) {
   const double k = look.height / 1.75, g = look.girth * k, stride = std::min(1.6, state.stride);
   const double hip_height = 0.90 * k, thigh = 0.43 * k, shin = 0.41 * k;
   const double swing = 0.48 * std::min(1.3, stride);
-  const double sway = 0.015 * stride * std::sin(state.phase), sink = thigh * (1 - std::cos(swing)) * 0.5 * (1 + std::cos(2 * state.phase));
+  const double sway = 0.015 * stride * std::sin(state.phase),
+               sink = thigh * (1 - std::cos(swing)) * 0.5 * (1 + std::cos(2 * state.phase));
   const double lean = 0.04 * stride + (stride > 1.1 ? 0.12 * (stride - 1.1) : 0.0);
   const double base = hip_height - sink;
   const Vector3d hips(0, sway, base);
@@ -60,7 +61,8 @@ Surfaces person_surfaces(const PersonLook& look, const MoverState& state) {
   for (const double side : {-1.0, 1.0}) {
     const double phase = state.phase + (side > 0 ? 0.0 : 3.141592653589793);
     const double hip_angle = swing * std::sin(phase) + 0.1 * stride;
-    const double bend = 0.12 * stride + 0.9 * std::min(1.0, stride) * std::max(0.0, std::cos(phase)) * (0.6 + 0.3 * stride);
+    const double bend =
+        0.12 * stride + 0.9 * std::min(1.0, stride) * std::max(0.0, std::cos(phase)) * (0.6 + 0.3 * stride);
     const Vector3d hip = hips + Vector3d(0, side * 0.09 * g, 0);
     const Vector3d knee = hip + thigh * Vector3d(std::sin(hip_angle), 0, -std::cos(hip_angle));
     const double shin_angle = hip_angle - bend;
@@ -69,32 +71,38 @@ Surfaces person_surfaces(const PersonLook& look, const MoverState& state) {
     limb(&s, knee, ankle, 0.058 * g, 0.042 * g, look.trousers);
     const double pitch = std::clamp(shin_angle, -1.0, 0.3);
     Eigen::Matrix3d foot = rotation_from_vector(Vector3d(0, -pitch, 0)).toRotationMatrix();
-    s.add_ellipsoid(ankle + foot * Vector3d(0.055 * k, 0, -0.035 * k), foot, Vector3d(0.135, 0.05, 0.045) * k, look_of(look.shoes));
+    s.add_ellipsoid(ankle + foot * Vector3d(0.055 * k, 0, -0.035 * k), foot, Vector3d(0.135, 0.05, 0.045) * k,
+                    look_of(look.shoes));
 
     const double arm_angle = -0.9 * swing * std::sin(phase), elbow_bend = 0.25 + 0.5 * std::max(0.0, stride - 0.5);
     const double out = 0.09 + look.arms_out;
     const Vector3d shoulder = leaned(0, side * 0.195 * g, 0.50 * k);
-    const Vector3d upper(std::sin(arm_angle) * std::cos(out), side * std::sin(out), -std::cos(arm_angle) * std::cos(out));
+    const Vector3d upper(std::sin(arm_angle) * std::cos(out), side * std::sin(out),
+                         -std::cos(arm_angle) * std::cos(out));
     const Vector3d elbow = shoulder + 0.29 * k * upper;
     const double fore = arm_angle + elbow_bend;
-    const Vector3d lower(std::sin(fore) * std::cos(out * 0.7), side * std::sin(out * 0.7), -std::cos(fore) * std::cos(out * 0.7));
+    const Vector3d lower(std::sin(fore) * std::cos(out * 0.7), side * std::sin(out * 0.7),
+                         -std::cos(fore) * std::cos(out * 0.7));
     const Vector3d wrist = elbow + 0.25 * k * lower;
     limb(&s, shoulder, elbow, 0.055 * g, 0.043 * g, look.shirt);
     limb(&s, elbow, wrist, 0.041 * g, 0.03 * g, look.skin);
-    s.add_ellipsoid(wrist + 0.06 * k * lower, Eigen::Matrix3d::Identity(), Vector3d(0.04, 0.03, 0.06) * k, look_of(look.skin));
+    s.add_ellipsoid(wrist + 0.06 * k * lower, Eigen::Matrix3d::Identity(), Vector3d(0.04, 0.03, 0.06) * k,
+                    look_of(look.skin));
   }
 
   const Eigen::Matrix3d tilt = rotation_from_vector(Vector3d(0, lean, 0)).toRotationMatrix();
   s.add_ellipsoid(leaned(0, 0, 0.01), tilt, Vector3d(0.12, 0.165, 0.13) * g, look_of(look.trousers));
   // Chest: an elliptic tube that widens towards the shoulders; radius 1 across, so that u = 0.5 is the front.
-  s.add_tube(leaned(0, 0, 0.06 * k), leaned(0, 0, 0.46 * k), Vector3d::UnitX(), 0.105 * g, 0.15 * g, 1.2, look_of(look.shirt));
+  s.add_tube(leaned(0, 0, 0.06 * k), leaned(0, 0, 0.46 * k), Vector3d::UnitX(), 0.105 * g, 0.15 * g, 1.2,
+             look_of(look.shirt));
   s.add_ellipsoid(leaned(0, 0, 0.46 * k), tilt, Vector3d(0.125 * g, 0.2 * g, 0.1 * k), look_of(look.shirt, 0, 0.3F));
   limb(&s, leaned(0, 0, 0.5 * k), leaned(0.02, 0, 0.62 * k), 0.055 * k, 0.05 * k, look.skin);
   const Vector3d head = leaned(0.03, 0, 0.72 * k);
   s.add_ellipsoid(head, tilt, Vector3d(0.097, 0.078, 0.122) * k, look_of(look.face));
   s.add_ellipsoid(head + Vector3d(-0.022, 0, 0.028) * k, tilt, Vector3d(0.095, 0.086, 0.112) * k, look_of(look.hair));
 
-  Rigid3 pose(Eigen::Quaterniond(Eigen::AngleAxisd(state.heading, Vector3d::UnitZ())), Vector3d(state.position.x(), state.position.y(), 0));
+  Rigid3 pose(Eigen::Quaterniond(Eigen::AngleAxisd(state.heading, Vector3d::UnitZ())),
+              Vector3d(state.position.x(), state.position.y(), 0));
   return s.moved(pose);
 }
 

@@ -68,7 +68,9 @@ bool sphere_visible(const Eigen::Vector3d& c, double radius, const CameraModel& 
   if (c.z() < -r) return false;
   const double left = camera.cx / camera.fx, right = (camera.width - 1 - camera.cx) / camera.fx;
   const double top = camera.cy / camera.fy, bottom = (camera.height - 1 - camera.cy) / camera.fy;
-  const auto outside = [&](double along, double tangent) { return along - tangent * c.z() > r * std::sqrt(1 + tangent * tangent); };
+  const auto outside = [&](double along, double tangent) {
+    return along - tangent * c.z() > r * std::sqrt(1 + tangent * tangent);
+  };
   return !outside(-c.x(), left) && !outside(c.x(), right) && !outside(-c.y(), top) && !outside(c.y(), bottom);
 }
 
@@ -84,7 +86,8 @@ void DrawList::add(const Surfaces& surfaces) {
   for (const Quadric& q : surfaces.quadrics) quadrics.push_back(&q);
 }
 
-void DrawList::add_visible(const Surfaces& surfaces, const CameraModel& camera, const Rigid3& cam_from_world, double slack) {
+void DrawList::add_visible(const Surfaces& surfaces, const CameraModel& camera, const Rigid3& cam_from_world,
+                           double slack) {
   const Eigen::Vector3d eye = centre_in_world(cam_from_world);
   for (const Patch& p : surfaces.patches) {
     const Eigen::Vector3d away = p.u.cross(p.v);
@@ -101,9 +104,9 @@ void DrawList::add_visible(const Surfaces& surfaces, const CameraModel& camera, 
   }
 }
 
-void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& r, GeometryImage* out) {
+void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& r,
+                            GeometryImage* out) {
   PatchView& view = patch_views_[static_cast<size_t>(id)];
-  view.seen = false;
   const Eigen::Vector3d o = cam_from_world * patch.origin, u = r * patch.u, v = r * patch.v;
   const Eigen::Vector3d away = u.cross(v);
   const double volume = away.dot(o);
@@ -120,7 +123,7 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
     x_min = std::min(x_min, corners[i].x());
     x_max = std::max(x_max, corners[i].x());
   }
-  if (x_max < -1 || y_max < -1 || x_min > camera_.width || y_min > camera_.height) return;
+  if (x_max < -1 || y_max < rows_.first - 1 || x_min > camera_.width || y_min > rows_.end) return;
 
   // z (ray) = o + a u + b v, so (a, b, 1) / z = [u v o]^-1 ray: affine in the pixel, no division in the loop.
   Eigen::Matrix3d basis;
@@ -133,12 +136,12 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
   for (int i = 0; i < 9; ++i) view.h[i] = h(i / 3, i % 3);
   view.density = std::abs(h.determinant());
   view.normal = (-away.normalized()).cast<float>();
-  view.seen = true;
 
-  const auto slack_u = static_cast<float>(kSeamOverlap / u.norm()), slack_v = static_cast<float>(kSeamOverlap / v.norm());
+  const auto slack_u = static_cast<float>(kSeamOverlap / u.norm()),
+             slack_v = static_cast<float>(kSeamOverlap / v.norm());
   const float u_low = -slack_u, u_high = 1 + slack_u, v_low = -slack_v, v_high = 1 + slack_v;
-  const int row0 = static_cast<int>(std::clamp(std::floor(y_min), 0.0, static_cast<double>(camera_.height)));
-  const int row1 = static_cast<int>(std::clamp(std::ceil(y_max), -1.0, static_cast<double>(camera_.height - 1)));
+  const int row0 = static_cast<int>(std::clamp<double>(std::floor(y_min), rows_.first, rows_.end));
+  const int row1 = static_cast<int>(std::clamp<double>(std::ceil(y_max), rows_.first - 1, rows_.end - 1));
   for (int y = row0; y <= row1; ++y) {
     // The span of this row, generously: what the edges touch within one pixel above and below.
     double left = 1e9, right = -1e9;
@@ -162,9 +165,12 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
     const int x1 = static_cast<int>(std::clamp(std::ceil(right) + 1, -1.0, static_cast<double>(camera_.width - 1)));
     const int count = x1 - x0 + 1;
     if (count <= 0) continue;
-    const auto at = [&](int i) { return static_cast<float>(view.h[3 * i] * x0 + view.h[3 * i + 1] * y + view.h[3 * i + 2]); };
+    const auto at = [&](int i) {
+      return static_cast<float>(view.h[3 * i] * x0 + view.h[3 * i + 1] * y + view.h[3 * i + 2]);
+    };
     const float a0 = at(0), b0 = at(1), c0 = at(2);
-    const auto a1 = static_cast<float>(view.h[0]), b1 = static_cast<float>(view.h[3]), c1 = static_cast<float>(view.h[6]);
+    const auto a1 = static_cast<float>(view.h[0]), b1 = static_cast<float>(view.h[3]),
+               c1 = static_cast<float>(view.h[6]);
     float* __restrict depth = out->inverse_depth.row(y) + x0;
     int32_t* __restrict ids = out->id.row(y) + x0;
     if (patch.disc) {
@@ -179,8 +185,8 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
       for (int i = 0; i < count; ++i) {
         const auto t = static_cast<float>(i);
         const float inverse = c0 + c1 * t, a = a0 + a1 * t, b = b0 + b1 * t;
-        const bool in = (a >= u_low * inverse) & (a <= u_high * inverse) & (b >= v_low * inverse) & (b <= v_high * inverse) &
-                        (inverse > depth[i]);
+        const bool in = (a >= u_low * inverse) & (a <= u_high * inverse) & (b >= v_low * inverse) &
+                        (b <= v_high * inverse) & (inverse > depth[i]);
         depth[i] = in ? inverse : depth[i];
         ids[i] = in ? id : ids[i];
       }
@@ -188,12 +194,11 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
   }
 }
 
-void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& world_from_cam,
-                              GeometryImage* out) {
+void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_from_world,
+                              const Eigen::Matrix3d& world_from_cam, GeometryImage* out) {
   QuadricView& view = quadric_views_[static_cast<size_t>(id) - patch_views_.size()];
   view.m = quadric.to_local * world_from_cam;
   view.centre = cam_from_world * quadric.centre;
-  view.seen = false;
   const Eigen::Matrix3d from_local = view.m.inverse();
   CameraModel shifted = camera_;
   shifted.cx -= offset_.x();
@@ -208,8 +213,9 @@ void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_
   } else {
     box = ellipsoid_bounds(view.centre, from_local * from_local.transpose(), shifted);
   }
+  box.y0 = std::max(box.y0, rows_.first);
+  box.y1 = std::min(box.y1, rows_.end - 1);
   if (box.empty()) return;
-  view.seen = true;
 
   // Along a ray, l(z) = m (ray z - centre). Measured from the plane z = pivot, near the surface, the numbers stay small
   // enough for floats.
@@ -242,21 +248,24 @@ void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_
       const float height = mz + dz * z;
       const float distance = pivot_f + z;
       const float inverse = 1.0F / (distance > 0.01F ? distance : 0.01F);
-      const bool in = (root2 > 0) & (a > 1e-12F) & (height >= low) & (height <= high) & (distance > 0.02F) & (inverse > depth[i]);
+      const bool in =
+          (root2 > 0) & (a > 1e-12F) & (height >= low) & (height <= high) & (distance > 0.02F) & (inverse > depth[i]);
       depth[i] = in ? inverse : depth[i];
       ids[i] = in ? id : ids[i];
     }
   }
 }
 
-void Rasteriser::draw(const DrawList& list, const Rigid3& cam_from_world, const Eigen::Vector2d& offset, GeometryImage* out) {
+void Rasteriser::draw(const DrawList& list, const Rigid3& cam_from_world, const Eigen::Vector2d& offset, Rows rows,
+                      GeometryImage* out) {
   if (out->id.width() != camera_.width || out->id.height() != camera_.height) {
     out->id = Image<int32_t>(camera_.width, camera_.height);
     out->inverse_depth = Image<float>(camera_.width, camera_.height);
   }
-  std::fill(out->id.data(), out->id.data() + out->id.size(), -1);
-  std::fill(out->inverse_depth.data(), out->inverse_depth.data() + out->inverse_depth.size(), 0.0F);
+  std::fill(out->id.row(rows.first), out->id.row(rows.end), -1);
+  std::fill(out->inverse_depth.row(rows.first), out->inverse_depth.row(rows.end), 0.0F);
   offset_ = offset;
+  rows_ = rows;
   patch_views_.resize(list.patches.size());
   quadric_views_.resize(list.quadrics.size());
   const Eigen::Matrix3d r = cam_from_world.matrix3(), r_inverse = r.transpose();
@@ -265,19 +274,20 @@ void Rasteriser::draw(const DrawList& list, const Rigid3& cam_from_world, const 
   for (const Quadric* q : list.quadrics) draw_quadric(*q, id++, cam_from_world, r_inverse, out);
 }
 
-bool Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth, Eigen::Vector3f* local,
-                     Eigen::Vector3f* normal) const {
+bool Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth,
+                     Eigen::Vector3f* local, Eigen::Vector3f* normal) const {
   *local = (view.m * (ray(x, y) / static_cast<double>(inverse_depth) - view.centre)).cast<float>();
   Eigen::Vector3f n = *local;
-  if (quadric.tube) n.z() = -static_cast<float>(quadric.taper * (quadric.radius + quadric.taper * static_cast<double>(local->z())));
+  if (quadric.tube)
+    n.z() = -static_cast<float>(quadric.taper * (quadric.radius + quadric.taper * static_cast<double>(local->z())));
   *normal = (view.m.transpose() * n.cast<double>()).normalized().cast<float>();
   return true;
 }
 
-void Rasteriser::add_colour(const DrawList& list, const Materials& materials, const GeometryImage& geometry, float level_shift,
-                            std::vector<uint64_t>* sum) const {
+void Rasteriser::add_colour(const DrawList& list, const Materials& materials, const GeometryImage& geometry,
+                            float level_shift, std::vector<uint64_t>* sum) const {
   const auto n_patches = static_cast<int32_t>(list.patches.size());
-  for (int y = 0; y < camera_.height; ++y) {
+  for (int y = rows_.first; y < rows_.end; ++y) {
     const int32_t* ids = geometry.id.row(y);
     const float* depth = geometry.inverse_depth.row(y);
     uint64_t* target = sum->data() + static_cast<size_t>(y) * static_cast<size_t>(camera_.width);
@@ -289,11 +299,15 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
         const Patch& patch = *list.patches[static_cast<size_t>(id)];
         const PatchView& view = patch_views_[static_cast<size_t>(id)];
         const Texture& texture = materials.texture(patch.look.texture);
-        const auto at = [&](int i) { return static_cast<float>(view.h[3 * i] * x + view.h[3 * i + 1] * y + view.h[3 * i + 2]); };
+        const auto at = [&](int i) {
+          return static_cast<float>(view.h[3 * i] * x + view.h[3 * i + 1] * y + view.h[3 * i + 2]);
+        };
         const float a0 = at(0), b0 = at(1), c0 = at(2);
-        const auto a1 = static_cast<float>(view.h[0]), b1 = static_cast<float>(view.h[3]), c1 = static_cast<float>(view.h[6]);
-        const auto texels = static_cast<float>(view.density * texture.width() * static_cast<double>(std::abs(patch.look.du)) *
-                                               texture.height() * static_cast<double>(std::abs(patch.look.dv)));
+        const auto a1 = static_cast<float>(view.h[0]), b1 = static_cast<float>(view.h[3]),
+                   c1 = static_cast<float>(view.h[6]);
+        const auto texels =
+            static_cast<float>(view.density * texture.width() * static_cast<double>(std::abs(patch.look.du)) *
+                               texture.height() * static_cast<double>(std::abs(patch.look.dv)));
         int level = 0;
         for (int i = 0; i < end - x; ++i) {
           const auto t = static_cast<float>(i);
@@ -312,8 +326,10 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
         const Texture& texture = materials.texture(quadric.look.texture);
         const double girth = 6.2832 / quadric.to_local.row(0).norm();
         const double lod = std::log2(texture.width() * static_cast<double>(quadric.look.du) /
-                                         (girth * camera_.fx * static_cast<double>(depth[x])) + 1e-6);
-        const int level = std::clamp(static_cast<int>(std::floor(static_cast<float>(lod) + kMipBias + level_shift)), 0, texture.levels() - 1);
+                                         (girth * camera_.fx * static_cast<double>(depth[x])) +
+                                     1e-6);
+        const int level = std::clamp(static_cast<int>(std::floor(static_cast<float>(lod) + kMipBias + level_shift)), 0,
+                                     texture.levels() - 1);
         const Eigen::Matrix3d world_from_cam = quadric.to_local.inverse() * view.m;
         for (int i = x; i < end; ++i) {
           Eigen::Vector3f local, normal;
@@ -321,7 +337,10 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
           const float shade = lambert_shade(world_from_cam * normal.cast<double>());
           const float u = 0.5F + std::atan2(local.y(), local.x()) * 0.15915494F;
           const float v = quadric.tube ? 1.0F - local.z() : 0.5F - 0.5F * local.z();
-          target[i] += (scaled(texture.sample(quadric.look.u0 + quadric.look.du * u, quadric.look.v0 + quadric.look.dv * v, level), shade) >> 3) &
+          target[i] += (scaled(texture.sample(quadric.look.u0 + quadric.look.du * u,
+                                              quadric.look.v0 + quadric.look.dv * v, level),
+                               shade) >>
+                        3) &
                        0x1FFF1FFF1FFF1FFFULL;
         }
       }
@@ -330,14 +349,14 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
   }
 }
 
-void Rasteriser::reflectance(const DrawList& list, const Materials& materials, const GeometryImage& geometry, Image<float>* grey,
-                             Image<float>* cosine) const {
+void Rasteriser::reflectance(const DrawList& list, const Materials& materials, const GeometryImage& geometry,
+                             Image<float>* grey, Image<float>* cosine) const {
   if (grey->width() != camera_.width || grey->height() != camera_.height) {
     *grey = Image<float>(camera_.width, camera_.height);
     *cosine = Image<float>(camera_.width, camera_.height);
   }
   const auto n_patches = static_cast<int32_t>(list.patches.size());
-  for (int y = 0; y < camera_.height; ++y)
+  for (int y = rows_.first; y < rows_.end; ++y)
     for (int x = 0; x < camera_.width; ++x) {
       const int32_t id = geometry.id(x, y);
       float value = 0, cos = 0;
@@ -352,7 +371,9 @@ void Rasteriser::reflectance(const DrawList& list, const Materials& materials, c
           const auto a = static_cast<float>(view.h[0] * x + view.h[1] * y + view.h[2]) / inverse;
           const auto b = static_cast<float>(view.h[3] * x + view.h[4] * y + view.h[5]) / inverse;
           const Texture& texture = materials.texture(patch.look.texture);
-          colour = scaled(texture.sample(patch.look.u0 + patch.look.du * a, patch.look.v0 + patch.look.dv * b, std::min(2, texture.levels() - 1)), patch.shade);
+          colour = scaled(texture.sample(patch.look.u0 + patch.look.du * a, patch.look.v0 + patch.look.dv * b,
+                                         std::min(2, texture.levels() - 1)),
+                          patch.shade);
           normal = view.normal;
         } else {
           const Quadric& quadric = *list.quadrics[static_cast<size_t>(id - n_patches)];
@@ -361,9 +382,13 @@ void Rasteriser::reflectance(const DrawList& list, const Materials& materials, c
           const Texture& texture = materials.texture(quadric.look.texture);
           const float u = 0.5F + std::atan2(local.y(), local.x()) * 0.15915494F;
           const float v = quadric.tube ? 1.0F - local.z() : 0.5F - 0.5F * local.z();
-          colour = scaled(texture.sample(quadric.look.u0 + quadric.look.du * u, quadric.look.v0 + quadric.look.dv * v, std::min(2, texture.levels() - 1)), 0.9F);
+          colour = scaled(texture.sample(quadric.look.u0 + quadric.look.du * u, quadric.look.v0 + quadric.look.dv * v,
+                                         std::min(2, texture.levels() - 1)),
+                          0.9F);
         }
-        const auto channel = [&](int lane) { return static_cast<float>((colour >> (16 * lane)) & 0xFFFF) * (1.0F / 256.0F); };
+        const auto channel = [&](int lane) {
+          return static_cast<float>((colour >> (16 * lane)) & 0xFFFF) * (1.0F / 256.0F);
+        };
         value = 0.299F * channel(0) + 0.587F * channel(2) + 0.114F * channel(1);
         cos = std::abs(normal.dot(direction));
       }

@@ -29,15 +29,19 @@ struct GeometryImage {
   Image<int32_t> id;           // -1 = nothing
 };
 
-// Draws one view of a draw list with an ideal pinhole camera: exact ray intersections at one point per pixel, z-buffered
-// in inverse depth. Not thread-safe; one per thread.
+// Draws one view of a draw list with an ideal pinhole camera: exact ray intersections at one point per pixel,
+// z-buffered in inverse depth. Not thread-safe; one per thread.
 class Rasteriser {
  public:
   explicit Rasteriser(const CameraModel& camera) : camera_(camera) {}
 
-  // Rays go through pixel centre + `offset` [px]. `out` is resized. Its geometry stays known to the functions below
-  // until the next draw().
-  void draw(const DrawList& list, const Rigid3& cam_from_world, const Eigen::Vector2d& offset, GeometryImage* out);
+  // Draws rows.first ... rows.end - 1. Rays go through pixel centre + `offset` [px]. `out` is resized if need be, and
+  // its other rows are kept. The functions below are for the rows of the last draw().
+  struct Rows {
+    int first = 0, end = 0;
+  };
+  void draw(const DrawList& list, const Rigid3& cam_from_world, const Eigen::Vector2d& offset, Rows rows,
+            GeometryImage* out);
 
   // Adds the texture colour of each pixel to `sum` (lanes r, b, g, 0 of 16 bits), 1/8 of 8.5 fixed point: eight calls
   // fill the lanes. `level_shift` in [0, 1) chooses between the two nearest mip levels: spread over the calls it blends
@@ -51,25 +55,27 @@ class Rasteriser {
 
  private:
   struct PatchView {
-    double h[9];  // pixel (x, y, 1) -> (u, v, 1) / z
-    double density;  // |Jacobian determinant| of pixel -> texel, times z^-3
+    double h[9];             // pixel (x, y, 1) -> (u, v, 1) / z
+    double density;          // |Jacobian determinant| of pixel -> texel, times z^-3
     Eigen::Vector3f normal;  // in camera
-    bool seen = false;
   };
   struct QuadricView {
-    Eigen::Matrix3d m;        // to_local * world_from_cam rotation
-    Eigen::Vector3d centre;   // in camera
-    bool seen = false;
+    Eigen::Matrix3d m;       // to_local * world_from_cam rotation
+    Eigen::Vector3d centre;  // in camera
   };
-  void draw_patch(const Patch& patch, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& cam_from_world_r, GeometryImage* out);
-  void draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& world_from_cam, GeometryImage* out);
-  bool hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth, Eigen::Vector3f* local, Eigen::Vector3f* normal) const;
+  void draw_patch(const Patch& patch, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& cam_from_world_r,
+                  GeometryImage* out);
+  void draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& world_from_cam,
+                    GeometryImage* out);
+  bool hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth, Eigen::Vector3f* local,
+           Eigen::Vector3f* normal) const;
   Eigen::Vector3d ray(double x, double y) const {
     return {(x + offset_.x() - camera_.cx) / camera_.fx, (y + offset_.y() - camera_.cy) / camera_.fy, 1};
   }
 
   const CameraModel camera_;
   Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();
+  Rows rows_;
   std::vector<PatchView> patch_views_;
   std::vector<QuadricView> quadric_views_;
 };

@@ -17,12 +17,12 @@ struct Scene {
   Materials materials;
   Furnishing furnishing;
   std::vector<Mover> movers;
-  Footprint inside;          // walls of the room where people walk
-  CameraPath path;           // scene_from_cam over seconds from the first frame
+  Footprint inside;  // walls of the room where people walk
+  CameraPath path;   // scene_from_cam over seconds from the first frame
   Rigid3 world_from_scene;
   double start_stamp = 1700000000.0;  // [s] of the first frame
   int frames = 300;
-  double exposure = 0.014;   // [s]
+  double exposure = 0.014;  // [s]
   std::vector<std::string> notes;
 };
 
@@ -46,8 +46,8 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
 void add_walkers(Scene* scene, WalkArea area, int count, double duration, uint64_t seed);
 void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed);
 
-// A scene from a YAML file. Lengths in metres, angles in degrees, times in seconds; the room is centred on the origin, z
-// is up, yaw turns a thing's front from +y towards -x. Only `path` is required:
+// A scene from a YAML file. Lengths in metres, angles in degrees, times in seconds; the room is centred on the origin,
+// z is up, yaw turns a thing's front from +y towards -x. Only `path` is required:
 //   frames: 300                 # at 30 Hz; --frames wins
 //   people: 2                   # walkers; --people wins
 //   exposure_ms: 14             # 1 ... 30
@@ -60,7 +60,8 @@ void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed
 //     - {kind: box | ellipsoid, position: [1, 0, 0.5], size: [0.4, 0.3, 1], yaw: 20, material: carton}   # centre
 //   movers:
 //     - {class: person | chair, waypoints: [{time: 0, position: [-2, 0]}, {time: 4, position: [2, 0]}]}
-// Throws InputError with file:line: unknown (misspelt), repeated, missing or ill-typed key, value out of range, not YAML.
+// Throws InputError with file:line: unknown (misspelt), repeated, missing or ill-typed key, value out of range, not
+// YAML.
 Scene read_scene_file(const std::string& file, const SceneRequest& request);
 
 }  // namespace dkb::sim

@@ -29,7 +29,9 @@ Eigen::Quaterniond upright(const std::vector<TimedPose>& poses) {
   forward /= static_cast<double>(poses.size());
   // Motion-capture worlds have z up. Others (the first camera's axes, say) take up from the pictures.
   const bool z_up = up.z() > 0.3 || forward.z() < -0.7;
-  const Eigen::Quaterniond level = z_up ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond::FromTwoVectors(up.norm() > 1e-3 ? up : Vector3d(0, -1, 0), Vector3d::UnitZ());
+  const Eigen::Quaterniond level =
+      z_up ? Eigen::Quaterniond::Identity()
+           : Eigen::Quaterniond::FromTwoVectors(up.norm() > 1e-3 ? up : Vector3d(0, -1, 0), Vector3d::UnitZ());
   const Vector3d ahead = level * forward;
   const double yaw = std::hypot(ahead.x(), ahead.y()) > 0.15 ? std::atan2(ahead.y(), ahead.x()) : 1.5707963;
   return Eigen::Quaterniond(Eigen::AngleAxisd(1.5707963267948966 - yaw, Vector3d::UnitZ())) * level;
@@ -48,7 +50,8 @@ Vector2d looked_at(const View& v) {
 
 void place_desks(const std::vector<View>& views, const Footprint& room, Furnisher* furnisher) {
   for (double y = std::floor(room.y0 / kDeskDepth) * kDeskDepth; y + kDeskDepth < room.y1 - 0.5; y += kDeskDepth)
-    for (double x = std::floor(room.x0 / kDeskWidth) * kDeskWidth + 0.3; x + kDeskWidth < room.x1 - 0.5; x += kDeskWidth) {
+    for (double x = std::floor(room.x0 / kDeskWidth) * kDeskWidth + 0.3; x + kDeskWidth < room.x1 - 0.5;
+         x += kDeskWidth) {
       if (x < room.x0 + 0.5 || y < room.y0 + 0.5) continue;
       const Footprint cell{x, y, x + kDeskWidth, y + kDeskDepth};
       size_t hits = 0;
@@ -62,8 +65,11 @@ void place_desks(const std::vector<View>& views, const Footprint& room, Furnishe
         low = low || (near < 0.45 && above < 0.75);
       }
       if (!free || hits * 50 < views.size()) continue;
-      furnisher->desk(placed(x + kDeskWidth / 2, y + kDeskDepth, 0, 3.141592653589793), kDeskWidth - 0.02, kDeskDepth - 0.01,
-                      low ? Clutter::low : tall ? Clutter::monitors : Clutter::normal);
+      furnisher->desk(placed(x + kDeskWidth / 2, y + kDeskDepth, 0, 3.141592653589793), kDeskWidth - 0.02,
+                      kDeskDepth - 0.01,
+                      low    ? Clutter::low
+                      : tall ? Clutter::monitors
+                             : Clutter::normal);
     }
 }
 
@@ -73,7 +79,8 @@ void line_walls(const std::vector<View>& views, const Footprint& r, Furnisher* f
     double length;
   };
   const double w = r.x1 - r.x0, d = r.y1 - r.y0;
-  for (const Side& s : {Side{{r.x0, r.y0}, {1, 0}, w}, Side{{r.x1, r.y0}, {0, 1}, d}, Side{{r.x1, r.y1}, {-1, 0}, w}, Side{{r.x0, r.y1}, {0, -1}, d}}) {
+  for (const Side& s : {Side{{r.x0, r.y0}, {1, 0}, w}, Side{{r.x1, r.y0}, {0, 1}, d}, Side{{r.x1, r.y1}, {-1, 0}, w},
+                        Side{{r.x0, r.y1}, {0, -1}, d}}) {
     double gap = 1e9;
     const Vector2d inward(-s.along.y(), s.along.x());
     for (const View& v : views) gap = std::min(gap, inward.dot(v.eye.head<2>() - s.start));
@@ -95,7 +102,8 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
   const int available = static_cast<int>(std::floor(duration * request.fps + 1e-6)) + 1;
   scene.frames = std::min(request.frames > 0 ? request.frames : 300, available);
   if (request.frames > available)
-    scene.notes.push_back("the path lasts " + std::to_string(available) + " frames; " + std::to_string(request.frames) + " were asked for");
+    scene.notes.push_back("the path lasts " + std::to_string(available) + " frames; " + std::to_string(request.frames) +
+                          " were asked for");
   const double used = (scene.frames - 1) / request.fps;
 
   std::vector<TimedPose> samples;
@@ -118,7 +126,8 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
   scene_from_world.translation = Vector3d(-middle.x(), -middle.y(), lift);
   Footprint room{1e9, 1e9, -1e9, -1e9};
   const auto include = [&](const Vector2d& p, double margin) {
-    room = {std::min(room.x0, p.x() - margin), std::min(room.y0, p.y() - margin), std::max(room.x1, p.x() + margin), std::max(room.y1, p.y() + margin)};
+    room = {std::min(room.x0, p.x() - margin), std::min(room.y0, p.y() - margin), std::max(room.x1, p.x() + margin),
+            std::max(room.y1, p.y() + margin)};
   };
   for (View& v : views) {
     v.eye += scene_from_world.translation;
@@ -126,7 +135,8 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
     include(looked_at(v), 1.3);
   }
   // At least 5 x 4.4 m.
-  const double grow_x = std::max(0.0, 5.0 - (room.x1 - room.x0)) / 2, grow_y = std::max(0.0, 4.4 - (room.y1 - room.y0)) / 2;
+  const double grow_x = std::max(0.0, 5.0 - (room.x1 - room.x0)) / 2,
+               grow_y = std::max(0.0, 4.4 - (room.y1 - room.y0)) / 2;
   room = {room.x0 - grow_x, room.y0 - grow_y, room.x1 + grow_x, room.y1 + grow_y};
 
   Furnisher furnisher(&scene.materials, &scene.furnishing, hash64(request.seed, 0xF00D));

@@ -28,15 +28,18 @@ std::string listed(const std::vector<std::string>& names) {
 // A map of the file whose keys are known; every complaint names the file and the line.
 class Section {
  public:
-  Section(const std::string& file, const YAML::Node& node, const std::string& name, const std::vector<std::string>& keys)
+  Section(const std::string& file, const YAML::Node& node, const std::string& name,
+          const std::vector<std::string>& keys)
       : file_(file), node_(node), name_(name) {
     if (!node.IsMap()) fail(node, name + " must be a map of " + listed(keys));
     std::vector<std::string> seen;
     for (const auto& entry : node) {
       const auto key = entry.first.as<std::string>();
       if (std::find(keys.begin(), keys.end(), key) == keys.end())
-        fail(entry.first, "unknown key \"" + key + "\" in " + name + did_you_mean(key, keys) + "; the keys are " + listed(keys));
-      if (std::find(seen.begin(), seen.end(), key) != seen.end()) fail(entry.first, "key \"" + key + "\" stands twice in " + name);
+        fail(entry.first,
+             "unknown key \"" + key + "\" in " + name + did_you_mean(key, keys) + "; the keys are " + listed(keys));
+      if (std::find(seen.begin(), seen.end(), key) != seen.end())
+        fail(entry.first, "key \"" + key + "\" stands twice in " + name);
       seen.push_back(key);
     }
   }
@@ -47,7 +50,9 @@ class Section {
     return node_[key];
   }
   double number(const std::string& key, double low, double high) const { return checked(child(key), key, low, high); }
-  double number(const std::string& key, double low, double high, double otherwise) const { return has(key) ? number(key, low, high) : otherwise; }
+  double number(const std::string& key, double low, double high, double otherwise) const {
+    return has(key) ? number(key, low, high) : otherwise;
+  }
   int whole(const std::string& key, int low, int high, int otherwise) const {
     const double v = number(key, low, high, otherwise);
     if (v != std::floor(v)) fail(node_[key], key + " must be a whole number");
@@ -59,7 +64,8 @@ class Section {
     if (!YAML::convert<bool>::decode(node_[key], v)) fail(node_[key], key + " must be true or false");
     return v;
   }
-  std::string choice(const std::string& key, const std::vector<std::string>& names, const std::string& otherwise) const {
+  std::string choice(const std::string& key, const std::vector<std::string>& names,
+                     const std::string& otherwise) const {
     if (!has(key) && !otherwise.empty()) return otherwise;
     const YAML::Node n = child(key);
     const std::string v = n.IsScalar() ? n.Scalar() : "";
@@ -69,7 +75,8 @@ class Section {
   }
   std::vector<double> numbers(const std::string& key, size_t count) const {
     const YAML::Node n = child(key);
-    if (!n.IsSequence() || n.size() != count) fail(n, key + " must be a list of " + std::to_string(count) + " numbers [m]");
+    if (!n.IsSequence() || n.size() != count)
+      fail(n, key + " must be a list of " + std::to_string(count) + " numbers [m]");
     std::vector<double> out;
     for (const auto& v : n) out.push_back(checked(v, key, -1000, 1000));
     return out;
@@ -88,7 +95,9 @@ class Section {
   double checked(const YAML::Node& n, const std::string& key, double low, double high) const {
     double v = 0;
     if (!n.IsScalar() || !parse_number(n.Scalar(), &v) || !std::isfinite(v)) fail(n, key + " must be a number");
-    if (v < low || v > high) fail(n, key + ": " + n.Scalar() + " is out of range; it must be " + std::to_string(low) + " ... " + std::to_string(high));
+    if (v < low || v > high)
+      fail(n, key + ": " + n.Scalar() + " is out of range; it must be " + std::to_string(low) + " ... " +
+                  std::to_string(high));
     return v;
   }
   std::string file_;
@@ -106,7 +115,8 @@ void read_room(const std::string& file, const Section& top, uint64_t seed, Scene
       const std::vector<double> size = room.numbers("size", 2);
       width = size[0];
       depth = size[1];
-      if (width < 2 || depth < 2 || width > 50 || depth > 50) room.fail(room.child("size"), "size must be 2 ... 50 m each way");
+      if (width < 2 || depth < 2 || width > 50 || depth > 50)
+        room.fail(room.child("size"), "size must be 2 ... 50 m each way");
     }
     height = room.number("height", 2, 10, height);
     floor = room.choice("floor", {"planks", "carpet", "plaster", "wood"}, floor);
@@ -130,9 +140,11 @@ void read_objects(const std::string& file, const Section& top, uint64_t seed, Sc
   Furnisher f(&scene->materials, &scene->furnishing, hash64(seed, 0x0B7E));
   for (const auto& node : top.list("objects")) {
     const Section o(file, node, "objects", {"kind", "position", "yaw", "size", "material"});
-    const std::string kind = o.choice("kind", {"box", "ellipsoid", "desk", "shelf", "cabinet", "chair", "plant", "cartons"}, "");
+    const std::string kind =
+        o.choice("kind", {"box", "ellipsoid", "desk", "shelf", "cabinet", "chair", "plant", "cartons"}, "");
     const bool free = kind == "box" || kind == "ellipsoid";
-    if (!free && (o.has("size") || o.has("material"))) o.fail(node, "size and material belong to kind box and ellipsoid only");
+    if (!free && (o.has("size") || o.has("material")))
+      o.fail(node, "size and material belong to kind box and ellipsoid only");
     const std::vector<double> p = o.numbers("position", free ? 3 : 2);
     const double yaw = o.number("yaw", -360, 360, 0) * kDegree;
     if (!free) {
@@ -149,11 +161,14 @@ void read_objects(const std::string& file, const Section& top, uint64_t seed, Sc
     for (const double v : size)
       if (v < 0.005) o.fail(o.child("size"), "size must be at least 0.005 m each way");
     const std::string material = o.choice("material", material_names(), "carton");
-    const auto kind_of = static_cast<Material>(std::find(material_names().begin(), material_names().end(), material) - material_names().begin());
-    const int t = scene->materials.get(kind_of, hash64(seed, static_cast<uint64_t>(node.Mark().line)), std::max(size[0], size[1]), size[2]);
+    const auto kind_of = static_cast<Material>(std::find(material_names().begin(), material_names().end(), material) -
+                                               material_names().begin());
+    const int t = scene->materials.get(kind_of, hash64(seed, static_cast<uint64_t>(node.Mark().line)),
+                                       std::max(size[0], size[1]), size[2]);
     Surfaces s;
     if (kind == "box") {
-      s.add_box(-0.5 * Vector3d(size[0], size[1], size[2]), Vector3d(size[0], 0, 0), Vector3d(0, size[1], 0), Vector3d(0, 0, size[2]), {t, t, t, t, t, t});
+      s.add_box(-0.5 * Vector3d(size[0], size[1], size[2]), Vector3d(size[0], 0, 0), Vector3d(0, size[1], 0),
+                Vector3d(0, 0, size[2]), {t, t, t, t, t, t});
     } else {
       TextureWindow look;
       look.texture = t;
@@ -170,12 +185,15 @@ void read_path(const std::string& file, const Section& top, uint64_t seed, Scene
   for (const auto& node : top.list("path")) {
     const Section k(file, node, "path", {"time", "position", "look_at"});
     const double time = k.number("time", 0, 36000);
-    if (!knots.empty() && time <= knots.back().time) k.fail(k.child("time"), "time must be later than that of the entry before");
+    if (!knots.empty() && time <= knots.back().time)
+      k.fail(k.child("time"), "time must be later than that of the entry before");
     const std::vector<double> p = k.numbers("position", 3), q = k.numbers("look_at", 3);
     const Vector3d eye(p[0], p[1], p[2]), d = Vector3d(q[0], q[1], q[2]) - eye;
     const Footprint& in = scene->inside;
-    if (eye.x() <= in.x0 || eye.x() >= in.x1 || eye.y() <= in.y0 || eye.y() >= in.y1 || eye.z() <= 0) k.fail(k.child("position"), "position is outside the room");
-    if (std::hypot(d.x(), d.y()) < 1e-3) k.fail(k.child("look_at"), "look_at must not be straight above or below position");
+    if (eye.x() <= in.x0 || eye.x() >= in.x1 || eye.y() <= in.y0 || eye.y() >= in.y1 || eye.z() <= 0)
+      k.fail(k.child("position"), "position is outside the room");
+    if (std::hypot(d.x(), d.y()) < 1e-3)
+      k.fail(k.child("look_at"), "look_at must not be straight above or below position");
     knots.push_back({time, camera_pose(eye, std::atan2(d.y(), d.x()), std::atan2(d.z(), std::hypot(d.x(), d.y())))});
   }
   const double tremor = top.number("tremor", 0, 10, 1);
@@ -185,7 +203,8 @@ void read_path(const std::string& file, const Section& top, uint64_t seed, Scene
     if (tremor == 0) return steady(t);
     const Tremor h = hand_tremor(t, 0.006 * tremor, 0.008 * tremor, seed);
     const Rigid3 p = steady(t);
-    return Rigid3((p.rotation * rotation_from_vector(Vector3d(h.pitch, h.yaw, h.roll))).normalized(), p.translation + h.shift);
+    return Rigid3((p.rotation * rotation_from_vector(Vector3d(h.pitch, h.yaw, h.roll))).normalized(),
+                  p.translation + h.shift);
   };
 }
 
@@ -198,9 +217,11 @@ void read_movers(const std::string& file, const Section& top, double duration, u
       const Section w(file, entry, "waypoints", {"time", "position"});
       const std::vector<double> p = w.numbers("position", 2);
       points.push_back({{p[0], p[1]}, w.number("time", 0, 36000)});
-      if (points.size() > 1 && points.back().time <= points[points.size() - 2].time) w.fail(w.child("time"), "time must be later than that of the entry before");
+      if (points.size() > 1 && points.back().time <= points[points.size() - 2].time)
+        w.fail(w.child("time"), "time must be later than that of the entry before");
     }
-    add_mover(scene, m.choice("class", {"person", "chair"}, "person"), track_along(points, duration), hash64(seed, static_cast<uint64_t>(scene->movers.size()), 3));
+    add_mover(scene, m.choice("class", {"person", "chair"}, "person"), track_along(points, duration),
+              hash64(seed, static_cast<uint64_t>(scene->movers.size()), 3));
   }
 }
 

@@ -43,10 +43,16 @@ void line_room(const Footprint& r, const std::array<double, 4>& depth_limit, Fur
   f->line_wall({r.x0, r.y1 - corner}, {0, -1}, d - 2 * corner, depth_limit[3]);
 }
 
-void desk_facing_south(double x, double y, Furnisher* f) { f->desk(placed(x, y + 0.75, 0, kPi), 1.4, 0.75, Clutter::monitors); }
+void desk_facing_south(double x, double y, Furnisher* f) {
+  f->desk(placed(x, y + 0.75, 0, kPi), 1.4, 0.75, Clutter::monitors);
+}
 
-int frames_of(const SceneRequest& request, int usual) { return request.frames > 0 ? request.frames : usual; }
-int people_of(const SceneRequest& request, int usual) { return request.people >= 0 ? request.people : usual; }
+int frames_of(const SceneRequest& request, int usual) {
+  return request.frames > 0 ? request.frames : usual;
+}
+int people_of(const SceneRequest& request, int usual) {
+  return request.people >= 0 ? request.people : usual;
+}
 
 Scene build_room(const SceneRequest& request) {
   // The path is made first; the room is furnished around it as around any given path.
@@ -76,7 +82,8 @@ Scene open_hall(const SceneRequest& request, double sway) {
   for (const double x : {-1.5, 0.0, 1.5}) desk_facing_south(x, 1.25, &f);
   const uint64_t seed = hash64(request.seed, 6);
   scene.path = [seed, sway](double t) {
-    const Vector3d eye(0.45 * sway * std::sin(0.8 * t), -1.9 + 0.25 * sway * std::sin(0.57 * t), 1.38 + 0.12 * sway * std::sin(1.1 * t));
+    const Vector3d eye(0.45 * sway * std::sin(0.8 * t), -1.9 + 0.25 * sway * std::sin(0.57 * t),
+                       1.38 + 0.12 * sway * std::sin(1.1 * t));
     const Vector3d target(0.5 * sway * std::sin(0.45 * t + 0.6), 1.4, 0.95);
     return looking_at(eye, target, t, 1, seed);
   };
@@ -104,7 +111,8 @@ Scene build_spin(const SceneRequest& request) {
   scene.path = [seed](double t) {
     // 60 degrees a second on average, 85 at most.
     const double yaw = 1.047 * t + 0.35 * std::sin(1.2 * t);
-    return shaken({0.15 * std::cos(0.8 * t), 0.15 * std::sin(0.8 * t), 1.4}, yaw, -0.2 + 0.08 * std::sin(0.9 * t), t, 0.7, seed);
+    return shaken({0.15 * std::cos(0.8 * t), 0.15 * std::sin(0.8 * t), 1.4}, yaw, -0.2 + 0.08 * std::sin(0.9 * t), t,
+                  0.7, seed);
   };
   if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request.seed);
   return scene;
@@ -177,7 +185,8 @@ Scene build_cover(const SceneRequest& request) {
       const Rigid3 camera = path(t);
       const Vector3d ahead = camera.rotation * Vector3d::UnitZ();
       // Follows the camera half-way, sways on its own.
-      const double x = 0.8 * camera.translation.x() + 0.3 * ahead.x() + 0.05 * std::sin(1.3 * t), y = camera.translation.y() + 0.62 + 0.03 * std::sin(0.7 * t);
+      const double x = 0.8 * camera.translation.x() + 0.3 * ahead.x() + 0.05 * std::sin(1.3 * t),
+                   y = camera.translation.y() + 0.62 + 0.03 * std::sin(0.7 * t);
       const double in = eased((t - (arrive - 1.4)) / 1.4, 0.3), out = eased((t - leave) / 1.4, 0.3);
       return {x + 2.4 * (1 - in) - 2.4 * out, y + 0.25 * (1 - in) + 0.25 * out};
     };
@@ -185,7 +194,8 @@ Scene build_cover(const SceneRequest& request) {
       MoverState s;
       s.position = where(t);
       s.velocity = (where(t + 0.01) - where(t - 0.01)) / 0.02;
-      const double speed = s.velocity.norm(), inside = eased((t - arrive + 0.5) / 0.5, 0.3) * (1 - eased((t - leave) / 0.5, 0.3));
+      const double speed = s.velocity.norm(),
+                   inside = eased((t - arrive + 0.5) / 0.5, 0.3) * (1 - eased((t - leave) / 0.5, 0.3));
       s.heading = kPi + (kPi / 2) * inside;  // walks along -x, turns to the camera
       s.stride = std::min(1.2, speed / 1.1) * (1 - inside) + 0.1 * inside;
       phase += Track::kStep * 6.2832 * (0.2 + 0.5 * speed);
@@ -244,10 +254,10 @@ Scene build_loop(const SceneRequest& request) {
     Vector2d start, along;
     double length, depth;
   };
-  const std::vector<Side> walls{
-      {{r.x0 + 0.7, r.y0}, {1, 0}, 7.6, 0.7}, {{r.x1, r.y0 + 0.1}, {0, 1}, 2.9, 0.45},  {{r.x1, -1.1}, {0, 1}, 2.2, 0.2},
-      {{r.x1, 1.25}, {0, 1}, 1.7, 0.45},      {{r.x1 - 0.7, r.y1}, {-1, 0}, 7.6, 0.45}, {{r.x0, r.y1 - 0.6}, {0, -1}, 1.7, 0.45},
-      {{r.x0, 1.1}, {0, -1}, 2.2, 0.2},       {{r.x0, -1.3}, {0, -1}, 2.2, 0.45}};
+  const std::vector<Side> walls{{{r.x0 + 0.7, r.y0}, {1, 0}, 7.6, 0.7},   {{r.x1, r.y0 + 0.1}, {0, 1}, 2.9, 0.45},
+                                {{r.x1, -1.1}, {0, 1}, 2.2, 0.2},         {{r.x1, 1.25}, {0, 1}, 1.7, 0.45},
+                                {{r.x1 - 0.7, r.y1}, {-1, 0}, 7.6, 0.45}, {{r.x0, r.y1 - 0.6}, {0, -1}, 1.7, 0.45},
+                                {{r.x0, 1.1}, {0, -1}, 2.2, 0.2},         {{r.x0, -1.3}, {0, -1}, 2.2, 0.45}};
   for (const Side& s : walls) f.line_wall(s.start, s.along, s.length, s.depth);
   // The core's outside: the room lies to the left when going round it clockwise.
   f.line_wall({2.2, -1.2}, {-1, 0}, 4.4, 0.3);
@@ -323,14 +333,15 @@ Scene build_twins(const SceneRequest& request) {
   auto& patches = scene.furnishing.surfaces.patches;
   patches.erase(std::remove_if(patches.begin(), patches.end(),
                                [&](const Patch& p) {
-                                 const bool across = std::abs(p.u.x()) < 1e-9 && std::abs(p.v.x()) < 1e-9 && p.u.norm() > 3;
+                                 const bool across =
+                                     std::abs(p.u.x()) < 1e-9 && std::abs(p.v.x()) < 1e-9 && p.u.norm() > 3;
                                  return across && p.origin.x() > 0.05 && p.origin.x() < pitch_x + width - 0.05;
                                }),
                 patches.end());
   for (const double x : {width, width + 0.1 + corridor}) {
     f.block(x, 0.75, x + 0.1, north, h);
     f.block(x, south, x + 0.1, -0.75, h);
-    f.line_wall({x, 0.75}, {0, 1}, north - 0.8, 0.1);           // seen from the west
+    f.line_wall({x, 0.75}, {0, 1}, north - 0.8, 0.1);                 // seen from the west
     f.line_wall({x + 0.1, north - 0.05}, {0, -1}, north - 0.8, 0.1);  // and from the east
   }
   const uint64_t seed = hash64(request.seed, 9);
@@ -338,7 +349,8 @@ Scene build_twins(const SceneRequest& request) {
   scene.path = [seed, duration, pitch_x](double t) {
     // From room to room the camera does exactly the same; only the hand's tremor differs.
     const double x = 0.75 + 9.9 * eased(t / duration, 0.03), along = 6.283185307 * (x - 0.75) / pitch_x;
-    return shaken({x, 0.06 * std::sin(along), 1.36 + 0.04 * std::sin(2 * along)}, kPi / 2 + 0.14 * std::cos(along), -0.16, t, 1, seed);
+    return shaken({x, 0.06 * std::sin(along), 1.36 + 0.04 * std::sin(2 * along)}, kPi / 2 + 0.14 * std::cos(along),
+                  -0.16, t, 1, seed);
   };
   if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request.seed);
   return scene;
@@ -368,10 +380,12 @@ void add_walkers(Scene* scene, WalkArea area, int count, double duration, uint64
       const Rigid3 pose = path(random.uniform(0, duration));
       const Vector3d ahead = pose.rotation * Vector3d::UnitZ();
       const Vector2d axis = Vector2d(ahead.x(), ahead.y()) / std::max(1e-3, std::hypot(ahead.x(), ahead.y()));
-      return pose.translation.head<2>() + random.uniform(1.1, 3.2) * axis + random.uniform(-1.6, 1.6) * Vector2d(-axis.y(), axis.x());
+      return pose.translation.head<2>() + random.uniform(1.1, 3.2) * axis +
+             random.uniform(-1.6, 1.6) * Vector2d(-axis.y(), axis.x());
     };
   uint64_t i = 0;
-  for (Track& track : plan_walks(area, count, duration, seed)) add_mover(scene, "person", std::move(track), hash64(seed, 100 + i++));
+  for (Track& track : plan_walks(area, count, duration, seed))
+    add_mover(scene, "person", std::move(track), hash64(seed, 100 + i++));
 }
 
 Scene build_scene(const SceneRequest& request) {

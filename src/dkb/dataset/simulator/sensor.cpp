@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kBaseline = 0.075;  // [m] between projector and camera
 
-uint8_t byte(float v) { return static_cast<uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F); }
+uint8_t byte(float v) {
+  return static_cast<uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F);
+}
 
 float in_units(float z, const CameraModel& camera) {
   const auto factor = static_cast<float>(camera.depth_factor);
@@ -25,7 +27,8 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, doub
   ColourImage out(width, height);
   // Noise common to the channels and of each channel, so that 0.299 r + 0.587 g + 0.114 b has the wanted spread.
   const auto own = static_cast<float>(0.8 * grey_noise);
-  const auto common = static_cast<float>(std::sqrt(std::max(0.0, 1 - 0.64 * (0.299 * 0.299 + 0.587 * 0.587 + 0.114 * 0.114))) * grey_noise);
+  const auto common = static_cast<float>(
+      std::sqrt(std::max(0.0, 1 - 0.64 * (0.299 * 0.299 + 0.587 * 0.587 + 0.114 * 0.114))) * grey_noise);
   const float cx = static_cast<float>(width - 1) / 2, cy = static_cast<float>(height - 1) / 2, r2 = cx * cx + cy * cy;
   for (int y = 0; y < height; ++y) {
     const uint64_t* row = sum.data() + static_cast<size_t>(y) * static_cast<size_t>(width);
@@ -38,7 +41,9 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, doub
       const float n = common * normal_from_bits(h);
       // Two independent normals of the second hash's halves: sums of two uniforms are near enough for the channels.
       const auto pair = [&](int shift) {
-        return own * (static_cast<float>((g >> shift) & 0x3FF) + static_cast<float>((g >> (shift + 10)) & 0x3FF) - 1023.0F) * (2.4494897F / 1024.0F);
+        return own *
+               (static_cast<float>((g >> shift) & 0x3FF) + static_cast<float>((g >> (shift + 10)) & 0x3FF) - 1023.0F) *
+               (2.4494897F / 1024.0F);
       };
       const uint64_t c = row[x];
       target[x].r = byte(static_cast<float>(c & 0xFFFF) * gain + n + pair(0));
@@ -54,13 +59,14 @@ DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& cam
   for (int y = 0; y < out.height(); ++y)
     for (int x = 0; x < out.width(); ++x) {
       const float i = inverse_depth(x, y), z = i > 0 ? 1 / i : 0;
-      if (z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max)) out(x, y) = in_units(z, camera);
+      if (z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max))
+        out(x, y) = in_units(z, camera);
     }
   return out;
 }
 
-DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine, const CameraModel& camera,
-                       uint64_t seed) {
+DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine,
+                       const CameraModel& camera, uint64_t seed) {
   const int width = inverse_depth.width(), height = inverse_depth.height();
   DepthImage out(width, height);
   const auto fb = static_cast<float>(camera.fx * kBaseline);  // disparity [px] = fb / z
@@ -93,9 +99,9 @@ DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& gr
       const float patch = lattice_noise(fx * 0.12F, fy * 0.12F, hash64(seed, 12));
       const float rough = 0.6F * patch + 0.4F * lattice_noise(fx * 0.4F, fy * 0.4F, hash64(seed, 13));
       if (shadow[static_cast<size_t>(x)] > 1.0F + 0.6F * patch) continue;
-      if (cosine(sx, y) < 0.19F + 0.06F * rough) continue;                                 // slanted
+      if (cosine(sx, y) < 0.19F + 0.06F * rough) continue;                                          // slanted
       if (grey(sx, y) * (0.4F + 0.6F * cosine(sx, y)) < 23.0F + 9.0F * rough + 1.5F * z) continue;  // dark
-      if ((h & 1023) < 2) continue;                                                        // single drop-outs
+      if ((h & 1023) < 2) continue;                                                                 // single drop-outs
       // Windows that straddle an edge find no match.
       bool edge = false;
       const int reach = rough > 0.1F ? 2 : 1;

@@ -16,8 +16,8 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, doub
 // Depth as a structured-light sensor gives it: Gaussian noise of 0.0012 + 0.0019 (z - 0.4)^2 m, disparity in steps of
 // 1/8 px (baseline 7.5 cm), ragged edges, holes in the projector's shadow, at edges, on dark and on slanted surfaces,
 // nothing outside depth_min ... depth_max. Values are multiples of 1 / depth_factor.
-DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine, const CameraModel& camera,
-                       uint64_t seed);
+DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine,
+                       const CameraModel& camera, uint64_t seed);
 
 // Only rounded to the file's units and cut to the range.
 DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& camera);

@@ -32,13 +32,15 @@ FrameRecord write_frame(const Simulator& simulator, int index, const std::filesy
   write_image_file(folder / "rgb" / (f.stamp + ".jpg"), encode_jpeg(f.image.colour, jpeg_quality));
   Image<uint16_t> depth(f.image.depth.width(), f.image.depth.height());
   for (size_t i = 0; i < depth.size(); ++i)
-    depth.data()[i] = static_cast<uint16_t>(std::lround(static_cast<double>(f.image.depth.data()[i]) * simulator.camera().depth_factor));
+    depth.data()[i] = static_cast<uint16_t>(
+        std::lround(static_cast<double>(f.image.depth.data()[i]) * simulator.camera().depth_factor));
   write_image_file(folder / "depth" / (f.depth_stamp + ".png"), encode_png(depth, 1));
   write_image_file(folder / "masks" / (f.stamp + ".png"), encode_png(f.mask, 1));
   return {f.stamp, f.depth_stamp, f.image.timestamp, f.world_from_cam, f.movers};
 }
 
-void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& records, const std::filesystem::path& folder) {
+void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& records,
+                 const std::filesystem::path& folder) {
   std::string rgb = "# timestamp filename\n", depth = rgb;
   std::string pairs = "# rgb_timestamp rgb_filename depth_timestamp depth_filename\n";
   std::string boxes = "# rgb_timestamp class x y w h score\n";
@@ -52,8 +54,8 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
     for (const SimulatedMover& m : r.movers) {
       boxes += fmt::format("{} {} {} {} {} {} 1\n", r.stamp, m.kind, m.box_x, m.box_y, m.box_width, m.box_height);
       const Eigen::Vector3d &p = m.position_in_world, &v = m.velocity_in_world;
-      movers += fmt::format("{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},0,{},{},{},{}\n", r.stamp, m.id, m.kind, p.x(), p.y(), p.z(),
-                            v.x(), v.y(), v.z(), m.box_x, m.box_y, m.box_width, m.box_height);
+      movers += fmt::format("{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},0,{},{},{},{}\n", r.stamp, m.id, m.kind,
+                            p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), m.box_x, m.box_y, m.box_width, m.box_height);
     }
   }
   write_file_atomically(folder / "camera.yaml", camera_to_yaml(simulator.camera()));
@@ -72,8 +74,8 @@ void SequenceWriterOptions::check() const {
   require_option(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", jpeg_quality, "1 ... 100");
 }
 
-void write_sequence(const Simulator& simulator, const std::filesystem::path& folder, const std::function<void(int)>& progress,
-                    const SequenceWriterOptions& options) {
+void write_sequence(const Simulator& simulator, const std::filesystem::path& folder,
+                    const std::function<void(int)>& progress, const SequenceWriterOptions& options) {
   options.check();
   make_output_folder(folder);
   for (const char* sub : {"rgb", "depth", "masks"}) make_output_folder(folder / sub);

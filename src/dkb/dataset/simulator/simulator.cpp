@@ -20,13 +20,16 @@ namespace {
 
 // Ray positions in a pixel and moments of the exposure, one each per drawing: the two do not follow each other, so that
 // neither direction of motion is favoured. 1/16 px.
-constexpr std::array<std::array<int, 2>, 8> kRays{{{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
-constexpr double kLensBlur = 1.7;     // rays spread over that many pixels
+constexpr std::array<std::array<int, 2>, 8> kRays{
+    {{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
+constexpr double kLensBlur = 1.7;       // rays spread over that many pixels
+constexpr int kBandRows = 16;           // rows read at the same time, as far as the rolling shutter goes
 constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth
 
 std::string stamp_text(int64_t microseconds) {
   std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%lld.%06lld", static_cast<long long>(microseconds / 1000000), static_cast<long long>(microseconds % 1000000));
+  std::snprintf(text.data(), text.size(), "%lld.%06lld", static_cast<long long>(microseconds / 1000000),
+                static_cast<long long>(microseconds % 1000000));
   return text.data();
 }
 
@@ -34,7 +37,9 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
   std::vector<sim::TimedPose> poses;
   for (const StampedPose& p : read_trajectory(file))
     if (poses.empty() || p.timestamp > poses.back().time) poses.push_back({p.timestamp, p.world_from_cam});
-  if (poses.size() < 2) throw InputError(file + ": holds " + std::to_string(poses.size()) + " poses; a camera path needs at least 2 at different times");
+  if (poses.size() < 2)
+    throw InputError(file + ": holds " + std::to_string(poses.size()) +
+                     " poses; a camera path needs at least 2 at different times");
   return poses;
 }
 
@@ -47,7 +52,8 @@ double median_of(std::vector<float>* v) {
 }  // namespace
 
 const std::vector<std::string>& simulator_scenes() {
-  static const std::vector<std::string> names{"room", "crowd", "loop", "spin", "rush", "straight", "cover", "chair", "twins"};
+  static const std::vector<std::string> names{"room",     "crowd", "loop",  "spin", "rush",
+                                              "straight", "cover", "chair", "twins"};
   return names;
 }
 
@@ -56,7 +62,9 @@ void SimulatorOptions::check() const {
   require_option(people >= -1 && people <= 30, "people", people, "0 ... 30");
   require_option(width >= 64 && width <= 4096, "width", width, "64 ... 4096 px");
   require_option(height >= 64 && height <= 4096, "height", height, "64 ... 4096 px");
-  require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure, "0.001 ... 0.03 s, or 0 for the scene's own");
+  require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure,
+                 "0.001 ... 0.03 s, or 0 for the scene's own");
+  require_option(readout >= 0 && readout <= 0.033, "readout", readout, "0 ... 0.033 s");
   require_option(grey_noise >= 0 && grey_noise <= 20, "grey_noise", grey_noise, "0 ... 20 grey levels");
 }
 
@@ -69,8 +77,15 @@ struct Simulator::Impl {
   int64_t start_us() const { return std::llround(scene.start_stamp * 1e6); }
   int64_t colour_us(int i) const { return std::llround(i * 1e6 / camera.fps); }
   int64_t depth_us(int i) const {
-    const double shift = (2.0 * static_cast<double>(sim::unit_float(sim::hash64(options.seed, 0xD5, static_cast<uint64_t>(i)))) - 1.0) * kStampSpread;
+    const double shift =
+        (2.0 * static_cast<double>(sim::unit_float(sim::hash64(options.seed, 0xD5, static_cast<uint64_t>(i)))) - 1.0) *
+        kStampSpread;
     return colour_us(i) + std::llround(shift * 1e6);
+  }
+
+  // [s] that these rows are read after the middle row.
+  double row_delay(const sim::Rasteriser::Rows& rows) const {
+    return options.readout * ((rows.first + rows.end) / (2.0 * camera.height) - 0.5);
   }
 
   // Surfaces of all movers at a time, with the owner of each primitive.
@@ -90,17 +105,19 @@ struct Simulator::Impl {
   // Index of the mover that owns each id; -1 for still things.
   static std::vector<int> owners(const sim::DrawList& still, const MoverSurfaces& movers) {
     std::vector<int> out(still.patches.size(), -1);
-    for (size_t m = 0; m < movers.parts.size(); ++m) out.insert(out.end(), movers.parts[m].patches.size(), static_cast<int>(m));
+    for (size_t m = 0; m < movers.parts.size(); ++m)
+      out.insert(out.end(), movers.parts[m].patches.size(), static_cast<int>(m));
     out.insert(out.end(), still.quadrics.size(), -1);
-    for (size_t m = 0; m < movers.parts.size(); ++m) out.insert(out.end(), movers.parts[m].quadrics.size(), static_cast<int>(m));
+    for (size_t m = 0; m < movers.parts.size(); ++m)
+      out.insert(out.end(), movers.parts[m].quadrics.size(), static_cast<int>(m));
     return out;
   }
-  void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam, double t,
-                      SimulatedFrame* frame) const;
+  void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam,
+                      double t, SimulatedFrame* frame) const;
 };
 
-void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam, double t,
-                                     SimulatedFrame* frame) const {
+void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner,
+                                     const Rigid3& scene_from_cam, double t, SimulatedFrame* frame) const {
   struct Seen {
     int x0 = 1 << 20, y0 = 1 << 20, x1 = -1, y1 = -1;
     std::vector<float> x, y, z;
@@ -118,7 +135,8 @@ void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const s
       s.y0 = std::min(s.y0, y);
       s.x1 = std::max(s.x1, x);
       s.y1 = std::max(s.y1, y);
-      const Eigen::Vector3d p = world_from_cam * camera.unproject({x, y}, 1.0 / static_cast<double>(geometry.inverse_depth(x, y)));
+      const Eigen::Vector3d p =
+          world_from_cam * camera.unproject({x, y}, 1.0 / static_cast<double>(geometry.inverse_depth(x, y)));
       s.x.push_back(static_cast<float>(p.x()));
       s.y.push_back(static_cast<float>(p.y()));
       s.z.push_back(static_cast<float>(p.z()));
@@ -164,11 +182,13 @@ Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<I
   if (!file && std::find(names.begin(), names.end(), options.scene) == names.end()) {
     std::string list;
     for (const std::string& n : names) list += (list.empty() ? "" : ", ") + n;
-    throw InputError("--scene: unknown scene \"" + options.scene + "\"" + did_you_mean(options.scene, names) + "; there are " + list +
-                     ", or a YAML file");
+    throw InputError("--scene: unknown scene \"" + options.scene + "\"" + did_you_mean(options.scene, names) +
+                     "; there are " + list + ", or a YAML file");
   }
   if (!options.path.empty()) {
-    if (options.scene != "room") throw InputError("--path: the camera follows a path only in scene room, not in " + options.scene + "; leave out --scene");
+    if (options.scene != "room")
+      throw InputError("--path: the camera follows a path only in scene room, not in " + options.scene +
+                       "; leave out --scene");
     m.scene = sim::build_scene_around(poses_of_file(options.path), request);
   } else if (file) {
     m.scene = sim::read_scene_file(options.scene, request);
@@ -182,17 +202,30 @@ Simulator::~Simulator() = default;
 Simulator::Simulator(Simulator&&) noexcept = default;
 Simulator& Simulator::operator=(Simulator&&) noexcept = default;
 
-int Simulator::frames() const { return impl_->scene.frames; }
-const CameraModel& Simulator::camera() const { return impl_->camera; }
-double Simulator::exposure() const { return impl_->exposure; }
-const std::vector<std::string>& Simulator::notes() const { return impl_->scene.notes; }
-Rigid3 Simulator::world_from_cam(double seconds) const { return impl_->scene.world_from_scene * impl_->scene.path(seconds); }
-double Simulator::stamp(int index) const { return static_cast<double>(impl_->start_us() + impl_->colour_us(index)) * 1e-6; }
+int Simulator::frames() const {
+  return impl_->scene.frames;
+}
+const CameraModel& Simulator::camera() const {
+  return impl_->camera;
+}
+double Simulator::exposure() const {
+  return impl_->exposure;
+}
+const std::vector<std::string>& Simulator::notes() const {
+  return impl_->scene.notes;
+}
+Rigid3 Simulator::world_from_cam(double seconds) const {
+  return impl_->scene.world_from_scene * impl_->scene.path(seconds);
+}
+double Simulator::stamp(int index) const {
+  return static_cast<double>(impl_->start_us() + impl_->colour_us(index)) * 1e-6;
+}
 
 double Simulator::nearest_mover(double seconds) const {
   double nearest = std::numeric_limits<double>::infinity();
   const Eigen::Vector3d eye = impl_->scene.path(seconds).translation;
-  for (const sim::Mover& mover : impl_->scene.movers) nearest = std::min(nearest, (mover.track.at(seconds).position - eye.head<2>()).norm());
+  for (const sim::Mover& mover : impl_->scene.movers)
+    nearest = std::min(nearest, (mover.track.at(seconds).position - eye.head<2>()).norm());
   return nearest;
 }
 
@@ -212,21 +245,28 @@ SimulatedFrame Simulator::render(int index) const {
 
   // What may be seen at any moment of the frame.
   double slack = 0;
-  for (const double other : {t - m.exposure / 2, t + m.exposure / 2, depth_t}) {
+  for (const double other :
+       {t - (m.exposure + m.options.readout) / 2, t + (m.exposure + m.options.readout) / 2, depth_t}) {
     const Rigid3 motion = m.scene.path(other).inverse() * middle;
     slack = std::max({slack, motion.translation.norm(), vector_from_rotation(motion.rotation).norm()});
   }
   sim::DrawList still;
   still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), 1.5 * slack + 0.02);
 
+  std::vector<sim::Rasteriser::Rows> bands;
+  const int band = m.options.readout > 0 ? kBandRows : m.camera.height;
+  for (int y = 0; y < m.camera.height; y += band) bands.push_back({y, std::min(y + band, m.camera.height)});
   sim::Rasteriser rasteriser(m.camera);
   sim::GeometryImage geometry;
   const uint64_t seed = sim::hash64(m.options.seed, 0x5EED, static_cast<uint64_t>(index));
   {
     const auto movers = m.movers_at(t);
     const sim::DrawList list = Impl::with(still, movers);
-    rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), &geometry);
+    for (const auto& rows : bands)
+      rasteriser.draw(list, m.scene.path(t + m.row_delay(rows)).inverse(), Eigen::Vector2d::Zero(), rows, &geometry);
     m.observe_movers(geometry, Impl::owners(still, movers), middle, t, &frame);
+    if (m.options.readout > 0)  // the depth image has no rolling shutter
+      rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
     frame.true_depth = DepthImage(m.camera.width, m.camera.height);
     for (size_t i = 0; i < geometry.inverse_depth.size(); ++i) {
       const float inverse = geometry.inverse_depth.data()[i];
@@ -239,17 +279,19 @@ SimulatedFrame Simulator::render(int index) const {
     const auto movers = m.movers_at(at);
     const sim::DrawList list = Impl::with(still, movers);
     const Eigen::Vector2d offset = kLensBlur / 16.0 * Eigen::Vector2d(kRays[k][0], kRays[k][1]);
-    rasteriser.draw(list, m.scene.path(at).inverse(), offset, &geometry);
     // The mip level is dithered in an order of its own.
     const float level_shift = (static_cast<float>((k * 3) % kRays.size()) + 0.5F) / static_cast<float>(kRays.size());
-    rasteriser.add_colour(list, m.scene.materials, geometry, level_shift, &sum);
+    for (const auto& rows : bands) {
+      rasteriser.draw(list, m.scene.path(at + m.row_delay(rows)).inverse(), offset, rows, &geometry);
+      rasteriser.add_colour(list, m.scene.materials, geometry, level_shift, &sum);
+    }
   }
   frame.image.colour = sim::expose(sum, m.camera.width, m.camera.height, m.options.grey_noise, sim::hash64(seed, 1));
   frame.image.grey = grey_from_colour(frame.image.colour);
   {
     const auto movers = m.movers_at(depth_t);
     const sim::DrawList list = Impl::with(still, movers);
-    rasteriser.draw(list, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), &geometry);
+    rasteriser.draw(list, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
     if (m.options.depth_noise) {
       Image<float> grey, cosine;
       rasteriser.reflectance(list, m.scene.materials, geometry, &grey, &cosine);

@@ -14,15 +14,18 @@
 namespace dkb {
 
 struct SimulatorOptions {
-  std::string scene = "room";  // a name of simulator_scenes(), or a YAML scene file (anything with a '.' or a '/')
-  std::string path;            // trajectory file in TUM format that the camera follows; empty: the scene's own path
-  int frames = 0;              // >= 0; 0: as many as the scene needs (300; loop and twins 900), at 30 Hz
-  int people = -1;             // 0 ... 30 walkers; -1: as many as the scene has by itself
-  uint64_t seed = 1;           // of everything random: furniture, people, tremor, noise
+  std::string scene = "room";     // a name of simulator_scenes(), or a YAML scene file (anything with a '.' or a '/')
+  std::string path;               // trajectory file in TUM format that the camera follows; empty: the scene's own path
+  int frames = 0;                 // >= 0; 0: as many as the scene needs (300; loop and twins 900), at 30 Hz
+  int people = -1;                // 0 ... 30 walkers; -1: as many as the scene has by itself
+  uint64_t seed = 1;              // of everything random: furniture, people, tremor, noise
   int width = 640, height = 480;  // [px] 64 ... 4096; the field of view stays that of a Kinect (fx = 525 at 640)
-  double exposure = 0;         // [s] 0.001 ... 0.03; 0: the scene's own, 0.010 ... 0.020
-  double grey_noise = 2.4;     // [grey levels] standard deviation of the sensor noise of the grey image, 0 ... 20
-  bool depth_noise = true;     // noise, disparity steps and holes of a structured-light sensor
+  double exposure = 0;            // [s] 0.001 ... 0.03; 0: the scene's own, 0.010 ... 0.020
+  // [s] from the first to the last row of the colour image (rolling shutter; stamps are those of the middle row), 0 ...
+  // 0.033. 0.015 makes fr1_xyz's path, drawn anew, as hard as the real clip.
+  double readout = 0.015;
+  double grey_noise = 2.4;  // [grey levels] standard deviation of the sensor noise of the grey image, 0 ... 20
+  bool depth_noise = true;  // noise, disparity steps and holes of a structured-light sensor
 
   void check() const;  // throws InvalidOption
 };
@@ -32,10 +35,10 @@ const std::vector<std::string>& simulator_scenes();
 
 // What moves by itself, as seen in one frame.
 struct SimulatedMover {
-  int id = 0;                          // the same in all frames, from 1
-  std::string kind;                    // class: person, chair ...
-  Eigen::Vector3d position_in_world;   // [m] median of its visible surface points, per coordinate
-  Eigen::Vector3d velocity_in_world;   // [m/s] of the body as a whole
+  int id = 0;                                               // the same in all frames, from 1
+  std::string kind;                                         // class: person, chair ...
+  Eigen::Vector3d position_in_world;                        // [m] median of its visible surface points, per coordinate
+  Eigen::Vector3d velocity_in_world;                        // [m/s] of the body as a whole
   int box_x = 0, box_y = 0, box_width = 0, box_height = 0;  // [px] bounds of its visible pixels
 };
 
@@ -44,16 +47,17 @@ struct SimulatedFrame {
   std::string stamp, depth_stamp;  // [s] with 6 decimals
   RgbdImage image;                 // as the sensor gives it; the depth is that of the 16-bit file, exactly
   GreyImage mask;                  // 255 = mover, at the middle of the exposure
-  DepthImage true_depth;           // [m] without noise, at the middle of the colour exposure; 0 = nothing there
+  DepthImage true_depth;           // [m] without noise, seen from world_from_cam at the colour stamp; 0 = nothing there
   std::vector<SimulatedMover> movers;  // visible ones, by id
-  Rigid3 world_from_cam;           // truth at the colour stamp, the middle of the exposure
-  Rigid3 world_from_depth_cam;     // truth at the depth stamp
+  Rigid3 world_from_cam;               // truth at the colour stamp, the middle of the exposure
+  Rigid3 world_from_depth_cam;         // truth at the depth stamp
 };
 
 // Synthetic RGB-D sequences: furnished rooms with procedural textures and articulated people, drawn by exact ray
-// intersection, seen by a sensor with the weaknesses of a hand-held Kinect: motion blur, grey noise, depth noise after
-// Nguyen, Izadi, Lovell 2012 ("Modeling Kinect Sensor Noise", 3DIMPVT), disparity steps of 1/8 px, holes at edges and on
-// dark or slanted surfaces, colour and depth up to 16 ms apart. The world of the poses has z up, or is that of `path`.
+// intersection, seen by a sensor with the weaknesses of a hand-held Kinect: motion blur, rolling shutter, grey noise,
+// depth noise after Nguyen, Izadi, Lovell 2012 ("Modeling Kinect Sensor Noise", 3DIMPVT), disparity steps of 1/8 px,
+// holes at edges and on dark or slanted surfaces, colour and depth up to 16 ms apart. The world of the poses has z up,
+// or is that of `path`.
 //
 // Deterministic: the same options give the same frames. Frames do not depend on each other; render() is thread-safe.
 class Simulator {

@@ -46,8 +46,8 @@ Surfaces Surfaces::moved(const Rigid3& m) const {
   return out;
 }
 
-void Surfaces::add_box(const Eigen::Vector3d& c, const Eigen::Vector3d& ex, const Eigen::Vector3d& ey, const Eigen::Vector3d& ez,
-                       const std::array<int, 6>& t) {
+void Surfaces::add_box(const Eigen::Vector3d& c, const Eigen::Vector3d& ex, const Eigen::Vector3d& ey,
+                       const Eigen::Vector3d& ez, const std::array<int, 6>& t) {
   // Pictures stand upright on the sides: v = -z; on top and bottom u = x.
   if (t[0] >= 0) patches.push_back(make_patch(c + ey + ez, -ey, -ez, t[0]));
   if (t[1] >= 0) patches.push_back(make_patch(c + ex + ez, ey, -ez, t[1]));
@@ -66,8 +66,8 @@ void Surfaces::add_ellipsoid(const Eigen::Vector3d& centre, const Eigen::Matrix3
   quadrics.push_back(q);
 }
 
-void Surfaces::add_tube(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& side, double radius_side,
-                        double radius_across, double end_scale, const TextureWindow& look) {
+void Surfaces::add_tube(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& side,
+                        double radius_side, double radius_across, double end_scale, const TextureWindow& look) {
   const double length = (b - a).norm();
   const Eigen::Vector3d z = (b - a) / length, x = (side - z * z.dot(side)).normalized(), y = z.cross(x);
   Quadric q;
@@ -81,8 +81,10 @@ void Surfaces::add_tube(const Eigen::Vector3d& a, const Eigen::Vector3d& b, cons
   quadrics.push_back(q);
 }
 
-void Surfaces::add_disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius, const TextureWindow& look) {
-  const Eigen::Vector3d n = normal.normalized(), seed = std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+void Surfaces::add_disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius,
+                        const TextureWindow& look) {
+  const Eigen::Vector3d n = normal.normalized(),
+                        seed = std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   const Eigen::Vector3d u = 2 * radius * (seed - n * n.dot(seed)).normalized(), v = u.cross(n);
   Patch p = make_patch(centre - 0.5 * (u + v), u, v, look.texture);
   p.look = look;

@@ -44,9 +44,10 @@ struct Surfaces {
 
   // The six faces of a box with corner `corner` and edges ex, ey, ez (right-handed). Faces with texture < 0 are left
   // out. Order: -x, +x, -y, +y, -z, +z.
-  void add_box(const Eigen::Vector3d& corner, const Eigen::Vector3d& ex, const Eigen::Vector3d& ey, const Eigen::Vector3d& ez,
-               const std::array<int, 6>& textures);
-  void add_ellipsoid(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& radii, const TextureWindow& look);
+  void add_box(const Eigen::Vector3d& corner, const Eigen::Vector3d& ex, const Eigen::Vector3d& ey,
+               const Eigen::Vector3d& ez, const std::array<int, 6>& textures);
+  void add_ellipsoid(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& radii,
+                     const TextureWindow& look);
   // Tube from a to b with radii in the directions of `side` (made orthogonal to the axis) and across it; the radii at b
   // are `end_scale` times those at a.
   void add_tube(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& side, double radius_side,

@@ -9,7 +9,9 @@
 namespace dkb::sim {
 namespace {
 
-float clamp255(float v) { return std::clamp(v, 0.0F, 255.0F); }
+float clamp255(float v) {
+  return std::clamp(v, 0.0F, 255.0F);
+}
 
 // Share of the texel [i, i + 1] that lies in [a, b].
 float coverage(int i, double a, double b) {
@@ -34,15 +36,19 @@ void Canvas::blend(int x, int y, Colour c, float alpha) {
   p.b += alpha * (c.b - p.b);
 }
 
-void Canvas::fill(Colour c) { std::fill(pixels_.begin(), pixels_.end(), c); }
+void Canvas::fill(Colour c) {
+  std::fill(pixels_.begin(), pixels_.end(), c);
+}
 
 void Canvas::rect(double x0, double y0, double x1, double y1, Colour c, float alpha) {
   x0 *= sx_;
   x1 *= sx_;
   y0 *= sy_;
   y1 *= sy_;
-  const int left = std::max(0, static_cast<int>(std::floor(x0))), right = std::min(width_, static_cast<int>(std::ceil(x1)));
-  const int top = std::max(0, static_cast<int>(std::floor(y0))), bottom = std::min(height_, static_cast<int>(std::ceil(y1)));
+  const int left = std::max(0, static_cast<int>(std::floor(x0))),
+            right = std::min(width_, static_cast<int>(std::ceil(x1)));
+  const int top = std::max(0, static_cast<int>(std::floor(y0))),
+            bottom = std::min(height_, static_cast<int>(std::ceil(y1)));
   for (int y = top; y < bottom; ++y)
     for (int x = left; x < right; ++x) blend(x, y, c, alpha * coverage(x, x0, x1) * coverage(y, y0, y1));
 }
@@ -95,7 +101,8 @@ void Canvas::triangle(const std::array<double, 6>& p, Colour c) {
 void Canvas::grain(double size_x, double size_y, float strength, int octaves, uint64_t seed) {
   std::vector<float> noise(static_cast<size_t>(width_));
   for (int y = 0; y < height_; ++y) {
-    fractal_noise_row(static_cast<float>(1 / sx_ / size_x), static_cast<float>(y / sy_ / size_y), octaves, seed, &noise);
+    fractal_noise_row(static_cast<float>(1 / sx_ / size_x), static_cast<float>(y / sy_ / size_y), octaves, seed,
+                      &noise);
     for (int x = 0; x < width_; ++x) {
       Colour& p = pixel(x, y);
       const float k = 1 + strength * noise[static_cast<size_t>(x)];
@@ -108,7 +115,8 @@ void Canvas::stain(double size, Colour c, float amount, uint64_t seed) {
   std::vector<float> noise(static_cast<size_t>(width_));
   for (int y = 0; y < height_; ++y) {
     fractal_noise_row(static_cast<float>(1 / sx_ / size), static_cast<float>(y / sy_ / size), 4, seed, &noise);
-    for (int x = 0; x < width_; ++x) blend(x, y, c, amount * std::clamp(0.5F + 1.2F * noise[static_cast<size_t>(x)], 0.0F, 1.0F));
+    for (int x = 0; x < width_; ++x)
+      blend(x, y, c, amount * std::clamp(0.5F + 1.2F * noise[static_cast<size_t>(x)], 0.0F, 1.0F));
   }
 }
 
@@ -147,7 +155,8 @@ void Canvas::paragraph(double x0, double y0, double x1, double y1, double size, 
 Texture::Texture(const Canvas& canvas) : width_(canvas.width()), height_(canvas.height()) {
   std::vector<Colour> level(static_cast<size_t>(width_) * static_cast<size_t>(height_));
   for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x) level[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)] = canvas.at(x, y);
+    for (int x = 0; x < width_; ++x)
+      level[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)] = canvas.at(x, y);
   int w = width_, h = height_;
   while (true) {
     offsets_.push_back(texels_.size());
@@ -160,7 +169,9 @@ Texture::Texture(const Canvas& canvas) : width_(canvas.width()), height_(canvas.
     std::vector<Colour> half(static_cast<size_t>(w2) * static_cast<size_t>(h2));
     for (int y = 0; y < h2; ++y)
       for (int x = 0; x < w2; ++x) {
-        const auto at = [&](int i, int j) { return level[static_cast<size_t>(j) * static_cast<size_t>(w) + static_cast<size_t>(i)]; };
+        const auto at = [&](int i, int j) {
+          return level[static_cast<size_t>(j) * static_cast<size_t>(w) + static_cast<size_t>(i)];
+        };
         const int x0 = x << dx, y0 = y << dy;
         const Colour a = at(x0, y0), b = at(x0 + dx, y0), c = at(x0, y0 + dy), d = at(x0 + dx, y0 + dy);
         half[static_cast<size_t>(y) * static_cast<size_t>(w2) + static_cast<size_t>(x)] = {

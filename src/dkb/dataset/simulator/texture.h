@@ -37,10 +37,14 @@ class Canvas {
   int height() const { return height_; }
   double width_m() const { return width_m_; }
   double height_m() const { return height_m_; }
-  const Colour& at(int x, int y) const { return pixels_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)]; }
+  const Colour& at(int x, int y) const {
+    return pixels_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
+  }
 
  private:
-  Colour& pixel(int x, int y) { return pixels_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)]; }
+  Colour& pixel(int x, int y) {
+    return pixels_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
+  }
   void blend(int x, int y, Colour c, float alpha);
 
   int width_, height_;
@@ -80,9 +84,7 @@ class Texture {
   }
 
  private:
-  static uint64_t lanes(uint32_t c) {
-    return (c & 0x00FF00FFU) | (static_cast<uint64_t>(c & 0xFF00FF00U) << 24);
-  }
+  static uint64_t lanes(uint32_t c) { return (c & 0x00FF00FFU) | (static_cast<uint64_t>(c & 0xFF00FF00U) << 24); }
   int width_, height_;
   std::vector<size_t> offsets_;
   std::vector<uint32_t> texels_;
