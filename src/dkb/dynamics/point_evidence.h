@@ -10,7 +10,7 @@
 namespace dkb {
 
 struct PointEvidenceOptions {
-  int sightings = 3;  // times that a point must be found on a mover, less the times it was found still, to be retracted, >= 1
+  int sightings = 10;  // times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1
   void check() const { require_option(sightings >= 1, "dynamics.evidence.sightings", sightings, "at least 1"); }
 };
 
@@ -21,7 +21,7 @@ class PointEvidence {
   void on_mover(PointId point) { ++suspicion_[point]; }
   void fits_still_world(PointId point) {
     const auto it = suspicion_.find(point);
-    if (it != suspicion_.end() && --it->second <= 0) suspicion_.erase(it);
+    if (it != suspicion_.end() && (it->second -= 2) <= 0) suspicion_.erase(it);
   }
   // Points with enough against them, increasing; each once.
   std::vector<PointId> take_convicted() {

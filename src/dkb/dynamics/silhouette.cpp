@@ -127,7 +127,8 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
         front.emplace_back(nx, ny);
       }
     }
-    // Holes of the depth image: a cell without depth belongs to the object when more of its known neighbours do.
+    // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
+    // What is too near for the camera has no depth at all, and in a box that is the object.
     for (int y = range.y0; y < range.y1; ++y)
       for (int x = range.x0; x < range.x1; ++x) {
         if (grid(x, y) > 0 || mine(x, y)) continue;
@@ -135,7 +136,7 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
         for (int ny = std::max(range.y0, y - 3); ny < std::min(range.y1, y + 4); ++ny)
           for (int nx = std::max(range.x0, x - 3); nx < std::min(range.x1, x + 4); ++nx)
             if (grid(nx, ny) > 0) ++(mine(nx, ny) ? in : out);
-        if (in > out) mask.cells(x, y) = 255;
+        if (in >= out) mask.cells(x, y) = 255;
       }
     for (int y = range.y0; y < range.y1; ++y)
       for (int x = range.x0; x < range.x1; ++x)

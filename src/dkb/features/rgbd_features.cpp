@@ -121,7 +121,25 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
       k.colour = {g, g, g};
     }
   }
+  result.width = camera.width;
+  result.height = camera.height;
   result.grid = KeypointGrid(xs, ys, camera.width, camera.height);
+  return result;
+}
+
+RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices) {
+  RgbdFeatures result;
+  result.width = features.width;
+  result.height = features.height;
+  std::vector<float> xs, ys;
+  for (int i : indices) {
+    const auto f = static_cast<size_t>(i);
+    result.keypoints.push_back(features.keypoints[f]);
+    result.descriptors.push_back(features.descriptors[f]);
+    xs.push_back(features.keypoints[f].pixel.x());
+    ys.push_back(features.keypoints[f].pixel.y());
+  }
+  result.grid = KeypointGrid(xs, ys, features.width, features.height);
   return result;
 }
 

@@ -19,6 +19,7 @@ struct Keypoint {
   float angle = 0;              // [rad]
   float response = 0;
   uint8_t octave = 0;
+  bool suspect = false;         // lies where a mover is seen: only well-established map points may be matched here
   Rgb colour;
 };
 
@@ -27,6 +28,7 @@ struct RgbdFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;  // same length
   KeypointGrid grid;                    // over the ideal pixels
+  int width = 0, height = 0;            // [px] of the image
   size_t size() const { return keypoints.size(); }
 };
 
@@ -56,5 +58,8 @@ class UndistortionTable {
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                                 const UndistortionTable& undistort, const Vector6d& velocity,
                                 const DepthOptions& options);
+
+// The features of these indices, in this order, with a grid of their own.
+RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices);
 
 }  // namespace dkb

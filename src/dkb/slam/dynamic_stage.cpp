@@ -82,7 +82,7 @@ void DynamicStage::mark_keyframes(const PastFrame& source, const Detections& det
 }
 
 void DynamicStage::receive(const Context& context, const std::shared_ptr<const ImagePyramid>& pyramid) {
-  for (const DueDetections& due : slow_->take_due(context.frame)) {
+  for (const DueDetections& due : std::exchange(due_, {})) {
     const PastFrame* source = nullptr;
     for (const PastFrame& p : past_)
       if (p.frame == due.frame) source = &p;
@@ -161,6 +161,12 @@ Rigid3 DynamicStage::own_motion(const std::vector<FilterFeature>& features, cons
   return pose.ok ? pose.pose : expected;
 }
 
+void DynamicStage::begin_frame(FrameIndex frame, std::shared_ptr<const RgbdImage> image) {
+  if (!slow_ || options_.filter == FilterKind::none) return;
+  slow_->push(frame, std::move(image));
+  due_ = slow_->take_due(frame);
+}
+
 DynamicScene DynamicStage::process(const Context& context) {
   DynamicScene scene;
   scene.dynamic.assign(context.orb->corners.size(), 0);
@@ -189,7 +195,6 @@ DynamicScene DynamicStage::process(const Context& context) {
       }
       carried_ = std::move(moved);
     }
-    slow_->push(context.frame, context.image);
     receive(context, pyramid);
   }
   scene.boxes = detections_of(carried_);

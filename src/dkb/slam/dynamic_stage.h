@@ -72,6 +72,8 @@ class DynamicStage {
     Rigid3 current_from_previous;                     // expected motion of the camera
     std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes, expected pose
   };
+  // Hands the image to the detector and waits for what is due at this frame (a real-time run waits only for the first).
+  void begin_frame(FrameIndex frame, std::shared_ptr<const RgbdImage> image);
   DynamicScene process(const Context& context);
   // The frame just processed became a keyframe: its silhouette is given again once its own detections are in.
   void note_keyframe();
@@ -115,6 +117,7 @@ class DynamicStage {
     Detection detection;
     int missed = 0;
   };
+  std::vector<DueDetections> due_;     // results to be worked in at this frame
   std::vector<Carried> carried_;       // boxes of the slow detector in the newest image
   std::vector<LateMask> late_;
   StageTimes times_;

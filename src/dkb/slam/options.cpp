@@ -60,6 +60,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.radius_local_map", &t.radius_local_map, "[px] search for local map points");
   s.bind("tracking.match_distance", &t.match_distance, "[bits] of a match with a map point");
   s.bind("tracking.match_ratio", &t.match_ratio, "best over second best distance of such a match");
+  s.bind("tracking.established_frames", &t.established_frames, "[frames] since its birth before a point may be found where a mover is");
   s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
   s.bind("tracking.recovery_keyframes", &t.recovery_keyframes, "newest keyframes that a lost tracker tries");
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes, "keyframes that share most points with the frame");

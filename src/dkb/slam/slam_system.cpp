@@ -65,7 +65,8 @@ class SlamSystem::Impl {
   FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
   Rigid3 world_from_odom_;
   bool localise_only_ = false;
-  std::vector<size_t> kept_;                   // features that may be tracked, as indices of all
+  std::vector<size_t> kept_;                   // features given to tracking, as indices of all
+  std::vector<uint8_t> suspect_;               // of these, which may move
   std::vector<FeatureReport> feature_reports_;  // all features of the last frame
   struct RecentKeyframe {
     FrameIndex frame;
@@ -80,6 +81,10 @@ class SlamSystem::Impl {
   void take_map(bool wait);
   void extract(const RgbdImage& image);
   void filter_dynamic(std::shared_ptr<const RgbdImage> image);
+  // Index among all extracted features.
+  size_t source_feature(const TrackedFrame& frame, size_t feature) const {
+    return kept_[frame.source.empty() ? feature : static_cast<size_t>(frame.source[feature])];
+  }
   void report_features(const TrackedFrame& frame);
   void weigh_evidence();
   void retract_late();
@@ -146,33 +151,43 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
     context.keyframe_points_in_camera = keyframe_points_in_camera(context.current_from_previous * last->cam_from_world);
   context.image = std::move(image);
   scene_ = dynamics_.process(context);
+  // The default filter only suspects: what well-known map points explain stays. The others judge for good.
+  const bool suspects = options_.dynamics.filter == FilterKind::standard;
   kept_.clear();
   feature_reports_.resize(orb_.corners.size());
   OrbFeatures kept;
+  suspect_.clear();
   for (size_t i = 0; i < orb_.corners.size(); ++i) {
     feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y, scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
-    if (scene_.dynamic[i]) continue;
+    if (scene_.dynamic[i] && !suspects) continue;
     kept_.push_back(i);
+    suspect_.push_back(scene_.dynamic[i]);
     kept.corners.push_back(orb_.corners[i]);
     kept.descriptors.push_back(orb_.descriptors[i]);
   }
-  statistics_.features_removed += static_cast<long>(orb_.corners.size() - kept_.size());
   orb_ = std::move(kept);
 }
 
 void SlamSystem::Impl::report_features(const TrackedFrame& frame) {
   for (size_t f = 0; f < frame.points.size(); ++f) {
-    if (frame.points[f] != kNoPoint) feature_reports_[kept_[f]].state = FeatureState::used;
-    if (frame.outlier[f]) feature_reports_[kept_[f]].state = FeatureState::outlier;
+    FeatureState& state = feature_reports_[source_feature(frame, f)].state;
+    if (frame.points[f] != kNoPoint) state = FeatureState::used;
+    if (frame.outlier[f] && state != FeatureState::dynamic) state = FeatureState::outlier;
   }
+  for (const FeatureReport& f : feature_reports_) statistics_.features_removed += f.state == FeatureState::dynamic;
 }
 
 // Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
 void SlamSystem::Impl::weigh_evidence() {
   if (scene_.mask.empty()) return;
   const auto& last = *tracker_->last_frame();
+  std::vector<PointId> matched;
   for (PointId p : last.points)
-    if (p != kNoPoint) evidence_->fits_still_world(p);
+    if (p != kNoPoint) {
+      evidence_->fits_still_world(p);
+      matched.push_back(p);
+    }
+  std::sort(matched.begin(), matched.end());
   const DepthImage& depth = image_->depth;
   tracker_->visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double z) {
     // The table undoes the distortion at image pixels; its negative at the ideal pixel is near enough for cells.
@@ -182,7 +197,7 @@ void SlamSystem::Impl::weigh_evidence() {
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) return;
     const double surface = depth(x, y);
-    if (std::abs(surface - z) < 0.05 * surface + 0.05) evidence_->on_mover(id);
+    if (std::abs(surface - z) < 0.05 * surface + 0.05 && !std::binary_search(matched.begin(), matched.end(), id)) evidence_->on_mover(id);
   });
   tracker_->retract(evidence_->take_convicted());
 }
@@ -232,7 +247,8 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
 void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
   const KeyframeId id = next_keyframe_++;
   KeyframePacket packet = tracker_->make_keyframe(id, frame);
-  for (const ProvisionalPoint& p : packet.new_points) feature_reports_[kept_[static_cast<size_t>(p.feature)]].state = FeatureState::used;
+  for (const ProvisionalPoint& p : packet.new_points) 
+    feature_reports_[source_feature(frame, static_cast<size_t>(p.feature))].state = FeatureState::used;
   dynamics_.note_keyframe();
   recent_keyframes_.push_back({frame.index, id, frame.features});
   const DetectionSchedule& schedule = dynamics_.schedule();
@@ -261,14 +277,17 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   take_map(!options_.pipeline.realtime);
   result.wait_ms = waiting.ms();
   times_.add("wait_mapper", result.wait_ms);
+  dynamics_.begin_frame(next_frame_, image_);
+  result.wait_ms = waiting.ms();
 
   const Stopwatch tracking;
   extract(image);
   filter_dynamic(image_);
   retract_late();
   const auto features_at = [&](const Vector6d& velocity) {
-    return std::make_shared<const RgbdFeatures>(
-        make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth));
+    RgbdFeatures features = make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth);
+    for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
+    return std::make_shared<const RgbdFeatures>(std::move(features));
   };
   TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at);
   TrackedFrame& frame = outcome.frame;

@@ -20,9 +20,11 @@ struct Candidate {
   float reference_scale = 1;        // pyramid scale there
   float angle = -1;                 // [rad] orientation of the feature to match with, -1 = unknown
   Descriptor descriptor;
+  bool established = false;         // known still for long enough that it may be found even where a mover is suspected
 };
 
 struct ProjectionMatchOptions {
+  float suspect_depth_gate = 0.03f;  // [1] largest depth difference, relative, at features that are suspected to move
   float radius = 4.0f;              // [px] search radius at the finest level, > 0; grows with the predicted scale
   int max_distance = 64;            // [bits] largest Hamming distance of a match, 0 ... 256
   float ratio = 0.8f;               // best distance must be below this share of the second best on the same level, 0 ... 1

@@ -17,6 +17,7 @@ struct TrackedFrame {
   std::shared_ptr<const RgbdFeatures> features;
   std::vector<PointId> points;    // per feature: the map point it shows (inliers of the pose), else kNoPoint
   std::vector<uint8_t> outlier;   // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<int> source;        // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;
   Rigid3 cam_from_reference;
   Rigid3 cam_from_world;          // by the map as tracking knew it at the time

@@ -27,6 +27,7 @@ void TrackingOptions::check() const {
   require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
   require_option(match_distance >= 0 && match_distance <= 256, "match_distance", match_distance, "0 ... 256 bits");
   require_option(match_ratio >= 0 && match_ratio <= 1, "match_ratio", match_ratio, "0 ... 1");
+  require_option(established_frames >= 0, "established_frames", established_frames, "at least 0");
   require_option(refresh_frames >= 1, "refresh_frames", refresh_frames, "at least 1");
   require_option(recovery_keyframes >= 1, "recovery_keyframes", recovery_keyframes, "at least 1");
   local_map.check();
@@ -133,7 +134,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (!at) continue;
     const Keypoint& k = last_->features->keypoints[f];
     candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
-                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle, last_->features->descriptors[f]});
+                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle, last_->features->descriptors[f], established(id, last_->index)});
   }
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
@@ -158,12 +159,13 @@ std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const Rg
   std::vector<PointId> ids;
   std::vector<Eigen::Vector3d> positions;
   for (size_t f = 0; f < keyframe.points.size(); ++f)
-    if (const MapPoint* p = view_->point(keyframe.points[f])) {
+    if (const MapPoint* p = view_->point(keyframe.points[f]); p != nullptr && !is_retracted(p->id)) {
       descriptors.push_back(keyframe.features->descriptors[f]);
       ids.push_back(p->id);
       positions.push_back(p->position);
     }
-  const std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
+  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
+  std::erase_if(matches, [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   for (const DescriptorMatch& m : matches) {
@@ -188,7 +190,31 @@ std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const Rg
 void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
   if (candidates_made_ >= 0 && index - candidates_made_ < options_.refresh_frames) return;
   candidates_ = local_map_candidates(points, *view_, options_.local_map);
+  for (Candidate& c : candidates_) c.established = established(c.id, index);
   candidates_made_ = index;
+}
+
+bool Tracker::established(PointId id, FrameIndex now) const {
+  const MapPoint* p = view_->point(id);
+  if (p == nullptr || p->observations.size() < 2) return false;
+  return view_->keyframe(birth_keyframe(id))->frame + options_.established_frames <= now;
+}
+
+// Features on movers that showed no well-known point end here: mapping never sees them.
+void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
+  frame.source.clear();
+  for (size_t f = 0; f < frame.points.size(); ++f)
+    if (!frame.features->keypoints[f].suspect || frame.points[f] != kNoPoint) frame.source.push_back(static_cast<int>(f));
+  if (frame.source.size() == frame.points.size()) return;
+  RgbdFeatures left = subset(*frame.features, frame.source);
+  for (Keypoint& k : left.keypoints) k.suspect = false;
+  frame.features = std::make_shared<const RgbdFeatures>(std::move(left));
+  for (size_t k = 0; k < frame.source.size(); ++k) {
+    frame.points[k] = frame.points[static_cast<size_t>(frame.source[k])];
+    frame.outlier[k] = frame.outlier[static_cast<size_t>(frame.source[k])];
+  }
+  frame.points.resize(frame.source.size());
+  frame.outlier.resize(frame.source.size());
 }
 
 bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
@@ -310,11 +336,12 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
 
   if (state_ == TrackingState::initialising) {
     int with_depth = 0;
-    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0;
+    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0 && !frame.features->keypoints[f].suspect;
     if (with_depth < options_.initial_points) return outcome;
     outcome.wants_first_keyframe = true;
     outcome.state = state_ = TrackingState::tracking;
     frame.inliers = with_depth;
+    drop_unmatched_suspects(frame);
     last_ = frame;
     return outcome;
   }
@@ -358,6 +385,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
     refine_at_velocity(step + kAccelerationShare * (step - before), features_at, frame);
     velocity_ = velocity_to(frame);
   }
+  drop_unmatched_suspects(frame);
   finish(frame);
   outcome.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
   state_ = TrackingState::tracking;

@@ -30,6 +30,7 @@ struct TrackingOptions {
   double radius_local_map = 4.0;     // [px] search for local map points under the first pose, > 0
   int match_distance = 90;           // [bits] largest Hamming distance of a match with a map point, 0 ... 256
   double match_ratio = 0.8;          // best over second best distance of such a match, 0 ... 1
+  int established_frames = 20;       // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
   int refresh_frames = 5;            // [frames] the choice of local map points is renewed at least so often, >= 1
   int recovery_keyframes = 8;        // newest keyframes that a lost tracker tries, >= 1
   LocalMapOptions local_map;
@@ -100,6 +101,8 @@ class Tracker {
   void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
   Vector6d velocity_to(const TrackedFrame& frame) const;
   void refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const;
+  bool established(PointId id, FrameIndex now) const;
+  static void drop_unmatched_suspects(TrackedFrame& frame);
   void finish(TrackedFrame& frame);
 
   CameraModel camera_;
