@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "dkb/detection/mask_folder.h"
 #include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
 #include "dkb/util/errors.h"
@@ -30,6 +31,7 @@ void DynamicsOptions::check() const {
   epipolar.check();
   multiview.check();
   silhouette.check();
+  motion.check();
   flow.check();
   carry.check();
   require_option(points_per_box >= 4, "dynamics.points_per_box", points_per_box, "at least 4");
@@ -41,7 +43,12 @@ DynamicStage::DynamicStage(const CameraModel& camera, const DynamicsOptions& opt
     : camera_(camera), options_(options), flow_(options.flow), schedule_(detectors.schedule), prompt_(std::move(detectors.prompt)) {
   options_.check();
   schedule_.check();
+  if (detectors.motion) motion_.emplace(camera, options_.motion);
   if (detectors.slow) slow_ = std::make_unique<DetectionThread>(std::move(detectors.slow), schedule_);
+}
+
+void DynamicStage::commit(const std::optional<Rigid3>& cam_from_world) {
+  if (motion_ && options_.filter != FilterKind::none) motion_->commit(cam_from_world);
 }
 
 void DynamicStage::note_keyframe() {
@@ -204,6 +211,18 @@ DynamicScene DynamicStage::process(const Context& context) {
     scene.boxes.insert(scene.boxes.end(), d.boxes.begin(), d.boxes.end());
     if (!d.mask.empty()) given = {1, d.mask};
   }
+  MoverMask moving;
+  if (motion_) {
+    const Stopwatch segmenting;
+    moving = motion_->segment(context.image, context.cam_from_world);
+    times_.add("motion", segmenting.ms());
+    // The other filters know boxes only.
+    if (options_.filter != FilterKind::standard && !moving.empty())
+      for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
+        const float c = static_cast<float>(moving.cell);
+        scene.boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
+      }
+  }
   const bool with_flow = paper_like && !scene.boxes.empty();
   const std::vector<FilterFeature> features = describe(context, pyramid ? *pyramid : ImagePyramid(), with_flow);
   times_.add("flow", watch.ms());
@@ -224,6 +243,7 @@ DynamicScene DynamicStage::process(const Context& context) {
     case FilterKind::standard:
       scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
       unite(scene.mask, given, camera_.width, camera_.height);
+      unite(scene.mask, moving, camera_.width, camera_.height);
       scene.dynamic = mask_filter(features, scene.mask);
       break;
   }
@@ -245,6 +265,7 @@ std::optional<std::string> DynamicStage::take_warning() { return slow_ ? slow_->
 
 std::string DynamicStage::detector_kind() const {
   std::string kind = slow_ ? slow_->stats().kind : "";
+  if (motion_) kind += kind.empty() ? "motion" : "+motion";
   for (const auto& d : prompt_) kind += (kind.empty() ? "" : "+") + d->kind();
   return kind.empty() ? "none" : kind;
 }

@@ -10,6 +10,7 @@
 #include "dkb/detection/carried_detections.h"
 #include "dkb/detection/detection_thread.h"
 #include "dkb/dynamics/dynamic_filter.h"
+#include "dkb/dynamics/motion_segmenter.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/dynamics/silhouette.h"
 #include "dkb/features/features.h"
@@ -28,6 +29,7 @@ struct DynamicsOptions {
   EpipolarFilterOptions epipolar;
   MultiviewFilterOptions multiview;
   SilhouetteOptions silhouette;
+  MotionOptions motion;
   OpticalFlowOptions flow;
   CarryOptions carry;
   int points_per_box = 80;        // features followed to carry a box, >= 4
@@ -70,11 +72,14 @@ class DynamicStage {
     const OrbFeatures* orb = nullptr;
     const UndistortionTable* undistort = nullptr;
     Rigid3 current_from_previous;                     // expected motion of the camera
+    Rigid3 cam_from_world;                            // expected pose
     std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes, expected pose
   };
   // Hands the image to the detector and waits for what is due at this frame (a real-time run waits only for the first).
   void begin_frame(FrameIndex frame, std::shared_ptr<const RgbdImage> image);
   DynamicScene process(const Context& context);
+  // After tracking: the pose of the frame just processed; nothing when lost.
+  void commit(const std::optional<Rigid3>& cam_from_world);
   // The frame just processed became a keyframe: its silhouette is given again once its own detections are in.
   void note_keyframe();
 
@@ -112,6 +117,7 @@ class DynamicStage {
   DetectionSchedule schedule_;
   std::unique_ptr<DetectionThread> slow_;
   std::vector<std::unique_ptr<Detector>> prompt_;
+  std::optional<MotionSegmenter> motion_;
   std::deque<PastFrame> past_;         // newest last; as many as the detector's latency needs
   struct Carried {
     Detection detection;

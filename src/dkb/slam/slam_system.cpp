@@ -147,8 +147,9 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
   context.undistort = &undistort_;
   const auto& last = tracker_->last_frame();
   context.current_from_previous = last ? tracker_->expected_motion(image->timestamp - last->timestamp) : Rigid3();
+  if (last) context.cam_from_world = context.current_from_previous * last->cam_from_world;
   if (last && dynamics_.wants_keyframe_points())
-    context.keyframe_points_in_camera = keyframe_points_in_camera(context.current_from_previous * last->cam_from_world);
+    context.keyframe_points_in_camera = keyframe_points_in_camera(context.cam_from_world);
   context.image = std::move(image);
   scene_ = dynamics_.process(context);
   // The default filter only suspects: what well-known map points explain stays. The others judge for good.
@@ -293,6 +294,8 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   TrackedFrame& frame = outcome.frame;
   if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
   report_features(frame);
+  const bool has_pose = outcome.state == TrackingState::tracking || outcome.state == TrackingState::relocalised;
+  dynamics_.commit(has_pose ? std::optional(frame.cam_from_world) : std::nullopt);
 
   result.frame = next_frame_++;
   result.timestamp = image.timestamp;
