@@ -59,7 +59,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   if (std::none_of(problem.fixed.begin(), problem.fixed.end(), [](uint8_t f) { return f != 0; })) problem.fixed[0] = 1;
 
   std::vector<double> inv_sigma(32);
-  for (int l = 0; l < 32; ++l) inv_sigma[static_cast<size_t>(l)] = 1.0 / (noise.pixel_sigma * std::pow(scale_factor, l));
+  for (int l = 0; l < 32; ++l) inv_sigma[static_cast<size_t>(l)] = 1.0 / noise.corner_sigma(l, scale_factor);
   std::vector<Observation> sources;
   for (size_t p = 0; p < points.size(); ++p) {
     const MapPoint& point = *map.point(points[p]);

@@ -149,7 +149,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     const Keypoint& kp = features->keypoints[static_cast<size_t>(m.feature)];
     const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
     const Eigen::Vector3d in_cam = cam_from_world * p->position;
-    const double sigma = noise_.pixel_sigma * std::pow(scale_factor_, kp.octave);
+    const double sigma = noise_.corner_sigma(kp.octave, scale_factor_);
     if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() > 5.991 * sigma * sigma) continue;
     if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > 3 * noise_.depth_sigma(kp.depth)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];

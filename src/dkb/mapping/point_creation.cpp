@@ -66,7 +66,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       for (size_t fb = 0; fb < b.points.size(); ++fb) {
         if (b.points[fb] != kNoPoint) continue;
         const Keypoint& kb = b.features->keypoints[fb];
-        const double sigma = noise.pixel_sigma * std::pow(scale_factor, kb.octave);
+        const double sigma = noise.corner_sigma(kb.octave, scale_factor);
         const double e = line_px.x() * kb.pixel.x() + line_px.y() * kb.pixel.y() + line_px.z();
         if (e * e > options.chi2_epipolar * sigma * sigma * norm2) continue;
         const int d = hamming_distance(a.features->descriptors[fa], b.features->descriptors[fb]);
@@ -85,7 +85,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
-        const double sigma = noise.pixel_sigma * std::pow(scale_factor, k.octave);
+        const double sigma = noise.corner_sigma(k.octave, scale_factor);
         if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma) return false;
         return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < 3 * noise.depth_sigma(k.depth);
       };

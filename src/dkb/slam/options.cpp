@@ -44,6 +44,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("depth.model_rolling_shutter", &o.depth.model_rolling_shutter, "undo the rolling shutter (needs the camera's readout)");
 
   s.bind("noise.pixel_sigma", &o.noise.pixel_sigma, "[px] of a corner on the finest level");
+  s.bind("noise.scale_exponent", &o.noise.scale_exponent, "growth of that with the level's scale");
   s.bind("noise.depth_sigma_base", &o.noise.depth_sigma_base, "[m] depth noise at 0.4 m");
   s.bind("noise.depth_sigma_quadratic", &o.noise.depth_sigma_quadratic, "[1/m] growth with (z - 0.4 m)^2");
   s.bind("noise.depth_sigma_factor", &o.noise.depth_sigma_factor, "factor on both for edges, registration, calibration");

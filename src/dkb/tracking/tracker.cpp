@@ -115,7 +115,7 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<std::pair<
     PoseObservation o;
     o.point_in_world = point;
     o.pixel = k.pixel.cast<double>();
-    o.pixel_sigma = noise_.pixel_sigma * std::pow(scale_factor_, k.octave);
+    o.pixel_sigma = noise_.corner_sigma(k.octave, scale_factor_);
     o.depth = k.depth;
     if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
     observations.push_back(o);
@@ -173,7 +173,7 @@ std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const Rg
     PoseObservation o;
     o.point_in_world = positions[static_cast<size_t>(m.a)];
     o.pixel = k.pixel.cast<double>();
-    o.pixel_sigma = noise_.pixel_sigma * std::pow(scale_factor_, k.octave);
+    o.pixel_sigma = noise_.corner_sigma(k.octave, scale_factor_);
     o.depth = k.depth;
     if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
     observations.push_back(o);
