@@ -26,15 +26,23 @@ struct KeyframeQuery {
   // Inliers: what was matched and where.
   const std::vector<PointId>* points = nullptr;  // per feature; kNoPoint where nothing was matched
   const RgbdFeatures* features = nullptr;
+  bool explain = false;  // fill KeyframeDecision::explanation
 };
 
 enum class KeyframeRule { none, first, baseline, adaptive, floor };
 const char* name_of(KeyframeRule rule);
 
+// Which tests of the adaptive policy spoke for a keyframe; those behind a closed gate were not asked.
+struct KeyframeTests {
+  bool parallax = false, visibility = false, spread = false;         // the gate, the two votes (DKB section 3.2)
+  bool few_points = false, close_points = false, view_left = false;  // the safety floor
+};
+
 struct KeyframeDecision {
   bool insert = false;
   KeyframeRule rule = KeyframeRule::none;
   std::string explanation;  // every test with its numbers, for logs; empty unless asked for
+  KeyframeTests tests = {};
 };
 
 // Decides whether a tracked frame becomes a keyframe.

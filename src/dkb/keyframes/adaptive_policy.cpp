@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/keyframes/adaptive_policy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+const char* yes_or_no(bool yes) {
+  return yes ? "yes" : "no";
+}
+
+// The points that a keyframe shows, by increasing id.
+void add_points_of(const Keyframe& keyframe, const Map& map, std::vector<PointId>& points) {
+  for (PointId id : keyframe.points)
+    if (map.point(id) != nullptr) points.push_back(id);
+}
+
+void sort_unique(std::vector<PointId>& points) {
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+}
+
+}  // namespace
+
+void AdaptiveKeyframeOptions::check() const {
+  parallax.check();
+  require_option(visibility_levels >= 2 && visibility_levels <= 18, "visibility_levels", visibility_levels, "2 ... 18");
+  require_option(least_frames_between >= 1, "least_frames_between", least_frames_between, "at least 1 frame");
+  require_option(floor_least_tracked >= 0, "floor_least_tracked", floor_least_tracked, "at least 0");
+  require_option(floor_few_close >= 0, "floor_few_close", floor_few_close, "at least 0");
+  require_option(floor_many_creatable >= 0, "floor_many_creatable", floor_many_creatable, "at least 0");
+  require_option(floor_reference_ratio >= 0 && floor_reference_ratio <= 1, "floor_reference_ratio",
+                 floor_reference_ratio, "0 ... 1");
+}
+
+AdaptiveKeyframePolicy::AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width,
+                                               int image_height)
+    : options_(options), image_width_(image_width), image_height_(image_height), gate_(options.parallax) {
+  options_.check();
+}
+
+const AdaptiveKeyframePolicy::KeyframePoint* AdaptiveKeyframePolicy::find(PointId id) const {
+  const auto at = std::lower_bound(keyframe_points_.begin(), keyframe_points_.end(), id,
+                                   [](const KeyframePoint& p, PointId wanted) { return p.id < wanted; });
+  return at != keyframe_points_.end() && at->id == id ? &*at : nullptr;
+}
+
+bool AdaptiveKeyframePolicy::level_changed(const KeyframePoint& p, const Eigen::Vector3d& camera_in_keyframe) const {
+  if (p.level == 0) return false;
+  return visibility_level(view_angle_deg(p.normal_in_keyframe, camera_in_keyframe - p.point_in_keyframe),
+                          options_.visibility_levels) != p.level;
+}
+
+// Normals and levels of the keyframe's points and the reference frame's counts: once per keyframe, when first asked
+// for.
+void AdaptiveKeyframePolicy::study_keyframe(KeyframeId id, const Map& map) {
+  const Keyframe& keyframe = *map.keyframe(id);
+  std::vector<PointId> points, cloud;
+  add_points_of(keyframe, map, points);
+  sort_unique(points);
+  cloud = points;
+  for (const Covisible& c : keyframe.covisible) add_points_of(*map.keyframe(c.keyframe), map, cloud);
+  sort_unique(cloud);
+  const auto normals = surface_normals(map, points, cloud, options_.normals);
+
+  const Rigid3 keyframe_from_world = map.cam_from_world(id);
+  keyframe_points_.clear();
+  for (size_t i = 0; i < points.size(); ++i) {
+    KeyframePoint p;
+    p.id = points[i];
+    p.point_in_keyframe = keyframe_from_world * map.point(points[i])->position;
+    if (normals[i]) {
+      p.normal_in_keyframe = keyframe_from_world.rotation * *normals[i];
+      p.level =
+          visibility_level(view_angle_deg(p.normal_in_keyframe, -p.point_in_keyframe), options_.visibility_levels);
+    }
+    keyframe_points_.push_back(p);
+  }
+  studied_ = id;
+
+  const Eigen::Vector3d camera = centre_in_world(reference_.cam_from_keyframe);
+  reference_matches_ = reference_changed_ = 0;
+  for (PointId named : reference_.points)
+    if (const KeyframePoint* p = find(map.resolve(named))) {
+      ++reference_matches_;
+      reference_changed_ += level_changed(*p, camera);
+    }
+}
+
+AdaptiveKeyframePolicy::Matches AdaptiveKeyframePolicy::match(const KeyframeQuery& q,
+                                                              const Rigid3& cam_from_keyframe) const {
+  Matches result;
+  const Eigen::Vector3d camera = centre_in_world(cam_from_keyframe);
+  for (size_t f = 0; f < q.points->size(); ++f) {
+    const KeyframePoint* p = (*q.points)[f] == kNoPoint ? nullptr : find((*q.points)[f]);
+    if (p == nullptr) continue;
+    ++result.matches;
+    result.changed += level_changed(*p, camera);
+    result.pixels.push_back(q.features->keypoints[f].image_pixel);
+  }
+  return result;
+}
+
+KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Map& map) {
+  const Rigid3 cam_from_keyframe = q.cam_from_world * q.last_keyframe_cam_from_world.inverse();
+  if (q.last_keyframe != reference_.keyframe) {
+    reference_ = {q.last_keyframe, {}, cam_from_keyframe, q.tracked_points};
+    for (PointId id : *q.points)
+      if (id != kNoPoint) reference_.points.push_back(id);
+  }
+
+  KeyframeDecision decision;
+  KeyframeTests& tests = decision.tests;
+  const bool waited = q.frame - q.last_keyframe_frame >= options_.least_frames_between;
+  const Parallax parallax =
+      parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world, options_.parallax.translation_unit);
+  tests.parallax = gate_.passes(parallax);
+
+  MatchCounts counts;
+  VisibilityVote visibility;
+  SpreadVote spread;
+  if (tests.parallax && waited && map.keyframe(q.last_keyframe) != nullptr) {
+    if (studied_ != q.last_keyframe) study_keyframe(q.last_keyframe, map);
+    const Matches matches = match(q, cam_from_keyframe);
+    counts = {matches.matches,    matches.changed,    q.tracked_points,
+              reference_matches_, reference_changed_, reference_.tracked_points};
+    visibility = vote_by_visibility(counts, options_.similarity);
+    spread = vote_by_spread(spread_grid(matches.pixels, image_width_, image_height_));
+    tests.visibility = visibility.votes;
+    tests.spread = spread.votes;
+  }
+  tests.few_points = q.tracked_points < options_.floor_least_tracked;
+  tests.close_points =
+      q.tracked_close_points < options_.floor_few_close && q.creatable_close_points >= options_.floor_many_creatable;
+  tests.view_left = q.tracked_points < options_.floor_reference_ratio * q.reference_points;
+
+  if (tests.visibility && tests.spread)
+    decision.rule = KeyframeRule::adaptive;
+  else if (waited && (tests.few_points || tests.close_points || tests.view_left))
+    decision.rule = KeyframeRule::floor;
+  decision.insert = decision.rule != KeyframeRule::none;
+  if (!q.explain) return decision;
+  decision.explanation = fmt::format(
+      "parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): {}; changed {} of {} matches (reference {} of {}, "
+      "points {} / {}), "
+      "S {:.2f}, theta {:.3f}, alpha {:.3f}, beta {:.3f}, against {:.2f}: {}; ECOG {:.3f} against {:.3f}: {}; "
+      "tracked {} of the reference's {}, close {} (+{}): {}",
+      parallax.rotation_deg, parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax),
+      counts.changed, counts.matches, counts.reference_changed, counts.reference_matches, counts.points,
+      counts.reference_points, visibility.s, visibility.theta, visibility.alpha, visibility.beta, visibility.threshold,
+      yes_or_no(tests.visibility), spread.ecog, spread.threshold, yes_or_no(tests.spread), q.tracked_points,
+      q.reference_points, q.tracked_close_points, q.creatable_close_points,
+      yes_or_no(tests.few_points || tests.close_points || tests.view_left));
+  return decision;
+}
+
+}  // namespace dkb

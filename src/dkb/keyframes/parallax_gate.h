@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+
+#include "dkb/geometry/rigid3.h"
+
+namespace dkb {
+
+enum class TranslationUnit { metre, centimetre };
+
+// The gate before the votes: a frame that moved little since the last keyframe is none (DKB section 3.2, eqs. 14-25).
+struct ParallaxGateOptions {
+  int window = 10;                // [frames] parallaxes averaged, >= 1                              (DKB eqs. 17, 18)
+  double threshold_min = 10.0;    // [deg + unit] parallax that opens the gate in fast motion, >= 0  (DKB eq. 25)
+  double threshold_max = 30.0;    // [deg + unit] the same at rest, >= threshold_min
+  double rotation_max = 45.0;     // [deg] Theta_max, > 0                                            (DKB eq. 24)
+  double translation_max = 10.0;  // [unit] t_max, > 0
+  TranslationUnit translation_unit = TranslationUnit::centimetre;  // the paper gives none: in metres only turns count
+  void check() const;                                              // throws InvalidOption
+};
+
+// Motion of a frame since a keyframe.
+struct Parallax {
+  double rotation_deg = 0;  // [deg] 0 ... 180
+  double translation = 0;   // [unit] between the camera centres
+  double sum() const { return rotation_deg + translation; }
+};
+
+// DKB eqs. 14-16. Both poses in the same world; the result is in degrees and `unit`.
+Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, TranslationUnit unit);
+
+struct ParallaxWeights {
+  double rotation = 0, translation = 0;  // each 0 ... 1, together at most 1
+};
+
+// DKB eqs. 19, 20. Both 0 for a still camera.
+ParallaxWeights parallax_weights(const Parallax& mean);
+
+// DKB eqs. 21-24, clamped to 0 ... 1. A still camera, for which eq. 24 is 0/0, gives 0.
+double parallax_factor(const Parallax& mean, double rotation_max, double translation_max);
+
+// DKB eq. 25: threshold_max at rest, threshold_min in fast motion.
+double parallax_threshold(double factor, double threshold_min, double threshold_max);
+
+// The gate with its window. Deterministic: depends on the parallaxes alone.
+class ParallaxGate {
+ public:
+  explicit ParallaxGate(const ParallaxGateOptions& options);
+
+  // Takes the parallax of the next frame, against whichever keyframe was the last at that frame. True when it reaches
+  // the threshold. Means are over the frames that are there (DKB eqs. 17, 18), this one included.
+  bool passes(const Parallax& parallax);
+
+  Parallax mean() const;                           // of the window; 0 before the first frame
+  double factor() const { return factor_; }        // F of the last frame
+  double threshold() const { return threshold_; }  // T of the last frame
+
+ private:
+  ParallaxGateOptions options_;
+  std::deque<Parallax> window_;
+  double factor_ = 0, threshold_;
+};
+
+}  // namespace dkb
