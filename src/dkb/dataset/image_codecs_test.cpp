@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "dkb/dataset/mutation.h"
+#include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "dkb/dataset/mutation.h"
+#include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "dkb/dataset/mutation.h"
+#include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 
