@@ -89,20 +89,18 @@ void append_features(std::string& csv, const std::string& stamp, const SlamSyste
 }
 
 // --disable dr,kf,ba,loop
-void disable_parts(const std::string& list, SlamOptions& options, DetectorArguments& detection) {
+DisabledParts parse_disabled(const std::string& list) {
   const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
-  std::istringstream parts(list);
-  for (std::string part; std::getline(parts, part, ',');) {
-    if (part == "dr") {
-      options.dynamics.filter = FilterKind::none;
-      detection = {};
-      detection.detector = "none";
-    } else if (part == "ba") {
-      options.mapping.ba.weighted = false;
-    } else if (std::find(known.begin(), known.end(), part) == known.end()) {
-      throw InputError("--disable: there is no part \"" + part + "\"" + did_you_mean(part, known) + "; parts: dr, kf, ba, loop");
-    }
+  DisabledParts parts;
+  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
+  std::istringstream names(list);
+  for (std::string name; std::getline(names, name, ',');) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end())
+      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) + "; parts: dr, kf, ba, loop");
+    *switches[at - known.begin()] = true;
   }
+  return parts;
 }
 
 int run(const RunArguments& args) {
@@ -114,7 +112,10 @@ int run(const RunArguments& args) {
   for (const std::string& assignment : args.set) settings.set_assignment(assignment, "--set");
   if (!args.filter.empty()) settings.set("dynamics.filter", args.filter, "--filter");
   DetectorArguments detection = args.detection;
-  disable_parts(args.disable, options, detection);
+  const DisabledParts disabled = parse_disabled(args.disable);
+  disable_parts(options, disabled);
+  if (options.dynamics.filter == FilterKind::none && (disabled.dynamic_removal || args.preset == "orb")) detection = {};
+  if (options.dynamics.filter == FilterKind::none) detection.detector = "none";
   if (args.has_seed) options.seed = args.seed;
   options.pipeline.threaded = args.threads != 1;
   options.pipeline.realtime = args.realtime;
@@ -195,7 +196,7 @@ void register_run(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("run", "Track a recorded sequence: trajectory, map and statistics");
   command->add_option("dataset", args->dataset, "Folder in TUM layout")->required();
   command->add_option("--camera", args->camera, "Camera file, or fr1, fr2, fr3, bonn");
-  command->add_option("--preset", args->preset, "Settings to start from: default");
+  command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
   command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
   command->add_option("--set", args->set, "key=value, any setting of config.yaml; may be repeated");
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");

@@ -23,9 +23,22 @@ void SlamOptions::check() const {
 }
 
 SlamOptions preset(const std::string& name) {
-  const std::vector<std::string> names = {"default"};
-  if (name == "default") return {};
-  throw InputError("--preset: there is no preset \"" + name + "\"" + did_you_mean(name, names) + "; presets: default");
+  const std::vector<std::string> names = {"default", "paper", "orb"};
+  SlamOptions o;
+  if (name == "default") return o;
+  if (name != "paper" && name != "orb")
+    throw InputError("--preset: there is no preset \"" + name + "\"" + did_you_mean(name, names) + "; presets: default, paper, orb");
+  // What the paper does not have: the camera's own motion within an image and between images.
+  o.depth.model_rolling_shutter = false;
+  o.depth.model_time_offset = false;
+  o.dynamics.filter = FilterKind::paper;
+  if (name == "orb") disable_parts(o, {.dynamic_removal = true, .keyframes = true, .weighted_ba = true});
+  return o;
+}
+
+void disable_parts(SlamOptions& options, const DisabledParts& parts) {
+  if (parts.dynamic_removal) options.dynamics.filter = FilterKind::none;
+  if (parts.weighted_ba) options.mapping.ba.weighted = false;
 }
 
 void bind_settings(Settings& s, SlamOptions& o) {

@@ -42,8 +42,18 @@ struct SlamOptions {
   void check() const;
 };
 
-// The built-in presets: "default". Throws InputError naming the nearest one.
+// The built-in presets: "default" is our best; "paper" is DKB-SLAM as printed; "orb" is that with all of its three
+// contributions off, an ORB-SLAM3-like baseline. Throws InputError naming the nearest one.
 SlamOptions preset(const std::string& name);
+
+// The switches of the paper's ablation (and of --disable).
+struct DisabledParts {
+  bool dynamic_removal = false;  // DR: no filter
+  bool keyframes = false;        // KF: the baseline rule instead of the adaptive one
+  bool weighted_ba = false;      // BA: all points weigh the same
+  bool loop = false;             // no loop closing
+};
+void disable_parts(SlamOptions& options, const DisabledParts& parts);
 
 // Binds every field to its dotted key, e.g. "tracking.close_depth".
 void bind_settings(Settings& settings, SlamOptions& options);
