@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "e2e_support.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "dkb/evaluation/trajectory_error.h"
+
+namespace dkb::test {
+namespace fs = std::filesystem;
+
+TempFolder::TempFolder() {
+  std::string pattern = (fs::temp_directory_path() / "dkb-e2e-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("cannot make " + pattern);
+  path_ = pattern;
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+size_t Finished::error_lines() const {
+  std::istringstream lines(err);
+  size_t n = 0;
+  for (std::string line; std::getline(lines, line);) n += !line.empty();
+  return n;
+}
+
+Program::Program(const std::vector<std::string>& arguments, long largest_file) {
+  std::vector<std::string> words = {DKB_SLAM_EXECUTABLE};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& w : words) argv.push_back(w.data());
+  argv.push_back(nullptr);
+  const std::string out = folder_ / "out", err = folder_ / "err";
+  pid_ = fork();
+  if (pid_ < 0) throw std::runtime_error("cannot fork");
+  if (pid_ == 0) {
+    const int out_fd = open(out.c_str(), O_CREAT | O_WRONLY, 0600),
+              err_fd = open(err.c_str(), O_CREAT | O_WRONLY, 0600);
+    dup2(out_fd, STDOUT_FILENO);
+    dup2(err_fd, STDERR_FILENO);
+    if (largest_file >= 0) {
+      const rlimit limit{static_cast<rlim_t>(largest_file), static_cast<rlim_t>(largest_file)};
+      setrlimit(RLIMIT_FSIZE, &limit);
+      std::signal(SIGXFSZ, SIG_IGN);
+    }
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+}
+
+Program::~Program() {
+  if (ended()) return;
+  kill(pid_, SIGKILL);
+  waitpid(pid_, &status_, 0);
+}
+
+std::string Program::err() const {
+  return fs::exists(folder_ / "err") ? read_text(folder_ / "err") : "";
+}
+
+bool Program::ended() {
+  if (!ended_) ended_ = waitpid(pid_, &status_, WNOHANG) == pid_;
+  return ended_;
+}
+
+Finished Program::wait() {
+  if (!ended_) waitpid(pid_, &status_, 0);
+  ended_ = true;
+  return {WIFEXITED(status_) ? WEXITSTATUS(status_) : 1000 + WTERMSIG(status_), read_text(folder_ / "out"), err()};
+}
+
+Finished run_program(const std::vector<std::string>& arguments, long largest_file) {
+  return Program(arguments, largest_file).wait();
+}
+
+fs::path sequence() {
+  const fs::path folder = DKB_TEST_SEQUENCE;
+  if (fs::exists(folder / "associations.txt")) return folder;
+  // Written beside and moved into place, so that programs that start at the same time do not meet.
+  const fs::path mine = folder.string() + "." + std::to_string(getpid());
+  const Finished made = run_program({"simulate", "--out", mine.string(), "--scene", "room", "--people", "0", "--seed",
+                                     "3", "--frames", std::to_string(kSequenceFrames)});
+  if (made.exit_code != 0) throw std::runtime_error("simulate failed: " + made.err);
+  std::error_code taken;
+  fs::rename(mine, folder, taken);
+  if (taken) fs::remove_all(mine);
+  return folder;
+}
+
+void copy_sequence(const fs::path& folder, int frames, bool own_images) {
+  const fs::path from = sequence();
+  fs::create_directories(folder);
+  for (const char* list : {"rgb.txt", "depth.txt", "associations.txt", "groundtruth.txt"}) {
+    std::string text;
+    int rows = 0;
+    std::ifstream in(from / list);
+    for (std::string line; std::getline(in, line);) {
+      if (line.starts_with('#') || rows++ < frames) text += line + "\n";
+    }
+    write_text(folder / list, text);
+  }
+  fs::copy_file(from / "camera.yaml", folder / "camera.yaml");
+  if (!own_images) {
+    fs::create_directory_symlink(from / "rgb", folder / "rgb");
+    fs::create_directory_symlink(from / "depth", folder / "depth");
+    return;
+  }
+  fs::create_directory(folder / "rgb");
+  fs::create_directory(folder / "depth");
+  for (const auto& row : rows_of(folder / "associations.txt"))
+    for (const std::string& image : {row.at(1), row.at(3)}) fs::copy_file(from / image, folder / image);
+}
+
+std::string read_text(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error("cannot read " + file.string());
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void write_text(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << text;
+  if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+std::vector<std::vector<std::string>> rows_of(const fs::path& file) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream text(read_text(file));
+  for (std::string line; std::getline(text, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream words(line);
+    rows.emplace_back();
+    for (std::string w; words >> w;) rows.back().push_back(w);
+  }
+  return rows;
+}
+
+double ape_of(const fs::path& dataset, const fs::path& trajectory) {
+  return evaluate(read_trajectory(dataset / "groundtruth.txt"), read_trajectory(trajectory)).ape.translation.rmse;
+}
+
+}  // namespace dkb::test

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bad input gives one clear line that names the place, exit code 2, and leaves nothing half-written.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <functional>
+#include <sstream>
+
+#include "dkb/dataset/image_codecs.h"
+#include "e2e_support.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Case {
+  std::string name;
+  std::string says;                            // what the message must hold
+  std::function<void(const fs::path&)> spoil;  // given the dataset's folder
+  std::vector<std::string> arguments = {};     // `@` stands for the folder
+};
+
+// Replaces row `row` of a list (comments not counted) by what `change` makes of it.
+void change_row(const fs::path& list, size_t row, const std::function<std::string(const std::string&)>& change) {
+  std::istringstream in(read_text(list));
+  std::string text;
+  size_t at = 0;
+  for (std::string line; std::getline(in, line);) text += (line[0] != '#' && at++ == row ? change(line) : line) + "\n";
+  write_text(list, text);
+}
+void change_all(const fs::path& list, const std::function<std::string(const std::string&)>& change) {
+  const size_t rows = rows_of(list).size();
+  for (size_t r = 0; r < rows; ++r) change_row(list, r, change);
+}
+std::string without_stamp(const std::string& row) {
+  return row.substr(row.find(' '));
+}
+void use_lists(const fs::path& folder) {
+  fs::remove(folder / "associations.txt");
+}
+void replace(const fs::path& file, const std::string& what, const std::string& by) {
+  std::string text = read_text(file);
+  const size_t at = text.find(what);
+  if (at == std::string::npos) throw std::logic_error(file.string() + " holds no " + what);
+  write_text(file, text.replace(at, what.size(), by));
+}
+void for_each_image(const fs::path& folder, size_t column, const std::function<void(const fs::path&)>& action) {
+  for (const auto& row : rows_of(folder / "associations.txt")) action(folder / row[column]);
+}
+
+std::vector<Case> cases() {
+  return {
+      {"empty folder", "", [](const fs::path& d) { fs::remove_all(d), fs::create_directory(d); }},
+      {"no such folder", "gone", [](const fs::path& d) { fs::rename(d, d.parent_path() / "elsewhere"); }},
+      {"no rgb.txt", "rgb.txt", [](const fs::path& d) { use_lists(d), fs::remove(d / "rgb.txt"); }},
+      {"no depth.txt", "depth.txt", [](const fs::path& d) { use_lists(d), fs::remove(d / "depth.txt"); }},
+      {"empty list", "associations.txt", [](const fs::path& d) { write_text(d / "associations.txt", "# nothing\n"); }},
+      {"malformed stamp", "rgb.txt:4",
+       [](const fs::path& d) {
+         use_lists(d), change_row(d / "rgb.txt", 2, [](const std::string& r) { return "x" + r; });
+       }},
+      {"NaN stamp", "associations.txt:2",
+       [](const fs::path& d) {
+         change_row(d / "associations.txt", 0, [](const std::string& r) { return "nan" + without_stamp(r); });
+       }},
+      {"stamps out of order", "rgb.txt:5",
+       [](const fs::path& d) {
+         use_lists(d), change_row(d / "rgb.txt", 3, [](const std::string& r) { return "1" + without_stamp(r); });
+       }},
+      {"repeated stamp", "associations.txt:7",
+       [](const fs::path& d) {
+         const std::string before = rows_of(d / "associations.txt")[4][0];
+         change_row(d / "associations.txt", 5, [&](const std::string& r) { return before + without_stamp(r); });
+       }},
+      {"too few columns", "associations.txt:4",
+       [](const fs::path& d) {
+         change_row(d / "associations.txt", 2, [](const std::string& r) { return r.substr(0, r.find(' ')); });
+       }},
+      {"colour and depth of different days", "",
+       [](const fs::path& d) {
+         use_lists(d), change_all(d / "depth.txt", [](const std::string& r) { return "9" + r; });
+       }},
+      {"all images missing", "rgb/",
+       [](const fs::path& d) { for_each_image(d, 1, [](const fs::path& f) { fs::remove(f); }); }},
+      {"all images truncated", "",
+       [](const fs::path& d) {
+         for_each_image(d, 1, [](const fs::path& f) { write_text(f, read_text(f).substr(0, 100)); });
+       }},
+      {"images of another kind", "",
+       [](const fs::path& d) { for_each_image(d, 1, [](const fs::path& f) { write_text(f, "GIF89a!"); }); }},
+      {"colour of another size", "320",
+       [](const fs::path& d) {
+         for_each_image(d, 1, [](const fs::path& f) { write_text(f, encode_jpeg(ColourImage(320, 240))); });
+       }},
+      {"depth of another size", "320",
+       [](const fs::path& d) {
+         for_each_image(d, 3, [](const fs::path& f) { write_text(f, encode_png(Image<uint16_t>(320, 240, 5000))); });
+       }},
+      {"depth of 8 bits", "8-bit",
+       [](const fs::path& d) {
+         for_each_image(d, 3, [](const fs::path& f) { write_text(f, encode_png(GreyImage(640, 480, 50))); });
+       }},
+      {"misspelt camera key", "depth_factor",
+       [](const fs::path& d) { replace(d / "camera.yaml", "depth_factor", "depth_factr"); }},
+      {"negative focal length", "fx", [](const fs::path& d) { replace(d / "camera.yaml", "fx: ", "fx: -"); }},
+      {"missing camera key", "cx", [](const fs::path& d) { replace(d / "camera.yaml", "cx:", "# cx:"); }},
+      {"camera file that is no YAML", "camera.yaml", [](const fs::path& d) { write_text(d / "camera.yaml", "{{{"); }},
+      {"missing camera file", "none.yaml", [](const fs::path&) {}, {"--camera", "@/none.yaml"}},
+      {"unknown option", "detectr", [](const fs::path&) {}, {"--detectr", "none"}},
+      {"unknown setting", "features.count", [](const fs::path&) {}, {"--set", "featurs.count=5"}},
+      {"setting of another type", "features.count", [](const fs::path&) {}, {"--set", "features.count=many"}},
+      {"setting out of range", "mapper_latency", [](const fs::path&) {}, {"--set", "pipeline.mapper_latency=0"}},
+      {"unknown preset", "papre", [](const fs::path&) {}, {"--preset", "papre"}},
+      {"unknown detector", "yolos", [](const fs::path&) {}, {"--detector", "yolos"}},
+      {"missing boxes file", "none.txt", [](const fs::path&) {}, {"--detector", "file", "--boxes", "@/none.txt"}},
+      {"NaN box",
+       "b.txt:2",
+       [](const fs::path& d) { write_text(d / "b.txt", "# t class x y w h\n1700000000.0 person nan 3 4 5\n"); },
+       {"--detector", "file", "--boxes", "@/b.txt"}},
+      {"frames that are none", "max", [](const fs::path&) {}, {"--max-frames", "0"}},
+      {"nothing left to run", "", [](const fs::path&) {}, {"--start", "1000"}},
+  };
+}
+
+TEST(RunBadInput, IsRefusedInOneClearLine) {
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    const TempFolder temp;
+    const fs::path folder = temp / (c.name == "no such folder" ? "gone" : "data");
+    copy_sequence(folder, 8, true);
+    c.spoil(folder);
+    std::vector<std::string> arguments = {"run", folder.string(), "--out", (temp / "out").string(), "--quiet"};
+    bool detector = false;
+    for (std::string a : c.arguments) {
+      if (const size_t at = a.find('@'); at != std::string::npos) a.replace(at, 1, folder.string());
+      detector = detector || a.starts_with("--detect");
+      arguments.push_back(a);
+    }
+    if (!detector) arguments.insert(arguments.end(), {"--detector", "none"});
+    const Finished run = run_program(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_EQ(run.error_lines(), 1U) << run.err;
+    EXPECT_NE(run.err.find("error: "), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find(c.says), std::string::npos) << "it must hold \"" << c.says << "\": " << run.err;
+    EXPECT_FALSE(fs::exists(temp.path() / "out" / "trajectory.txt"));
+  }
+}
+
+TEST(RunBadInput, TheSameFolderUnspoiltRuns) {
+  const TempFolder temp;
+  copy_sequence(temp / "data", 8, true);
+  const Finished run =
+      run_program({"run", (temp / "data").string(), "--out", (temp / "out").string(), "--detector", "none", "--quiet"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  use_lists(temp / "data");
+  const Finished by_lists = run_program(
+      {"run", (temp / "data").string(), "--out", (temp / "out2").string(), "--detector", "none", "--quiet"});
+  EXPECT_EQ(by_lists.exit_code, 0) << by_lists.err;
+  EXPECT_EQ(read_text(temp.path() / "out" / "trajectory.txt"), read_text(temp.path() / "out2" / "trajectory.txt"));
+}
+
+TEST(RunBadInput, AnOutputThatCannotBeMadeIsRefusedBeforeTheRun) {
+  const TempFolder temp;
+  write_text(temp / "file", "mine");
+  for (const std::string& out :
+       {std::string("/proc/nowhere/out"), (temp / "file").string(), (temp / "file").string() + "/out"}) {
+    SCOPED_TRACE(out);
+    const Finished run = run_program({"run", sequence().string(), "--out", out, "--detector", "none", "--quiet"});
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_EQ(run.error_lines(), 1U) << run.err;
+    EXPECT_NE(run.err.find(out.substr(0, out.rfind('/'))), std::string::npos) << run.err;
+  }
+  EXPECT_EQ(read_text(temp / "file"), "mine");
+}
+
+TEST(RunBadInput, AFullDiskLeavesNothingHalfWritten) {
+  const TempFolder temp;
+  const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none",
+                                    "--max-frames", "20", "--quiet"},
+                                   1000);
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(run.error_lines(), 1U) << run.err;
+  EXPECT_NE(run.err.find("trajectory.txt"), std::string::npos) << run.err;
+  for (const auto& left : fs::directory_iterator(temp / "out")) ADD_FAILURE() << "left behind: " << left.path();
+}
+
+TEST(RunBadInput, AnEarlierResultSurvivesAFullDisk) {
+  const TempFolder temp;
+  fs::create_directory(temp / "out");
+  write_text(temp.path() / "out" / "trajectory.txt", "earlier");
+  const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none",
+                                    "--max-frames", "20", "--quiet"},
+                                   1000);
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(read_text(temp.path() / "out" / "trajectory.txt"), "earlier");
+}
+
+TEST(RunBadInput, NoCommandNoDatasetAndAMisspeltCommandAreRefused) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{}, {"run"}, {"rnu"}, {"run", "--out"}}) {
+    const Finished run = run_program(arguments);
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_EQ(run.error_lines(), 1U) << run.err;
+  }
+}
+
+}  // namespace
+}  // namespace dkb::test

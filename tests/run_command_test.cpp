@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+// `dkb-slam run`, as its users start it.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/image_codecs.h"
+#include "e2e_support.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Runs on `dataset` and leaves the results in `out`.
+struct SlamRun {
+  explicit SlamRun(const fs::path& dataset, const fs::path& out_folder, std::vector<std::string> more = {})
+      : out(out_folder) {
+    std::vector<std::string> arguments = {"run",        dataset.string(), "--out",  out.string(),
+                                          "--detector", "none",           "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    finished = run_program(arguments);
+    if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
+  }
+  fs::path out;
+  Finished finished;
+  nlohmann::json stats;
+};
+
+const std::vector<std::string> kSameBytes = {"trajectory.txt", "trajectory_online.txt", "keyframes.txt", "map.dkb",
+                                             "map.ply",        "config.yaml",           "features.csv"};
+
+// Images of one's own making in place of the sequence's.
+std::string black_jpeg() {
+  return encode_jpeg(ColourImage(640, 480));
+}
+std::string empty_depth() {
+  return encode_png(Image<uint16_t>(640, 480));
+}
+
+TEST(RunCommand, WritesEveryFileOfTheContract) {
+  const TempFolder temp;
+  const SlamRun run(sequence(), temp / "out", {"--dump-features"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.finished.err, "") << "--quiet hides progress, and there is nothing to warn of";
+
+  std::set<std::string> stamps;
+  for (const auto& row : rows_of(sequence() / "rgb.txt")) stamps.insert(row[0]);
+  for (const char* name : {"trajectory.txt", "trajectory_online.txt", "keyframes.txt"}) {
+    const auto rows = rows_of(run.out / name);
+    EXPECT_GT(rows.size(), 1U) << name;
+    double before = 0;
+    for (const auto& row : rows) {
+      ASSERT_EQ(row.size(), 8U) << name;
+      EXPECT_TRUE(stamps.contains(row[0])) << name << ": " << row[0] << " is not written as in rgb.txt";
+      EXPECT_GT(std::stod(row[0]), before);
+      before = std::stod(row[0]);
+    }
+  }
+  EXPECT_EQ(rows_of(run.out / "trajectory.txt").size(), static_cast<size_t>(kSequenceFrames));
+  const auto first = rows_of(run.out / "trajectory_online.txt").front();
+  for (size_t i = 1; i < 7; ++i) EXPECT_EQ(std::stod(first[i]), 0) << "the world is the first camera";
+  EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.01);
+  EXPECT_LT(ape_of(sequence(), run.out / "trajectory_online.txt"), 0.015);
+
+  const nlohmann::json& s = run.stats;
+  EXPECT_EQ(s.at("frames"), kSequenceFrames);
+  EXPECT_EQ(s.at("tracked"), kSequenceFrames);
+  EXPECT_EQ(s.at("lost"), 0);
+  EXPECT_EQ(s.at("skipped"), 0);
+  EXPECT_EQ(s.at("keyframes"), static_cast<int>(rows_of(run.out / "keyframes.txt").size()));
+  EXPECT_GT(s.at("map_points"), 100);
+  for (const char* key : {"maps", "merges", "loops", "relocalisations"})
+    EXPECT_TRUE(s.at(key).is_number_integer()) << key;
+  for (const char* key : {"startup_s", "wall_s", "cpu_s", "peak_rss_mb"}) EXPECT_GT(s.at(key).get<double>(), 0) << key;
+  for (const char* stage : {"tracking", "features", "mapping", "local_ba", "keyframe_decision", "wait_mapper"})
+    for (const char* figure : {"mean_ms", "median_ms", "p95_ms", "max_ms", "count"})
+      EXPECT_TRUE(s.at("stages").at(stage).contains(figure)) << stage << "." << figure;
+  EXPECT_EQ(s.at("stages").at("tracking").at("count"), kSequenceFrames);
+  int by_rule = 0;
+  for (const char* rule : {"first", "adaptive", "floor", "baseline"})
+    by_rule += s.at("keyframe_rules").at(rule).get<int>();
+  EXPECT_GE(by_rule, s.at("keyframes"));
+  EXPECT_EQ(s.at("keyframe_rules").at("first"), 1);
+  EXPECT_TRUE(s.at("dynamic").contains("features_removed"));
+  EXPECT_TRUE(s.at("detector").contains("kind"));
+
+  EXPECT_TRUE(read_text(run.out / "map.ply").starts_with("ply\n"));
+  EXPECT_GT(fs::file_size(run.out / "map.dkb"), 1000U);
+  EXPECT_NE(read_text(run.out / "config.yaml").find("mapper_latency"), std::string::npos);
+  const std::string csv = read_text(run.out / "features.csv");
+  EXPECT_TRUE(csv.starts_with("timestamp,x,y,state\n"));
+  EXPECT_NE(csv.find(",used\n"), std::string::npos);
+  EXPECT_EQ(csv.find(",dynamic\n"), std::string::npos);
+}
+
+TEST(RunCommand, OneThreadAndManyGiveTheSameBytes) {
+  const TempFolder temp;
+  const SlamRun many(sequence(), temp / "many", {"--dump-features"}),
+      one(sequence(), temp / "one", {"--dump-features", "--threads", "1"});
+  ASSERT_EQ(many.finished.exit_code, 0) << many.finished.err;
+  ASSERT_EQ(one.finished.exit_code, 0) << one.finished.err;
+  for (const std::string& name : kSameBytes) EXPECT_EQ(read_text(many.out / name), read_text(one.out / name)) << name;
+}
+
+TEST(RunCommand, ItsConfigurationRepeatsTheRun) {
+  const TempFolder temp;
+  const SlamRun first(sequence(), temp / "first", {"--set", "features.count=600", "--max-frames", "15"});
+  ASSERT_EQ(first.finished.exit_code, 0) << first.finished.err;
+  EXPECT_NE(read_text(first.out / "config.yaml").find("600"), std::string::npos);
+  const SlamRun again(sequence(), temp / "again", {"--config", (first.out / "config.yaml").string(), "--max-frames", "15"});
+  ASSERT_EQ(again.finished.exit_code, 0) << again.finished.err;
+  for (const char* name : {"trajectory.txt", "map.dkb", "config.yaml"})
+    EXPECT_EQ(read_text(first.out / name), read_text(again.out / name)) << name;
+}
+
+TEST(RunCommand, ChoosesFramesAndReplacesEarlierResults) {
+  const TempFolder temp;
+  const SlamRun first(sequence(), temp / "out", {"--max-frames", "12"});
+  EXPECT_EQ(first.stats.at("frames"), 12);
+  write_text(temp.path() / "out" / "mine.txt", "kept");
+  const SlamRun second(sequence(), temp / "out", {"--start", "0.5", "--end", "0.9"});  // frames 15 ... 27 at 30 Hz
+  ASSERT_EQ(second.finished.exit_code, 0) << second.finished.err;
+  EXPECT_EQ(second.stats.at("frames"), 13);
+  EXPECT_EQ(rows_of(second.out / "trajectory.txt").size(), 13U);
+  EXPECT_EQ(read_text(temp.path() / "out" / "mine.txt"), "kept");
+}
+
+TEST(RunCommand, ShowsProgressUnlessQuiet) {
+  const TempFolder temp;
+  const Finished loud = run_program(
+      {"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none", "--max-frames", "8"});
+  EXPECT_EQ(loud.exit_code, 0);
+  EXPECT_NE(loud.err.find("frame 8/8"), std::string::npos) << loud.err;
+  EXPECT_EQ(loud.err.find('\r'), std::string::npos) << "plain lines where no terminal is";
+  EXPECT_NE(loud.out.find("camera.yaml"), std::string::npos) << "which camera was chosen: " << loud.out;
+}
+
+TEST(RunCommand, PacedByTheStampsEveryFrameIsAccountedFor) {
+  const TempFolder temp;
+  const SlamRun run(sequence(), temp / "out", {"--realtime"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  const auto& s = run.stats;
+  EXPECT_EQ(s.at("frames"), kSequenceFrames);
+  EXPECT_EQ(s.at("tracked").get<int>() + s.at("lost").get<int>() + s.at("skipped").get<int>(), kSequenceFrames);
+  EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.02);
+}
+
+TEST(RunCommand, GreyImagesFloatDepthAndHalfTheSizeWork) {
+  const TempFolder temp;
+  const fs::path folder = temp / "half";
+  copy_sequence(folder, 15, true);
+  CameraModel camera = read_camera_file(folder / "camera.yaml");
+  const CameraModel full = camera;
+  camera.width /= 2;
+  camera.height /= 2;
+  camera.fx /= 2;
+  camera.fy /= 2;
+  camera.cx = (camera.cx - 0.5) / 2;
+  camera.cy = (camera.cy - 0.5) / 2;
+  write_text(folder / "camera.yaml", camera_to_yaml(camera));
+  for (const auto& row : rows_of(folder / "associations.txt")) {
+    const GreyImage grey = read_grey(folder / row[1]);
+    const DepthImage depth = read_depth(folder / row[3], full);
+    GreyImage small(camera.width, camera.height);
+    DepthImage small_depth(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) {
+        small(x, y) = static_cast<uint8_t>(
+            (grey(2 * x, 2 * y) + grey(2 * x + 1, 2 * y) + grey(2 * x, 2 * y + 1) + grey(2 * x + 1, 2 * y + 1) + 2) /
+            4);
+        small_depth(x, y) = depth(2 * x, 2 * y);
+      }
+    write_text(folder / row[1], encode_png(small));  // a file's kind is told by its content
+    write_text(folder / row[3], encode_pfm(small_depth));
+  }
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), 15);
+  EXPECT_LT(ape_of(folder, run.out / "trajectory.txt"), 0.02);
+}
+
+TEST(RunCommand, IsLostInTheDarkAndFoundAgain) {
+  const TempFolder temp;
+  const fs::path folder = temp / "dark";
+  copy_sequence(folder, kSequenceFrames, true);
+  const auto rows = rows_of(folder / "associations.txt");
+  for (size_t i = 12; i < 17; ++i) write_text(folder / rows[i][1], black_jpeg());
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("lost"), 5);
+  EXPECT_EQ(run.stats.at("tracked"), kSequenceFrames - 5);
+  EXPECT_GE(run.stats.at("relocalisations"), 1);
+  std::set<std::string> written;
+  for (const auto& row : rows_of(run.out / "trajectory.txt")) written.insert(row[0]);
+  for (size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(written.contains(rows[i][0]), i < 12 || i >= 17) << "frame " << i;
+  EXPECT_LT(ape_of(folder, run.out / "trajectory.txt"), 0.02);
+}
+
+TEST(RunCommand, SurvivesAStretchWithoutDepth) {
+  const TempFolder temp;
+  const fs::path folder = temp / "flat";
+  copy_sequence(folder, kSequenceFrames, true);
+  const auto rows = rows_of(folder / "associations.txt");
+  for (size_t i = 12; i < 22; ++i) write_text(folder / rows[i][3], empty_depth());
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("frames"), kSequenceFrames);
+  EXPECT_GE(run.stats.at("tracked"), kSequenceFrames - 10);
+  const auto tracked = rows_of(run.out / "trajectory.txt");
+  EXPECT_EQ(tracked.back()[0], rows.back()[0]);
+  EXPECT_LT(ape_of(folder, run.out / "trajectory.txt"), 0.03);
+}
+
+TEST(RunCommand, StartsOnceTheLensIsUncovered) {
+  const TempFolder temp;
+  const fs::path folder = temp / "covered";
+  copy_sequence(folder, 16, true);
+  const auto rows = rows_of(folder / "associations.txt");
+  for (size_t i = 0; i < 6; ++i) write_text(folder / rows[i][1], black_jpeg());
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), 10);
+  EXPECT_EQ(rows_of(run.out / "trajectory.txt").front()[0], rows[6][0]);
+}
+
+TEST(RunCommand, NeverSeeingAnythingIsAFailureThatSaysSo) {
+  const TempFolder temp;
+  const fs::path folder = temp / "black";
+  copy_sequence(folder, 6, true);
+  for (const auto& row : rows_of(folder / "associations.txt")) write_text(folder / row[1], black_jpeg());
+  const SlamRun run(folder, temp / "out");
+  EXPECT_EQ(run.finished.exit_code, 1);
+  EXPECT_EQ(run.finished.error_lines(), 1U) << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), 0);
+}
+
+TEST(RunCommand, ABadImageIsSkippedNamedAndCounted) {
+  const TempFolder temp;
+  const fs::path folder = temp / "bad";
+  copy_sequence(folder, 20, true);
+  const auto rows = rows_of(folder / "associations.txt");
+  write_text(folder / rows[10][1], "");
+  const std::string depth = read_text(folder / rows[14][3]);
+  write_text(folder / rows[14][3], depth.substr(0, depth.size() / 2));
+  fs::remove(folder / rows[16][1]);
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("skipped"), 3);
+  EXPECT_EQ(run.stats.at("tracked"), 17);
+  EXPECT_NE(run.finished.err.find("warning"), std::string::npos);
+  EXPECT_NE(run.finished.err.find(fs::path(rows[10][1]).filename().string()), std::string::npos) << run.finished.err;
+}
+
+// The tenth image is a named pipe: the run cannot get past it before it is interrupted.
+TEST(RunCommand, AnInterruptWritesWhatThereIs) {
+  const TempFolder temp;
+  const fs::path folder = temp / "endless";
+  copy_sequence(folder, 20, true);
+  const fs::path pipe = folder / rows_of(folder / "associations.txt")[10][1];
+  fs::remove(pipe);
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const fs::path out = temp / "out";
+  Program program({"run", folder.string(), "--out", out.string(), "--detector", "none"});
+  const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
+  while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause();
+  ASSERT_FALSE(program.ended());
+  kill(program.pid(), SIGINT);
+  while (!program.ended()) {
+    const int fd = open(pipe.c_str(), O_WRONLY | O_NONBLOCK);  // whoever reads it finds an empty file
+    if (fd >= 0) close(fd);
+    pause();
+  }
+  const Finished finished = program.wait();
+  EXPECT_EQ(finished.exit_code, 130) << finished.err;
+  const auto stats = nlohmann::json::parse(read_text(out / "stats.json"));
+  EXPECT_GE(stats.at("tracked"), 1);
+  EXPECT_EQ(rows_of(out / "trajectory.txt").size(), stats.at("tracked").get<size_t>());
+  for (const char* name : {"trajectory_online.txt", "keyframes.txt", "map.dkb", "map.ply", "config.yaml"})
+    EXPECT_TRUE(fs::exists(out / name)) << name;
+}
+
+}  // namespace
+}  // namespace dkb::test
