@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/mover_observer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr float kBin = 0.05f;        // [m] of depth histograms
+constexpr size_t kMostPoints = 500;  // per object, that medians are taken of
+
+float median(std::vector<float>& v) {
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+// What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
+// sensor's noise.
+double position_sd(double depth) {
+  return std::hypot(0.03, 0.01 * depth);
+}
+
+}  // namespace
+
+void MoverObserverOptions::check() const {
+  require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
+  require_option(least_cells >= 1, "least_cells", least_cells, "at least 1");
+  require_option(least_region >= 1, "least_region", least_region, "at least 1");
+  require_option(margin >= 0, "margin", margin, "at least 0");
+  require_option(layer > 0, "layer", layer, "greater than 0 m");
+  require_option(step > 0, "step", step, "greater than 0");
+  require_option(gap >= 0, "gap", gap, "at least 0 cells");
+  require_option(step_merged > 0, "step_merged", step_merged, "greater than 0 m");
+}
+
+MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptions& options)
+    : camera_(camera), options_(options) {
+  options_.check();
+  camera_.check();
+  columns_ = (camera_.width + options_.cell - 1) / options_.cell;
+  rows_ = (camera_.height + options_.cell - 1) / options_.cell;
+  rays_.reserve(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
+  for (int y = 0; y < rows_; ++y)
+    for (int x = 0; x < columns_; ++x) {
+      const Eigen::Vector2d middle((x + 0.5) * options_.cell - 0.5, (y + 0.5) * options_.cell - 0.5);
+      rays_.push_back(camera_.unproject(camera_.undistort(middle), 1.0).head<2>().cast<float>());
+    }
+}
+
+// Cells whose middle lies in the box, widened by a share of its size.
+MoverObserver::CellRange MoverObserver::cells_in(const Box& b, double margin) const {
+  const auto first = [&](double edge, int n) {
+    return static_cast<int>(std::clamp(std::ceil(edge / options_.cell - 0.5), 0.0, static_cast<double>(n)));
+  };
+  const double x = static_cast<double>(b.x), y = static_cast<double>(b.y), w = static_cast<double>(b.w),
+               h = static_cast<double>(b.h);
+  return {first(x - margin * w, columns_), first(y - margin * h, rows_), first(x + (1 + margin) * w, columns_),
+          first(y + (1 + margin) * h, rows_)};
+}
+
+template <class Function>
+void MoverObserver::for_each_cell(const CellRange& r, const Function& function) const {
+  for (int y = r.y0; y < r.y1; ++y)
+    for (int x = r.x0; x < r.x1; ++x)
+      function(static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x), x, y);
+}
+
+// Depth in the middle of a cell, or beside it; 0 = none.
+float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
+  const int px = x * options_.cell + options_.cell / 2, py = y * options_.cell + options_.cell / 2;
+  for (const auto& [dx, dy] : {std::array{0, 0}, {-1, 0}, {0, -1}, {-1, -1}})
+    if (depth.contains(px + dx, py + dy) && depth(px + dx, py + dy) > 0) return depth(px + dx, py + dy);
+  return 0;
+}
+
+Eigen::Vector3d MoverObserver::median_position(std::span<const size_t> cells) const {
+  const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
+  const size_t stride = (cells.size() + kMostPoints - 1) / kMostPoints;
+  std::array<std::vector<float>, 3> values;
+  for (auto& v : values) v.reserve(cells.size() / stride + 1);
+  for (size_t k = 0; k < cells.size(); k += stride) {
+    const Eigen::Vector2f& ray = rays_[cells[k]];
+    const Eigen::Vector3f p = rotation * (depth_[cells[k]] * Eigen::Vector3f(ray.x(), ray.y(), 1));
+    for (size_t i = 0; i < 3; ++i) values[i].push_back(p[static_cast<Eigen::Index>(i)]);
+  }
+  return world_from_cam_.translation +
+         Eigen::Vector3f(median(values[0]), median(values[1]), median(values[2])).cast<double>();
+}
+
+// Middle of the stretch of depth, twice `layer` long, that holds most of the depths; the nearest of equals.
+float MoverObserver::main_layer(const std::vector<float>& depths) const {
+  std::vector<int> histogram;
+  for (float d : depths) {
+    const auto bin = static_cast<size_t>(d / kBin);
+    if (bin >= histogram.size()) histogram.resize(bin + 1, 0);
+    ++histogram[bin];
+  }
+  const size_t window = std::max<size_t>(1, static_cast<size_t>(2 * static_cast<float>(options_.layer) / kBin));
+  int inside = 0, most = 0;
+  size_t end_of_most = 0;
+  for (size_t end = 0; end < histogram.size(); ++end) {
+    inside += histogram[end];
+    if (end >= window) inside -= histogram[end - window];
+    if (inside > most) {
+      most = inside;
+      end_of_most = end;
+    }
+  }
+  std::vector<float> in;
+  for (float d : depths)
+    if (const auto bin = static_cast<size_t>(d / kBin); bin <= end_of_most && bin + window > end_of_most)
+      in.push_back(d);
+  return median(in);
+}
+
+// Depth [m] of the object in each box; 0 = not known. The cells that a box alone has tell it; for a box within others,
+// the cells that these do not explain.
+std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
+                                             const std::vector<CellRange>& ranges) const {
+  std::vector<int> count(rays_.size(), 0);
+  for (const CellRange& r : ranges) for_each_cell(r, [&](size_t i, int, int) { ++count[i]; });
+  std::vector<size_t> by_area(boxes.size());
+  std::iota(by_area.begin(), by_area.end(), size_t{0});
+  std::stable_sort(by_area.begin(), by_area.end(),
+                   [&](size_t a, size_t b) { return boxes[a].box.area() < boxes[b].box.area(); });
+
+  const float half = static_cast<float>(options_.layer);
+  std::vector<float> found(boxes.size(), 0), depths;
+  std::vector<char> explained(rays_.size(), 0);
+  const auto settle = [&](size_t b, const auto& counts) {
+    depths.clear();
+    for_each_cell(ranges[b], [&](size_t i, int, int) {
+      if (depth_[i] > 0 && counts(i)) depths.push_back(depth_[i]);
+    });
+    if (depths.size() < static_cast<size_t>(options_.least_cells)) return;
+    const float depth = found[b] = main_layer(depths);
+    for_each_cell(ranges[b], [&](size_t i, int, int) { explained[i] |= std::abs(depth_[i] - depth) < half; });
+  };
+  for (const size_t b : by_area) settle(b, [&](size_t i) { return count[i] == 1; });
+  for (const size_t b : by_area)
+    if (!(found[b] > 0)) settle(b, [&](size_t i) { return !explained[i]; });
+  return found;
+}
+
+std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detection> boxes) const {
+  std::vector<CellRange> ranges;
+  for (const Detection& d : boxes) ranges.push_back(cells_in(d.box, 0));
+  const std::vector<float> depths = box_depths(boxes, ranges);
+  const float half = static_cast<float>(options_.layer);
+  // A cell in several boxes goes to the object at whose depth and in whose middle it is.
+  std::vector<float> least(rays_.size(), std::numeric_limits<float>::max());
+  std::vector<int> owner(rays_.size(), -1);
+  for (size_t b = 0; b < boxes.size(); ++b) {
+    if (!(depths[b] > 0)) continue;
+    const float middle = 0.5f * static_cast<float>(ranges[b].x0 + ranges[b].x1 - 1);
+    const float across = std::max(1.0f, 0.5f * static_cast<float>(ranges[b].x1 - ranges[b].x0));
+    for_each_cell(ranges[b], [&](size_t i, int x, int) {
+      const float off = std::abs(depth_[i] - depths[b]) / half, aside = (static_cast<float>(x) - middle) / across;
+      const float cost = off + 0.5f * aside * aside;
+      if (!(depth_[i] > 0) || off > 1 || cost >= least[i]) return;
+      least[i] = cost;
+      owner[i] = static_cast<int>(b);
+    });
+  }
+  std::vector<MoverObservation> observations;
+  std::vector<size_t> cells;
+  for (size_t b = 0; b < boxes.size(); ++b) {
+    cells.clear();
+    for_each_cell(ranges[b], [&](size_t i, int, int) {
+      if (owner[i] == static_cast<int>(b)) cells.push_back(i);
+    });
+    if (cells.size() < static_cast<size_t>(options_.least_cells)) continue;
+    observations.push_back(
+        {boxes[b].class_name, boxes[b].box, median_position(cells), position_sd(static_cast<double>(depths[b]))});
+  }
+  return observations;
+}
+
+// Parts of the mask outside all boxes that hang together in depth.
+std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector<char>& claimed) const {
+  std::vector<char> free(rays_.size());
+  for (size_t i = 0; i < free.size(); ++i) free[i] = depth_[i] > 0 && !claimed[i];
+  struct Part {
+    Region region;
+    float depth;
+    size_t merged_into;
+  };
+  std::vector<Part> parts;
+  const auto width = static_cast<size_t>(columns_);
+  std::vector<float> depths;
+  for (size_t seed = 0; seed < free.size(); ++seed) {
+    if (!free[seed]) continue;
+    free[seed] = 0;
+    std::vector<size_t> cells{seed};
+    CellRange bounds{columns_, rows_, 0, 0};
+    depths.clear();
+    for (size_t k = 0; k < cells.size(); ++k) {
+      const size_t i = cells[k];
+      const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
+      bounds = {std::min(bounds.x0, x), std::min(bounds.y0, y), std::max(bounds.x1, x + 1), std::max(bounds.y1, y + 1)};
+      const float d = depth_[i];
+      depths.push_back(d);
+      const auto visit = [&](bool there, size_t j) {
+        if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.step) * d) return;
+        free[j] = 0;
+        cells.push_back(j);
+      };
+      visit(x > 0, i - 1);
+      visit(x + 1 < columns_, i + 1);
+      visit(y > 0, i - width);
+      visit(y + 1 < rows_, i + width);
+    }
+    if (cells.size() < 4) continue;  // specks would bridge objects
+    parts.push_back({{bounds, std::move(cells)}, median(depths), parts.size()});
+  }
+  // Holes of the depth image and arms held out cut bodies into parts.
+  const auto root = [&](size_t p) {
+    while (parts[p].merged_into != p) p = parts[p].merged_into;
+    return p;
+  };
+  for (size_t a = 0; a < parts.size(); ++a)
+    for (size_t b = a + 1; b < parts.size(); ++b) {
+      const CellRange &p = parts[a].region.bounds, &q = parts[b].region.bounds;
+      const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
+      if (gap > options_.gap || std::abs(parts[a].depth - parts[b].depth) > static_cast<float>(options_.step_merged))
+        continue;
+      const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
+      parts[high].merged_into = low;
+    }
+  for (size_t p = 0; p < parts.size(); ++p) {
+    const size_t r = root(p);
+    if (r == p) continue;
+    Region &into = parts[r].region, &from = parts[p].region;
+    into.cells.insert(into.cells.end(), from.cells.begin(), from.cells.end());
+    into.bounds = {std::min(into.bounds.x0, from.bounds.x0), std::min(into.bounds.y0, from.bounds.y0),
+                   std::max(into.bounds.x1, from.bounds.x1), std::max(into.bounds.y1, from.bounds.y1)};
+  }
+  std::vector<Region> regions;
+  for (size_t p = 0; p < parts.size(); ++p)
+    if (parts[p].merged_into == p && parts[p].region.cells.size() >= static_cast<size_t>(options_.least_region))
+      regions.push_back(std::move(parts[p].region));
+  return regions;
+}
+
+std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, const MoverMask& mask,
+                                                     std::span<const Detection> boxes, const Rigid3& world_from_cam) {
+  if (depth.width() != camera_.width || depth.height() != camera_.height)
+    throw InputError("depth image is " + std::to_string(depth.width()) + " x " + std::to_string(depth.height()) +
+                     " px; it must have the camera's size " + std::to_string(camera_.width) + " x " +
+                     std::to_string(camera_.height));
+  if (mask.empty()) return {};
+  world_from_cam_ = world_from_cam;
+  depth_.assign(rays_.size(), 0.0f);
+  std::vector<char> claimed(rays_.size(), 0);  // by a box or its rim
+  for (const Detection& d : boxes)
+    for_each_cell(cells_in(d.box, options_.margin), [&](size_t i, int, int) { claimed[i] = 1; });
+  bool loose = false;
+  const float middle = 0.5f * static_cast<float>(options_.cell);
+  for_each_cell({0, 0, columns_, rows_}, [&](size_t i, int x, int y) {
+    if (!mask.at(static_cast<float>(x * options_.cell) + middle, static_cast<float>(y * options_.cell) + middle))
+      return;
+    depth_[i] = depth_near(depth, x, y);
+    loose |= !claimed[i];
+  });
+  std::vector<MoverObservation> observations = observe_boxes(boxes);
+  if (!loose) return observations;
+  std::vector<float> depths;
+  for (const Region& r : find_regions(claimed)) {
+    depths.clear();
+    for (size_t i : r.cells) depths.push_back(depth_[i]);
+    const auto pixels = [&](int cells) { return static_cast<float>(cells * options_.cell); };
+    const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
+                     pixels(r.bounds.y1 - r.bounds.y0)};
+    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),
+                            position_sd(static_cast<double>(median(depths)))});
+  }
+  return observations;
+}
+
+}  // namespace dkb

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/movers_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/settings.h"
+
+namespace dkb {
+namespace {
+
+constexpr std::string_view kHeader = "timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h";
+constexpr std::array<const char*, 14> kColumns{"timestamp", "id", "class",       "x",     "y",     "z",     "vx",
+                                               "vy",        "vz", "position_sd", "box_x", "box_y", "box_w", "box_h"};
+
+std::string excerpt(std::string_view text) {
+  std::string out(text.substr(0, 40));
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return text.size() > 40 ? out + "..." : out;
+}
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> columns;
+  for (;;) {
+    const size_t comma = line.find(',');
+    columns.push_back(line.substr(0, comma));
+    if (comma == std::string_view::npos) return columns;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+double number(const std::vector<std::string_view>& columns, size_t column, const std::string& place) {
+  double value = 0;
+  const auto complaint = [&](const char* what) {
+    return place + ": " + kColumns[column] + " \"" + excerpt(columns[column]) + "\" is not " + what;
+  };
+  if (!parse_number(columns[column], &value)) throw InputError(complaint("a number"));
+  if (!(std::abs(value) < 1e12)) throw InputError(complaint("a finite number in range"));
+  return value;
+}
+
+MoverRow parse_row(const std::vector<std::string_view>& columns, const std::string& place) {
+  if (columns.size() != kColumns.size())
+    throw InputError(place +
+                     fmt::format(": {} of {} columns; a row must be `{}`", columns.size(), kColumns.size(), kHeader));
+  MoverRow row;
+  Mover& m = row.mover;
+  row.timestamp = number(columns, 0, place);
+  row.stamp = std::string(columns[0]);
+  int64_t id = 0;
+  if (!parse_number(columns[1], &id) || id < 1 || id > std::numeric_limits<int>::max())
+    throw InputError(place + ": id \"" + excerpt(columns[1]) + "\" is not a whole number from 1");
+  m.id = static_cast<int>(id);
+  m.class_name = std::string(columns[2]);
+  if (m.class_name.empty()) throw InputError(place + ": the class is empty; it must name what moves, e.g. person");
+  for (int i = 0; i < 3; ++i) {
+    m.position_in_world[i] = number(columns, 3 + static_cast<size_t>(i), place);
+    m.velocity_in_world[i] = number(columns, 6 + static_cast<size_t>(i), place);
+  }
+  m.position_sd = number(columns, 9, place);
+  const auto pixels = [&](size_t column) { return static_cast<float>(number(columns, column, place)); };
+  m.box = {pixels(10), pixels(11), pixels(12), pixels(13)};
+  if (m.position_sd < 0)
+    throw InputError(place + ": position_sd " + excerpt(columns[9]) + " is negative; it must be at least 0");
+  if (m.box.w < 0 || m.box.h < 0)
+    throw InputError(place + ": the box is " + excerpt(columns[12]) + " x " + excerpt(columns[13]) +
+                     " px; its size must be at least 0");
+  return row;
+}
+
+std::string written_class(std::string name) {
+  if (name.empty()) return "object";
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return c <= 0x20 || c == ',' || c == '"' || c == 0x7F; }, '_');
+  return name;
+}
+
+}  // namespace
+
+std::string movers_to_csv(const MoverRows& rows) {
+  std::string out(kHeader);
+  out += '\n';
+  for (const MoverRow& row : rows) {
+    const Mover& m = row.mover;
+    const Eigen::Vector3d &p = m.position_in_world, &v = m.velocity_in_world;
+    out += fmt::format("{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.2f},{:.2f},{:.2f},{:.2f}\n",
+                       row.stamp, m.id, written_class(m.class_name), p.x(), p.y(), p.z(), v.x(), v.y(), v.z(),
+                       m.position_sd, m.box.x, m.box.y, m.box.w, m.box.h);
+  }
+  return out;
+}
+
+void write_movers(const std::filesystem::path& path, const MoverRows& rows) {
+  write_file_atomically(path, movers_to_csv(rows));
+}
+
+MoverRows parse_movers(std::string_view text, const std::string& name) {
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  MoverRows rows;
+  std::set<int> ids_of_frame;
+  bool header_seen = false;
+  for (size_t line_number = 1; !text.empty(); ++line_number) {
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (line.empty()) continue;
+    const std::string place = name + ":" + std::to_string(line_number);
+    if (!header_seen) {
+      if (line != kHeader)
+        throw InputError(place + ": the header is \"" + excerpt(line) + "\"; it must be `" + std::string(kHeader) +
+                         "`");
+      header_seen = true;
+      continue;
+    }
+    MoverRow row = parse_row(split(line), place);
+    if (!rows.empty() && row.timestamp < rows.back().timestamp)
+      throw InputError(place + ": timestamp " + row.stamp + " is before that of the line above (" + rows.back().stamp +
+                       "); sort the file by time");
+    if (rows.empty() || row.timestamp > rows.back().timestamp) ids_of_frame.clear();
+    if (!ids_of_frame.insert(row.mover.id).second)
+      throw InputError(place + ": id " + std::to_string(row.mover.id) + " stands twice at " + row.stamp +
+                       "; a mover has one line per frame");
+    rows.push_back(std::move(row));
+  }
+  if (!header_seen)
+    throw InputError(name + ":1: the file is empty; its first line must be `" + std::string(kHeader) + "`");
+  return rows;
+}
+
+MoverRows read_movers(const std::filesystem::path& path) {
+  return parse_movers(read_file(path), path.string());
+}
+
+}  // namespace dkb

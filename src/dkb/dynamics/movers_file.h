@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dkb/dynamics/mover.h"
+
+namespace dkb {
+
+// One row of movers.csv.
+struct MoverRow {
+  double timestamp = 0;  // [s] of the colour image
+  std::string stamp;     // the same as read from the dataset
+  Mover mover;
+  bool operator==(const MoverRow&) const = default;
+};
+using MoverRows = std::vector<MoverRow>;  // by time; within a frame in the file's order
+
+// movers.csv: a header line `timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h`, then one line per
+// mover and frame: position [m] and velocity [m/s] in the world, box [px] with its top-left corner. Metres are written
+// with 4 decimals, pixels with 2. Commas, quotes and white space in class names become '_'; an empty class, "object".
+std::string movers_to_csv(const MoverRows& rows);
+void write_movers(const std::filesystem::path& path, const MoverRows& rows);  // throws OutputError
+
+// The same format. CRLF, a byte order mark and empty lines are tolerated. Throws InputError `name:line: ...` for
+// another header, another number of columns, numbers that are not finite, ids below 1 or twice in a frame, a negative
+// position_sd or box size, an empty class, and stamps that go back.
+MoverRows parse_movers(std::string_view text, const std::string& name);
+MoverRows read_movers(const std::filesystem::path& path);
+
+}  // namespace dkb
