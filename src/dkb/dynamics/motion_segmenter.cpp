@@ -69,6 +69,7 @@ MoverMask MotionSegmenter::segment(const std::shared_ptr<const RgbdImage>& image
   carry();
   votes_ = Image<float>(w, h, 0.0f);
   still_ = Image<float>(w, h, 0.0f);
+  match_ = Image<float>(w, h, 0.0f);
   const size_t n = views_.size(), k = std::min(n, static_cast<size_t>(options_.views_per_frame));
   for (size_t i = 0; i < k; ++i) compare(*views_[(turn_ + i * n / k) % n]);
   ++turn_;
@@ -78,23 +79,28 @@ MoverMask MotionSegmenter::segment(const std::shared_ptr<const RgbdImage>& image
 
 void MotionSegmenter::carry() {
   std::fill(current_->score.data(), current_->score.data() + current_->score.size(), 0.0f);
+  known_ = Image<float>(rays_.width(), rays_.height(), 0.0f);
   if (!previous_) return;
   const Transform move(previous_->cam_from_world * current_->cam_from_world.inverse());
   const float keep = static_cast<float>(std::exp(-std::max(0.0, current_->time - previous_->time) / options_.memory));
+  const float keep_hole = static_cast<float>(std::exp(-std::max(0.0, current_->time - previous_->time) / options_.hole_memory));
   const int w = rays_.width(), h = rays_.height();
   for (int y = 0, i = 0; y < h; ++y)
     for (int x = 0; x < w; ++x, ++i) {
-      const float z = current_->depth.data()[i];
-      if (!(z > 0)) continue;
+      const float z = current_->depth.data()[i] > 0 ? current_->depth.data()[i] : 0.45f;
       float px, py, pz;
       const auto& ray = rays_.ray(static_cast<size_t>(i));
       move.apply(ray.x(), ray.y(), z, px, py, pz);
       if (pz < 0.1f) continue;
       const int c = rays_.cell_of(px, py, pz);
       if (c < 0) continue;
+      if (!(current_->depth.data()[i] > 0)) {
+        if (previous_->depth.data()[c] < static_cast<float>(options_.near_range)) { current_->score.data()[i] = keep_hole * std::max(0.0f, previous_->score.data()[c]); known_.data()[i] = 1; }
+        continue;
+      }
       const float tol = tolerance_.data()[i];
       const float d = previous_->depth.data()[c];
-      if (d > 0 && std::abs(d - pz) < tol + 0.03f) { current_->score.data()[i] = keep * previous_->score.data()[c]; continue; }
+      if (d > 0 && std::abs(d - pz) < tol + 0.03f) { known_.data()[i] = 1; current_->score.data()[i] = keep * previous_->score.data()[c]; continue; }
       // moved: nearest cell of the same depth around
       const int cx = c % w, cy = c / w;
       float best = tol + 0.03f, score = 0;
@@ -102,7 +108,7 @@ void MotionSegmenter::carry() {
         for (int dx = -2; dx <= 2; ++dx) {
           if (!previous_->depth.contains(cx + dx, cy + dy)) continue;
           const float e = previous_->depth(cx + dx, cy + dy);
-          if (e > 0 && std::abs(e - pz) < best) { best = std::abs(e - pz); score = previous_->score(cx + dx, cy + dy); }
+          if (e > 0 && std::abs(e - pz) < best) { best = std::abs(e - pz); score = previous_->score(cx + dx, cy + dy); known_.data()[i] = 1; }
         }
       current_->score.data()[i] = keep * score;
     }
@@ -111,15 +117,20 @@ void MotionSegmenter::carry() {
 void MotionSegmenter::compare(const MotionDepthGrid& view) {
   const Transform move(view.cam_from_world * current_->cam_from_world.inverse());
   const int n = rays_.width() * rays_.height();
+  const float trust = static_cast<float>(std::min(1.0, (current_->time - view.time) / options_.age));
   for (int i = 0; i < n; ++i) {
-    const float z = current_->depth.data()[i];
-    if (!(z > 0)) continue;
+    const bool hole = !(current_->depth.data()[i] > 0);
+    const float z = hole ? 0.45f : current_->depth.data()[i];
     float px, py, pz;
     const auto& ray = rays_.ray(static_cast<size_t>(i));
     move.apply(ray.x(), ray.y(), z, px, py, pz);
     if (pz < 0.1f) continue;
     const int c = rays_.cell_of(px, py, pz);
     if (c < 0) continue;
+    if (hole) {
+      votes_.data()[i] += view.depth.data()[c] > 0 && view.depth(c % rays_.width(), c / rays_.width()) > pz ? 1.0f : 0.0f;
+      continue;
+    }
     const float near = view.nearest.data()[c], far = view.farthest.data()[c];
     if (!(far > 0)) continue;
     const float tol = tolerance_.data()[i];
@@ -127,11 +138,12 @@ void MotionSegmenter::compare(const MotionDepthGrid& view) {
       if (!(view.depth.data()[c] > 0)) continue;
       const float b = near - 0.4f;
       const float tn = static_cast<float>(options_.tolerance_base) + static_cast<float>(options_.tolerance_sigmas) * (0.0012f + 0.0019f * b * b);
-      if (pz + std::max(tol, tn) < near) votes_.data()[i] += 1;
+      if (pz + std::max(tol, tn) + static_cast<float>(options_.slope) * (far - near) < near) votes_.data()[i] += 1;
     } else if (pz < far + tol && view.score.data()[c] < 0.3f) {
       const bool contour = current_->farthest.data()[i] > z + 2 * tol + 0.03f * z;
       const bool contour_then = far > pz + 2 * tol + 0.03f * pz;
-      still_.data()[i] += contour ? (contour_then ? static_cast<float>(options_.contour) : 0.0f) : static_cast<float>(options_.interior);
+      match_.data()[i] += trust;
+      still_.data()[i] += trust * (contour ? (contour_then ? static_cast<float>(options_.contour) : 0.0f) : static_cast<float>(options_.interior));
     }
   }
 }
@@ -153,13 +165,18 @@ void MotionSegmenter::decide() {
       crease_(x, y) = std::max(cx, cy);
     }
   const auto joined = [](float a, float b) { return std::abs(a - b) < 0.015f + 0.02f * std::min(a, b); };
+  ++frames_;
+  if (hole_share_.empty()) hole_share_ = Image<float>(w, h, 0.0f);
+  for (size_t i = 0; i < n; ++i) hole_share_.data()[i] += ((depth.data()[i] > 0 ? 0.0f : 1.0f) - hole_share_.data()[i]) / static_cast<float>(std::min(frames_, 300));
+  const auto opened = [&](int x, int y) { return votes_(x, y) > 0 && hole_share_(x, y) < 0.9f; };
   const float fade = static_cast<float>(1.414 * options_.cell / (camera_.fx * options_.reach));  // per cell and metre of depth
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
       const float z = depth(x, y);
       const auto link = [&](int x2, int y2) {
         const float z2 = depth(x2, y2);
-        if (!(z > 0) || !(z2 > 0) || !joined(z, z2)) return 0.0f;
+        if (!(z > 0) || !(z2 > 0)) return std::max(z, z2) < static_cast<float>(options_.near_range) && (z > 0 || opened(x, y)) && (z2 > 0 || opened(x2, y2)) ? 1.0f / (1.0f + fade * 0.45f) : 0.0f;
+        if (!joined(z, z2)) return 0.0f;
         return (std::max(crease_(x, y), crease_(x2, y2)) > static_cast<float>(options_.crease) ? 0.3f : 1.0f) / (1.0f + fade * z);
       };
       link_x_(x, y) = x > 0 ? link(x - 1, y) : 0;
@@ -169,14 +186,18 @@ void MotionSegmenter::decide() {
     for (int x = 0; x < w; ++x) {
       const size_t i = static_cast<size_t>(y * w + x);
       float plus = 0;
-      if (votes_.data()[i] > 0 && x > 0 && y > 0 && x + 1 < w && y + 1 < h) {
+      if (votes_.data()[i] > 0 && depth.data()[i] > 0 && x > 0 && y > 0 && x + 1 < w && y + 1 < h) {
         int support = 0;
-        for (int dy = -1; dy <= 1; ++dy) for (int dx = -1; dx <= 1; ++dx) support += votes_(x + dx, y + dy) > 0;
-        if (support >= 5) plus = 1;
+        for (int dy = -1; dy <= 1; ++dy) for (int dx = -1; dx <= 1; ++dx) support += votes_(x + dx, y + dy) > 0 && depth(x + dx, y + dy) > 0;
+        if (support >= 5) plus = votes_.data()[i] / (votes_.data()[i] + match_.data()[i]);
       }
+      if (plus_.empty()) plus_ = Image<float>(w, h);
+      plus_.data()[i] = plus;
       const float minus = plus > 0 ? 0 : std::min(still_.data()[i], 1.0f);
-      num_.data()[i] = plus - minus;
-      den_.data()[i] = plus + minus;
+      const float state = std::clamp(s.data()[i], -1.0f, 1.0f), weight = static_cast<float>(options_.state) * std::abs(state);
+      const float prior = static_cast<float>(depth.data()[i] > 0 ? options_.prior : options_.hole_prior);
+      num_.data()[i] = plus - minus + weight * state - prior;
+      den_.data()[i] = plus + minus + weight + prior;
     }
   for (int pass = 0; pass < 2; ++pass) {
     for (int y = 0; y < h; ++y) {
@@ -193,7 +214,7 @@ void MotionSegmenter::decide() {
     const float d = den_.data()[i];
     if (d <= 0) continue;
     const float m = num_.data()[i] / d, conf = std::min(1.0f, d / static_cast<float>(options_.full_evidence));
-    s.data()[i] = std::clamp(s.data()[i] + m * conf, -static_cast<float>(options_.low), 3.0f);
+    s.data()[i] = std::clamp((known_.data()[i] > 0 ? s.data()[i] : m) + m * conf, -static_cast<float>(options_.low), 3.0f);
   }
 }
 
@@ -213,7 +234,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
   current_->cam_from_world = at_depth_time(*cam_from_world, image_time_, depth_time_);
   last_ = Pose{image_time_, *cam_from_world};
   if (previous_) {
-    if (views_.empty() || previous_->time - views_.back()->time >= options_.view_interval) {
+    if (views_.empty() || (views_.size() == 1 && previous_->time - views_.back()->time > 0.06) || previous_->time - views_.back()->time >= options_.view_interval) {
       views_.push_back(std::move(previous_));
       if (views_.size() > static_cast<size_t>(options_.views)) {
         // thin out: drop the view whose loss leaves the smallest relative gap

@@ -23,9 +23,14 @@ struct MotionOptions {
   double on = 0.5;
   double memory = 6.0;  // [s]
   double reach = 0.4;  // [m]
+  double near_range = 0.7, hole_memory = 1;
+  double hole_prior = 0.02;
+  double slope = 1;
+  double prior = 0.01;
+  double state = 0.02, age = 0.5;
   double interior = 0.02, contour = 0.3, low = 1.5;
   double crease = 0.012;  // [1/m]
-  double full_evidence = 0.02;
+  double full_evidence = 0.05;
   void check() const;
 };
 
@@ -36,7 +41,8 @@ class MotionSegmenter {
   void commit(const std::optional<Rigid3>& cam_from_world);
   void reset();
   // dev
-  Image<float> votes_;
+  Image<float> votes_, plus_;
+  const Image<float>& score() const { return (current_ ? current_ : previous_)->score; }
 
  private:
   struct Pose { double time; Rigid3 cam_from_world; };
@@ -56,7 +62,8 @@ class MotionSegmenter {
   double image_time_ = 0, depth_time_ = 0;
   size_t turn_ = 0;
   Image<float> tolerance_;
-  Image<float> still_, link_x_, link_y_, num_, den_, inverse_, crease_;
+  int frames_ = 0;
+  Image<float> hole_share_, known_, match_, still_, link_x_, link_y_, num_, den_, inverse_, crease_;
 };
 
 }  // namespace dkb

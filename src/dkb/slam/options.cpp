@@ -16,6 +16,7 @@ void SlamOptions::check() const {
   noise.check();
   tracking.check();
   baseline_keyframes.check();
+  adaptive_keyframes.check();
   mapping.check();
   dynamics.check();
   evidence.check();
@@ -32,12 +33,15 @@ SlamOptions preset(const std::string& name) {
   o.depth.model_rolling_shutter = false;
   o.depth.model_time_offset = false;
   o.dynamics.filter = FilterKind::paper;
+  o.keyframe_policy = KeyframePolicyKind::adaptive;
+  o.adaptive_keyframes.visibility_levels = 4;
   if (name == "orb") disable_parts(o, {.dynamic_removal = true, .keyframes = true, .weighted_ba = true});
   return o;
 }
 
 void disable_parts(SlamOptions& options, const DisabledParts& parts) {
   if (parts.dynamic_removal) options.dynamics.filter = FilterKind::none;
+  if (parts.keyframes) options.keyframe_policy = KeyframePolicyKind::baseline;
   if (parts.weighted_ba) options.mapping.ba.weighted = false;
 }
 
@@ -80,6 +84,28 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes, "keyframes that share most points with the frame");
   s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each, "covisible keyframes added for each");
   s.bind("tracking.local_map.keyframes", &t.local_map.keyframes, "keyframes of the local map, at most");
+
+  s.bind("keyframes.policy", &o.keyframe_policy,
+         {{"adaptive", KeyframePolicyKind::adaptive}, {"baseline", KeyframePolicyKind::baseline}},
+         "who decides that a frame becomes a keyframe");
+  AdaptiveKeyframeOptions& a = o.adaptive_keyframes;
+  s.bind("keyframes.window", &a.parallax.window, "[frames] parallaxes averaged (DKB eqs. 17, 18)");
+  s.bind("keyframes.threshold_min", &a.parallax.threshold_min, "parallax that opens the gate in fast motion (DKB eq. 25)");
+  s.bind("keyframes.threshold_max", &a.parallax.threshold_max, "the same at rest");
+  s.bind("keyframes.rotation_max", &a.parallax.rotation_max, "[deg] Theta_max (DKB eq. 24)");
+  s.bind("keyframes.translation_max", &a.parallax.translation_max, "[unit] t_max (DKB eq. 24)");
+  s.bind("keyframes.translation_unit", &a.parallax.translation_unit,
+         {{"metre", TranslationUnit::metre}, {"centimetre", TranslationUnit::centimetre}}, "of translations in the gate");
+  s.bind("keyframes.similarity", &a.similarity, {{"printed", Similarity::printed}, {"pks", Similarity::pks}},
+         "S as the paper prints it or as its source has it (DKB eq. 34)");
+  s.bind("keyframes.normals", &a.normals, {{"oriented", NormalSum::oriented}, {"plain", NormalSum::plain}},
+         "cross products turned toward the camera or summed as printed (DKB eq. 28)");
+  s.bind("keyframes.visibility_levels", &a.visibility_levels, "of 10 degrees each; the paper has 4 (DKB eq. 32)");
+  s.bind("keyframes.least_frames_between", &a.least_frames_between, "[frames] from a keyframe to the next");
+  s.bind("keyframes.floor_least_tracked", &a.floor_least_tracked, "[points] fewer make a keyframe whatever the votes");
+  s.bind("keyframes.floor_few_close", &a.floor_few_close, "[points] fewer tracked close points ...");
+  s.bind("keyframes.floor_many_creatable", &a.floor_many_creatable, "[points] ... with so many to be made do so too");
+  s.bind("keyframes.floor_reference_ratio", &a.floor_reference_ratio, "likewise a smaller share of the reference's points");
 
   BaselineKeyframeOptions& b = o.baseline_keyframes;
   s.bind("keyframes.baseline.frames_between", &b.frames_between, "[frames] longest wait while mapping is busy");

@@ -8,6 +8,7 @@
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb/keyframes/adaptive_policy.h"
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/tracking/tracker.h"
@@ -26,11 +27,15 @@ struct PipelineOptions {
   void check() const;
 };
 
+enum class KeyframePolicyKind { adaptive, baseline };
+
 struct SlamOptions {
   OrbOptions features;
   DepthOptions depth;
   SensorNoise noise;
   TrackingOptions tracking;
+  KeyframePolicyKind keyframe_policy = KeyframePolicyKind::baseline;
+  AdaptiveKeyframeOptions adaptive_keyframes;
   BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
   DynamicsOptions dynamics;

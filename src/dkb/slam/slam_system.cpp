@@ -97,7 +97,10 @@ void SlamSystem::Impl::start() {
   mapping_.reset();
   const OrbOptions& orb = options_.features;
   tracker_ = std::make_unique<Tracker>(camera_, options_.noise, orb.scale, orb.levels, options_.tracking, options_.seed);
-  policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
+  if (options_.keyframe_policy == KeyframePolicyKind::adaptive)
+    policy_ = std::make_unique<AdaptiveKeyframePolicy>(options_.adaptive_keyframes, camera_.width, camera_.height);
+  else
+    policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
   mapping_ = std::make_unique<MappingStage>(LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping),
                                             options_.pipeline.threaded);
   records_.clear();
