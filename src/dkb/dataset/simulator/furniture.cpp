@@ -42,6 +42,7 @@ Furnisher::Furnisher(Materials* materials, Furnishing* target, uint64_t seed, ui
     : materials_(materials),
       target_(target),
       seed_(hash64(seed, 77)),
+      variation_(variation),
       random_(hash64(seed, 1)),
       details_(hash64(seed, 2, variation)) {}
 
@@ -49,7 +50,9 @@ int Furnisher::texture(Material material, uint32_t kinds, double width, double h
   return materials_->get(material, hash64(seed_, random_.below(kinds)), width, height);
 }
 int Furnisher::detail(Material material, uint32_t kinds, double width, double height) {
-  return materials_->get(material, hash64(seed_, details_.below(kinds)), width, height);
+  const uint32_t usual = random_.below(kinds), other = details_.below(kinds);
+  const bool differs = details_.uniform() < 0.2 && variation_ != 0;
+  return materials_->get(material, hash64(seed_, differs ? other : usual), width, height);
 }
 
 void Furnisher::reserve(const Rigid3& at, double x0, double y0, double x1, double y1) {

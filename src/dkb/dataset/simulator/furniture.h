@@ -31,7 +31,8 @@ enum class Clutter { low, normal, monitors };
 Rigid3 placed(double x, double y, double z, double yaw);
 
 // Builds furniture. The same seed gives the same things. `variation` seeds details apart from the layout: two rooms of
-// the same seed and different variations look alike but differ in small things.
+// the same seed and different variations look alike; a fifth of the pictures, books and
+// cartons differ, and small things stand a centimetre or two elsewhere.
 class Furnisher {
  public:
   Furnisher(Materials* materials, Furnishing* target, uint64_t seed, uint64_t variation = 0);
@@ -71,7 +72,7 @@ class Furnisher {
 
   Materials* const materials_;
   Furnishing* const target_;
-  const uint64_t seed_;
+  const uint64_t seed_, variation_;
   Random random_;   // layout
   Random details_;  // small differences
 };

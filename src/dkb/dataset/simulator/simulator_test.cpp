@@ -248,7 +248,7 @@ TEST(Simulator, TwinRoomsLookAlike) {
     aa += p * p;
     bb += q * q;
   }
-  EXPECT_GT(ab / std::sqrt(aa * bb), 0.5);
+  EXPECT_GT(ab / std::sqrt(aa * bb), 0.6);
   EXPECT_NE(a, b);
 }
 
