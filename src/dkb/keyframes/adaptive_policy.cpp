@@ -36,6 +36,19 @@ void AdaptiveKeyframeOptions::check() const {
   require_option(floor_many_creatable >= 0, "floor_many_creatable", floor_many_creatable, "at least 0");
   require_option(floor_reference_ratio >= 0 && floor_reference_ratio <= 1, "floor_reference_ratio",
                  floor_reference_ratio, "0 ... 1");
+  require_option(floor_kept_ratio >= 0 && floor_kept_ratio <= 1, "floor_kept_ratio", floor_kept_ratio, "0 ... 1");
+}
+
+AdaptiveKeyframeOptions paper_keyframe_options() {
+  AdaptiveKeyframeOptions options;
+  options.parallax.threshold_min = 10;
+  options.parallax.threshold_max = 30;
+  options.similarity = Similarity::printed;
+  options.normals = NormalSum::plain;
+  options.visibility_levels = 4;
+  options.floor_reference_ratio = 0.25;
+  options.floor_kept_ratio = 0;
+  return options;
 }
 
 AdaptiveKeyframePolicy::AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width,
@@ -137,7 +150,8 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   tests.few_points = q.tracked_points < options_.floor_least_tracked;
   tests.close_points =
       q.tracked_close_points < options_.floor_few_close && q.creatable_close_points >= options_.floor_many_creatable;
-  tests.view_left = q.tracked_points < options_.floor_reference_ratio * q.reference_points;
+  tests.view_left = q.tracked_points < options_.floor_reference_ratio * q.reference_points ||
+                    q.tracked_points < options_.floor_kept_ratio * reference_.tracked_points;
 
   if (tests.visibility && tests.spread)
     decision.rule = KeyframeRule::adaptive;

@@ -12,20 +12,26 @@
 
 namespace dkb {
 
+// The defaults are those that measured best; paper_keyframe_options() has the paper's.
 struct AdaptiveKeyframeOptions {
   ParallaxGateOptions parallax;
-  Similarity similarity = Similarity::printed;  // in the visibility vote                   (DKB eq. 34)
-  NormalSum normals = NormalSum::oriented;      // of the map points' surfaces              (DKB eq. 28)
-  int visibility_levels = 9;                    // of 10 degrees each, 2 ... 18; the paper has 4   (DKB eq. 32)
-  int least_frames_between = 2;                 // [frames] from a keyframe to the next, whoever asks for it, >= 1
+  Similarity similarity = Similarity::pks;  // in the visibility vote                              (DKB eq. 34)
+  NormalSum normals = NormalSum::oriented;  // of the map points' surfaces                         (DKB eq. 28)
+  int visibility_levels = 9;                // of 10 degrees each, 2 ... 18                        (DKB eq. 32)
+  int least_frames_between = 2;             // [frames] from a keyframe to the next, whoever asks for it, >= 1
   // The safety floor: keyframes are made, whatever the votes, while tracking is in danger.
-  int floor_least_tracked = 50;         // [points] fewer tracked points, >= 0
-  int floor_few_close = 100;            // [points] fewer tracked close points ..., >= 0
-  int floor_many_creatable = 70;        // [points] ... while at least so many could be made, >= 0
-  double floor_reference_ratio = 0.25;  // share of the reference keyframe's points, 0 ... 1
+  int floor_least_tracked = 50;        // [points] fewer tracked points, >= 0
+  int floor_few_close = 100;           // [points] fewer tracked close points ..., >= 0
+  int floor_many_creatable = 70;       // [points] ... while at least so many could be made, >= 0
+  double floor_reference_ratio = 0.7;  // or a smaller share of the reference keyframe's points, 0 ... 1
+  double floor_kept_ratio = 0.5;       // or of the points tracked in the first frame after the last keyframe, 0 ... 1
 
   void check() const;  // throws InvalidOption
 };
+
+// DKB section 3.2 as printed: T of 10 to 30, S of eq. 34, four levels, plain sums of cross products; the floor is the
+// least that keeps tracking alive.
+AdaptiveKeyframeOptions paper_keyframe_options();
 
 // Keyframes by parallax, visibility, match quality and spread of the matches (DKB section 3.2, eqs. 14-41), with a
 // floor that keeps tracking alive. A frame becomes a keyframe when the gate is open and both votes are for it.

@@ -82,6 +82,7 @@ AdaptiveKeyframeOptions all_levels() {
   options.similarity = Similarity::pks;
   options.visibility_levels = 9;
   options.floor_reference_ratio = 0.25;
+  options.floor_kept_ratio = 0;
   options.parallax.threshold_min = 10;
   options.parallax.threshold_max = 30;
   return options;
@@ -196,6 +197,30 @@ TEST(AdaptiveKeyframes, TheFloorKeepsTrackingAlive) {
   EXPECT_EQ(policy.decide(q, wall.map()).rule, KeyframeRule::floor);
 }
 
+TEST(AdaptiveKeyframes, TheFloorLooksAtWhatIsLeftOfTheReferenceFrame) {
+  Wall wall;
+  AdaptiveKeyframeOptions options = all_levels();
+  options.floor_kept_ratio = 0.5;
+  AdaptiveKeyframePolicy policy(options, 640, 480);
+  policy.decide(wall.query(1, {}, 320), wall.map());  // the reference frame
+  EXPECT_FALSE(policy.decide(wall.query(2, {}, 160), wall.map()).insert);
+  const KeyframeDecision d = policy.decide(wall.query(3, {}, 159), wall.map());
+  EXPECT_TRUE(d.tests.view_left);
+  EXPECT_EQ(d.rule, KeyframeRule::floor);
+}
+
+TEST(AdaptiveKeyframes, ThePapersNumbersStayAsPrinted) {
+  const AdaptiveKeyframeOptions paper = paper_keyframe_options();
+  EXPECT_NO_THROW(paper.check());
+  EXPECT_EQ(paper.parallax.window, 10);
+  EXPECT_EQ(paper.parallax.threshold_min, 10);
+  EXPECT_EQ(paper.parallax.threshold_max, 30);
+  EXPECT_EQ(paper.parallax.rotation_max, 45);
+  EXPECT_EQ(paper.parallax.translation_max, 10);
+  EXPECT_EQ(paper.similarity, Similarity::printed);
+  EXPECT_EQ(paper.visibility_levels, 4);
+}
+
 TEST(AdaptiveKeyframes, DoNotDependOnWhereTheWorldLies) {
   const auto decisions = [](const Rigid3& moved_world) {
     Wall wall;
@@ -222,7 +247,7 @@ TEST(AdaptiveKeyframes, ExplainThemselvesWhenAsked) {
   Wall wall;
   AdaptiveKeyframePolicy policy(all_levels(), 640, 480);
   KeyframeQuery q = wall.query(1, {});
-  EXPECT_NE(policy.decide(q, wall.map()).explanation.find("parallax 0.00 deg + 0.00 against T 30.00"),
+  EXPECT_NE(policy.decide(q, wall.map()).explanation.find("parallax 0.00 deg + 0.00 against T 30.00 (F 0.000): no"),
             std::string::npos);
   q.explain = false;
   EXPECT_TRUE(policy.decide(q, wall.map()).explanation.empty());
@@ -245,6 +270,7 @@ TEST(AdaptiveKeyframes, AnOptionOutOfRangeIsNamed) {
   EXPECT_NE(message([](auto& o) { o.floor_least_tracked = -1; }).find("floor_least_tracked"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_few_close = -1; }).find("floor_few_close"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_many_creatable = -1; }).find("floor_many_creatable"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.floor_kept_ratio = -0.1; }).find("floor_kept_ratio"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_reference_ratio = 2; }).find("floor_reference_ratio"), std::string::npos);
 }
 

@@ -60,6 +60,13 @@ TEST(ParallaxThreshold, FallsFromTheLargestToTheSmallest) {  // DKB eq. 25
   EXPECT_EQ(parallax_threshold(1, 10, 30), 10);
 }
 
+ParallaxGateOptions paper() {
+  ParallaxGateOptions options;
+  options.threshold_min = 10;
+  options.threshold_max = 30;
+  return options;
+}
+
 TEST(ParallaxGate, AveragesOverTheFramesThatAreThere) {  // DKB eqs. 17, 18
   ParallaxGateOptions options;
   options.window = 3;
@@ -85,7 +92,7 @@ TEST(ParallaxGate, OpensAtTheThreshold) {
 }
 
 TEST(ParallaxGate, IsWiderInFastMotion) {
-  ParallaxGate slow({}), fast({});
+  ParallaxGate slow(paper()), fast(paper());
   for (int i = 0; i < 10; ++i) {
     slow.passes({0.1, 0.1});
     fast.passes({30, 30});
@@ -96,7 +103,7 @@ TEST(ParallaxGate, IsWiderInFastMotion) {
 }
 
 TEST(ParallaxGate, AStillCameraKeepsItShut) {
-  ParallaxGate gate({});
+  ParallaxGate gate(paper());
   EXPECT_FALSE(gate.passes({0, 0}));
   EXPECT_EQ(gate.factor(), 0);
   EXPECT_EQ(gate.threshold(), 30);
@@ -107,7 +114,7 @@ TEST(ParallaxGate, AnOptionOutOfRangeIsNamed) {
   options.window = 0;
   EXPECT_THROW(ParallaxGate{options}, InvalidOption);
   options = {};
-  options.threshold_max = 9;  // below threshold_min
+  options.threshold_max = options.threshold_min - 1;
   EXPECT_THROW(ParallaxGate{options}, InvalidOption);
   options = {};
   options.translation_max = 0;
