@@ -39,6 +39,14 @@ FrameRecord write_frame(const Simulator& simulator, int index, const std::filesy
   return {f.stamp, f.depth_stamp, f.image.timestamp, f.world_from_cam, f.movers};
 }
 
+// The camera file without the key `readout`, which is not known (see SimulatorOptions).
+std::string camera_file(const CameraModel& camera) {
+  std::string text = camera_to_yaml(camera);
+  const size_t start = text.find("readout:");
+  if (start != std::string::npos) text.erase(start, text.find('\n', start) + 1 - start);
+  return text;
+}
+
 void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& records,
                  const std::filesystem::path& folder) {
   std::string rgb = "# timestamp filename\n", depth = rgb;
@@ -58,7 +66,7 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
                             p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), m.box_x, m.box_y, m.box_width, m.box_height);
     }
   }
-  write_file_atomically(folder / "camera.yaml", camera_to_yaml(simulator.camera()));
+  write_file_atomically(folder / "camera.yaml", camera_file(simulator.camera()));
   write_trajectory(folder / "groundtruth.txt", truth);
   write_file_atomically(folder / "boxes.txt", boxes);
   write_file_atomically(folder / "movers.csv", movers);

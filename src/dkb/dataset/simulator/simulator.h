@@ -22,8 +22,9 @@ struct SimulatorOptions {
   int width = 640, height = 480;  // [px] 64 ... 4096; the field of view stays that of a Kinect (fx = 525 at 640)
   double exposure = 0;            // [s] 0.001 ... 0.03; 0: the scene's own, 0.010 ... 0.020
   // [s] from the first to the last row of the colour image (rolling shutter; stamps are those of the middle row), 0 ...
-  // 0.033. 0.015 makes fr1_xyz's path, drawn anew, as hard as the real clip.
-  double readout = 0.015;
+  // 0.033. No camera file tells it, as none does for recorded sequences: the default makes fr1_xyz's path, drawn anew,
+  // about as hard as the real clip, whose rolling shutter is longer but mostly modelled.
+  double readout = 0.018;
   double grey_noise = 2.4;  // [grey levels] standard deviation of the sensor noise of the grey image, 0 ... 20
   bool depth_noise = true;  // noise, disparity steps and holes of a structured-light sensor
 
