@@ -20,6 +20,18 @@ void add_points_of(const Keyframe& keyframe, const Map& map, std::vector<PointId
     if (map.point(id) != nullptr) points.push_back(id);
 }
 
+// Median depth [m] of the features that show a map point; 0 when none has a depth.
+double median_depth(const KeyframeQuery& q) {
+  std::vector<float> depths;
+  for (size_t f = 0; f < q.points->size(); ++f)
+    if ((*q.points)[f] != kNoPoint && q.features->keypoints[f].depth > 0)
+      depths.push_back(q.features->keypoints[f].depth);
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
 void sort_unique(std::vector<PointId>& points) {
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
@@ -43,6 +55,7 @@ AdaptiveKeyframeOptions paper_keyframe_options() {
   AdaptiveKeyframeOptions options;
   options.parallax.threshold_min = 10;
   options.parallax.threshold_max = 30;
+  options.parallax.translation_unit = TranslationUnit::centimetre;
   options.similarity = Similarity::printed;
   options.normals = NormalSum::plain;
   options.visibility_levels = 4;
@@ -130,8 +143,8 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   KeyframeDecision decision;
   KeyframeTests& tests = decision.tests;
   const bool waited = q.frame - q.last_keyframe_frame >= options_.least_frames_between;
-  const Parallax parallax =
-      parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world, options_.parallax.translation_unit);
+  const Parallax parallax = parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world,
+                                             units_per_metre(options_.parallax.translation_unit, median_depth(q)));
   tests.parallax = gate_.passes(parallax);
 
   MatchCounts counts;

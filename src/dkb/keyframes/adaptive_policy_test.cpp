@@ -85,6 +85,7 @@ AdaptiveKeyframeOptions all_levels() {
   options.floor_kept_ratio = 0;
   options.parallax.threshold_min = 10;
   options.parallax.threshold_max = 30;
+  options.parallax.translation_unit = TranslationUnit::centimetre;
   return options;
 }
 
@@ -217,8 +218,24 @@ TEST(AdaptiveKeyframes, ThePapersNumbersStayAsPrinted) {
   EXPECT_EQ(paper.parallax.threshold_max, 30);
   EXPECT_EQ(paper.parallax.rotation_max, 45);
   EXPECT_EQ(paper.parallax.translation_max, 10);
+  EXPECT_EQ(paper.parallax.translation_unit, TranslationUnit::centimetre);
   EXPECT_EQ(paper.similarity, Similarity::printed);
   EXPECT_EQ(paper.visibility_levels, 4);
+}
+
+TEST(AdaptiveKeyframes, MayMeasureTheWayByTheDepth) {
+  Wall wall;  // without depths a percent of the depth is a centimetre; with depths of 4 m the same way counts a quarter
+  AdaptiveKeyframeOptions options = all_levels();
+  options.parallax.translation_unit = TranslationUnit::depth_percent;
+  const KeyframeQuery unknown = wall.query(1, moved_by(0.4));
+  EXPECT_NE(AdaptiveKeyframePolicy(options, 640, 480).decide(unknown, wall.map()).explanation.find("deg + 40.00"),
+            std::string::npos);
+  KeyframeQuery far = wall.query(1, moved_by(0.4));
+  RgbdFeatures deep = *far.features;
+  for (Keypoint& k : deep.keypoints) k.depth = 4;
+  far.features = &deep;
+  EXPECT_NE(AdaptiveKeyframePolicy(options, 640, 480).decide(far, wall.map()).explanation.find("deg + 10.00"),
+            std::string::npos);
 }
 
 TEST(AdaptiveKeyframes, DoNotDependOnWhereTheWorldLies) {

@@ -16,11 +16,23 @@ void ParallaxGateOptions::check() const {
   require_option(translation_max > 0, "parallax.translation_max", translation_max, "greater than 0");
 }
 
-Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, TranslationUnit unit) {
+double units_per_metre(TranslationUnit unit, double median_depth) {
+  switch (unit) {
+    case TranslationUnit::metre:
+      return 1;
+    case TranslationUnit::centimetre:
+      return 100;
+    case TranslationUnit::depth_percent:
+      break;
+  }
+  return median_depth > 0 ? 100 / median_depth : 100;
+}
+
+Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, double units_in_metre) {
   const Eigen::Matrix3d turn = last_cam_from_world.matrix3().transpose() * cam_from_world.matrix3();
   const double cosine = std::clamp((turn.trace() - 1) / 2, -1.0, 1.0);
   const double metres = (centre_in_world(cam_from_world) - centre_in_world(last_cam_from_world)).norm();
-  return {std::acos(cosine) * 180 / M_PI, unit == TranslationUnit::centimetre ? 100 * metres : metres};
+  return {std::acos(cosine) * 180 / M_PI, units_in_metre * metres};
 }
 
 ParallaxWeights parallax_weights(const Parallax& mean) {

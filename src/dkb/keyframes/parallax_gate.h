@@ -7,7 +7,12 @@
 
 namespace dkb {
 
-enum class TranslationUnit { metre, centimetre };
+// What a translation of 1 is in the gate. The paper gives no unit; in metres only turns would count.
+enum class TranslationUnit {
+  metre,
+  centimetre,
+  depth_percent,  // 1/100 of the median depth of the tracked points: the same change of view counts alike near and far
+};
 
 // The gate before the votes: a frame that moved little since the last keyframe is none (DKB section 3.2, eqs. 14-25).
 struct ParallaxGateOptions {
@@ -16,8 +21,8 @@ struct ParallaxGateOptions {
   double threshold_max = 20.0;    // [deg + unit] the same at rest, >= threshold_min; paper 30
   double rotation_max = 45.0;     // [deg] Theta_max, > 0                                            (DKB eq. 24)
   double translation_max = 10.0;  // [unit] t_max, > 0
-  TranslationUnit translation_unit = TranslationUnit::centimetre;  // the paper gives none: in metres only turns count
-  void check() const;                                              // throws InvalidOption
+  TranslationUnit translation_unit = TranslationUnit::centimetre;
+  void check() const;  // throws InvalidOption
 };
 
 // Motion of a frame since a keyframe.
@@ -27,8 +32,11 @@ struct Parallax {
   double sum() const { return rotation_deg + translation; }
 };
 
-// DKB eqs. 14-16. Both poses in the same world; the result is in degrees and `unit`.
-Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, TranslationUnit unit);
+// Units in a metre, for points at a median depth [m]; where that is unknown (not > 0) depth_percent is centimetres.
+double units_per_metre(TranslationUnit unit, double median_depth);
+
+// DKB eqs. 14-16. Both poses in the same world; the translation is in the unit that a metre has so many of.
+Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, double units_in_metre);
 
 struct ParallaxWeights {
   double rotation = 0, translation = 0;  // each 0 ... 1, together at most 1

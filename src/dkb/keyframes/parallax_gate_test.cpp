@@ -16,20 +16,26 @@ Rigid3 camera_at(const Eigen::Vector3d& centre, double turn_deg) {
 
 TEST(ParallaxBetween, IsTheTurnInDegreesAndTheWayInTheUnit) {  // DKB eqs. 14-16
   const Rigid3 last = camera_at({1, 2, 3}, 10), now = camera_at({1.03, 2, 3.04}, 40);
-  const Parallax centimetres = parallax_between(last, now, TranslationUnit::centimetre);
+  const Parallax centimetres = parallax_between(last, now, 100);
   EXPECT_NEAR(centimetres.rotation_deg, 30, 1e-9);
   EXPECT_NEAR(centimetres.translation, 5, 1e-9);  // sqrt(3^2 + 4^2)
-  EXPECT_NEAR(parallax_between(last, now, TranslationUnit::metre).translation, 0.05, 1e-12);
+  EXPECT_NEAR(parallax_between(last, now, 1).translation, 0.05, 1e-12);
   EXPECT_NEAR(centimetres.sum(), 35, 1e-9);
 }
 
 TEST(ParallaxBetween, StaysDefinedAtBothEndsOfTheArcCosine) {
   const Rigid3 at(rotation_from_vector({0.3, -0.2, 0.9}), {1, 2, 3});
-  const Parallax none = parallax_between(at, at, TranslationUnit::centimetre);
+  const Parallax none = parallax_between(at, at, 100);
   EXPECT_NEAR(none.rotation_deg, 0, 1e-5);
   EXPECT_EQ(none.translation, 0);
-  EXPECT_NEAR(parallax_between(camera_at({0, 0, 0}, 0), camera_at({0, 0, 0}, 180), TranslationUnit::metre).rotation_deg,
-              180, 1e-5);
+  EXPECT_NEAR(parallax_between(camera_at({0, 0, 0}, 0), camera_at({0, 0, 0}, 180), 1).rotation_deg, 180, 1e-5);
+}
+
+TEST(TranslationUnits, AreMetresCentimetresOrPercentOfTheDepth) {
+  EXPECT_EQ(units_per_metre(TranslationUnit::metre, 4), 1);
+  EXPECT_EQ(units_per_metre(TranslationUnit::centimetre, 4), 100);
+  EXPECT_EQ(units_per_metre(TranslationUnit::depth_percent, 4), 25);   // 1 m is 25% of 4 m
+  EXPECT_EQ(units_per_metre(TranslationUnit::depth_percent, 0), 100);  // unknown
 }
 
 TEST(ParallaxWeights, ShareOutTheMotion) {  // DKB eqs. 19, 20
