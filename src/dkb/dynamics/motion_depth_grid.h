@@ -15,7 +15,7 @@ class MotionRays {
  public:
   MotionRays(const CameraModel& camera, int cell);
 
-  int cell() const { return cell_; }  // [px]
+  int cell() const { return cell_; }      // [px]
   int width() const { return width_; }    // [cells]
   int height() const { return height_; }  // [cells]
   // Ray through the middle of a cell, at depth 1, in camera axes: (x, y, 1).
@@ -45,11 +45,11 @@ class MotionRays {
 
 // A depth image on that grid, and where its camera stood.
 struct MotionDepthGrid {
-  double time = 0;        // [s] of the depth image
-  Rigid3 cam_from_world;  // at that time
-  Image<float> depth;     // [m] of the cell's middle, 0 = none
+  double time = 0;                 // [s] of the depth image
+  Rigid3 cam_from_world;           // at that time
+  Image<float> depth;              // [m] of the cell's middle, 0 = none
   Image<float> nearest, farthest;  // [m] over the cell and its eight neighbours; infinity and 0 where there is no depth
-  Image<float> score;     // evidence for motion of what is seen in each cell
+  Image<float> score;              // evidence for motion of what is seen in each cell
 
   // Sets the three depth maps. Buffers are kept.
   void set_depth(const DepthImage& image, const MotionRays& rays);

@@ -3,255 +3,320 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
-struct Transform {
-  float r[9], t[3];
-  explicit Transform(const Rigid3& m) {
-    const Eigen::Matrix3d a = m.matrix3();
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) r[3 * i + k] = static_cast<float>(a(i, k));
-      t[i] = static_cast<float>(m.translation[i]);
-    }
-  }
-  void apply(float x, float y, float z, float& ox, float& oy, float& oz) const {
-    ox = z * (r[0] * x + r[1] * y + r[2]) + t[0];
-    oy = z * (r[3] * x + r[4] * y + r[5]) + t[1];
-    oz = z * (r[6] * x + r[7] * y + r[8]) + t[2];
+constexpr float kTooNear = 0.45f;                  // [m] taken for the depth of what is too near for the sensor
+constexpr float kNearestDepth = 0.1f;              // [m] in front of the camera
+constexpr float kMotionPerFrame = 0.03f;           // [m] that a surface comes nearer or goes away from frame to frame
+constexpr float kHighest = 3.0f, kLowest = -1.5f;  // bounds of scores: a still cell is convinced sooner than a mover
+constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
+constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
+constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
+constexpr int kLongRun = 300;      // [frames] over which missing depth is averaged
+
+// A rigid motion in floats, applied to points given by ray and depth.
+struct RayMotion {
+  Eigen::Matrix3f rotation;
+  Eigen::Vector3f translation;
+
+  explicit RayMotion(const Rigid3& motion)
+      : rotation(motion.matrix3().cast<float>()), translation(motion.translation.cast<float>()) {}
+  Eigen::Vector3f operator()(const Eigen::Vector2f& ray, float z) const {
+    return {z * (rotation(0, 0) * ray.x() + rotation(0, 1) * ray.y() + rotation(0, 2)) + translation.x(),
+            z * (rotation(1, 0) * ray.x() + rotation(1, 1) * ray.y() + rotation(1, 2)) + translation.y(),
+            z * (rotation(2, 0) * ray.x() + rotation(2, 1) * ray.y() + rotation(2, 2)) + translation.z()};
   }
 };
 
-}  // namespace
-
-void MotionOptions::check() const {}
-
-MotionSegmenter::MotionSegmenter(const CameraModel& camera, const MotionOptions& options)
-    : camera_(camera), options_(options), rays_(camera, options.cell) {
-  options_.check();
+void clear(Image<float>& image) {
+  std::fill(image.data(), image.data() + image.size(), 0.0f);
 }
 
-Rigid3 MotionSegmenter::at_depth_time(const Rigid3& cam_from_world, double time, double depth_time) const {
-  if (!last_ || time - last_->time <= 0 || time - last_->time > 0.2) return cam_from_world;
-  const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
-  const double share = (depth_time - time) / (time - last_->time);
-  if (std::abs(share) > 2) return cam_from_world;
-  Vector6d d;
-  d << share * step.translation, share * vector_from_rotation(step.rotation);
-  return rigid3_from_tangent(d) * cam_from_world;
+}  // namespace
+
+void MotionOptions::check() const {
+  require_option(cell >= 2 && cell <= 32, "motion.cell", cell, "in 2 ... 32 px");
+  require_option(views >= 2, "motion.views", views, "at least 2");
+  require_option(views_per_frame >= 1, "motion.views_per_frame", views_per_frame, "at least 1");
+  require_option(view_interval > 0, "motion.view_interval", view_interval, "greater than 0 s");
+  require_option(view_age > 0, "motion.view_age", view_age, "greater than 0 s");
+  require_option(tolerance >= 0, "motion.tolerance", tolerance, "at least 0 m");
+  require_option(tolerance_sigmas >= 0, "motion.tolerance_sigmas", tolerance_sigmas, "at least 0");
+  require_option(slope >= 0, "motion.slope", slope, "at least 0");
+  require_option(settle > 0, "motion.settle", settle, "greater than 0 s");
+  require_option(memory > 0, "motion.memory", memory, "greater than 0 s");
+  require_option(hole_memory > 0, "motion.hole_memory", hole_memory, "greater than 0 s");
+  require_option(contour >= 0, "motion.contour", contour, "at least 0");
+  require_option(interior >= 0, "motion.interior", interior, "at least 0");
+  require_option(state >= 0, "motion.state", state, "at least 0");
+  require_option(prior >= 0, "motion.prior", prior, "at least 0");
+  require_option(hole_prior >= 0, "motion.hole_prior", hole_prior, "at least 0");
+  require_option(full_evidence > 0, "motion.full_evidence", full_evidence, "greater than 0");
+  require_option(threshold > 0 && threshold <= 2, "motion.threshold", threshold, "in (0, 2]");
+  require_option(rim >= 0, "motion.rim", rim, "at least 0 cells");
+  smoothing.check();
+}
+
+MotionSegmenter::MotionSegmenter(const CameraModel& camera, const MotionOptions& options)
+    : camera_(camera),
+      options_((options.check(), options)),
+      rays_(camera, options.cell),
+      smoothing_(camera, options.cell, options.smoothing) {
+  const int width = rays_.width(), height = rays_.height();
+  for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
+    *i = Image<float>(width, height);
+  known_ = open_ = Image<uint8_t>(width, height);
 }
 
 void MotionSegmenter::reset() {
-  while (!views_.empty()) { spare_.push_back(std::move(views_.front())); views_.pop_front(); }
+  for (auto& view : views_) spare_.push_back(std::move(view));
+  views_.clear();
   if (previous_) spare_.push_back(std::move(previous_));
   if (current_) spare_.push_back(std::move(current_));
   last_.reset();
 }
 
-MoverMask MotionSegmenter::segment(const std::shared_ptr<const RgbdImage>& image, const Rigid3& predicted) {
-  if (!current_) {
-    if (spare_.empty()) spare_.push_back(std::make_unique<MotionDepthGrid>());
-    current_ = std::move(spare_.back());
-    spare_.pop_back();
-  }
-  image_time_ = image->timestamp;
-  depth_time_ = image->depth_timestamp;
-  current_->set_depth(image->depth, rays_);
-  current_->time = depth_time_;
-  current_->cam_from_world = at_depth_time(predicted, image_time_, depth_time_);
-  const int w = rays_.width(), h = rays_.height();
-  if (tolerance_.empty()) tolerance_ = Image<float>(w, h);
-  for (size_t i = 0; i < tolerance_.size(); ++i) {
-    const float z = current_->depth.data()[i], a = z - 0.4f;
-    tolerance_.data()[i] = static_cast<float>(options_.tolerance_base) + static_cast<float>(options_.tolerance_sigmas) * (0.0012f + 0.0019f * a * a);
-  }
-  carry();
-  votes_ = Image<float>(w, h, 0.0f);
-  still_ = Image<float>(w, h, 0.0f);
-  match_ = Image<float>(w, h, 0.0f);
-  const size_t n = views_.size(), k = std::min(n, static_cast<size_t>(options_.views_per_frame));
-  for (size_t i = 0; i < k; ++i) compare(*views_[(turn_ + i * n / k) % n]);
+void MotionSegmenter::move_world(const Rigid3& new_from_old) {
+  const Rigid3 old_from_new = new_from_old.inverse();
+  for (auto& view : views_) view->cam_from_world = view->cam_from_world * old_from_new;
+  for (MotionDepthGrid* grid : {previous_.get(), current_.get()})
+    if (grid != nullptr) grid->cam_from_world = grid->cam_from_world * old_from_new;
+  if (last_) last_->cam_from_world = last_->cam_from_world * old_from_new;
+}
+
+std::unique_ptr<MotionDepthGrid> MotionSegmenter::take_spare() {
+  if (spare_.empty()) return std::make_unique<MotionDepthGrid>();
+  auto grid = std::move(spare_.back());
+  spare_.pop_back();
+  return grid;
+}
+
+// Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time.
+Rigid3 MotionSegmenter::at_depth_time(const Rigid3& cam_from_world) const {
+  constexpr double kLongestGap = 0.2;  // [s] over which motion is taken to be even
+  if (!last_) return cam_from_world;
+  const double interval = image_time_ - last_->time, offset = current_->time - image_time_;
+  if (!(interval > 0) || interval > kLongestGap || std::abs(offset) > interval) return cam_from_world;
+  const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
+  Vector6d part;
+  part << step.translation, vector_from_rotation(step.rotation);
+  return rigid3_from_tangent(offset / interval * part) * cam_from_world;
+}
+
+float MotionSegmenter::tolerance_at(float depth) const {
+  const SensorNoise noise;
+  const auto base = static_cast<float>(options_.tolerance + options_.tolerance_sigmas * noise.depth_sigma_base);
+  const float x = depth - 0.4f;
+  return base + static_cast<float>(options_.tolerance_sigmas * noise.depth_sigma_quadratic) * x * x;
+}
+
+MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
+  if (image.depth.width() != camera_.width || image.depth.height() != camera_.height)
+    throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
+                     std::to_string(image.depth.height()) + ", the camera " + std::to_string(camera_.width) + " x " +
+                     std::to_string(camera_.height) + "; give images of the camera's size");
+  if (!current_) current_ = take_spare();
+  image_time_ = image.timestamp;
+  current_->set_depth(image.depth, rays_);
+  current_->time = image.depth_timestamp;
+  current_->cam_from_world = at_depth_time(cam_from_world_expected);
+  for (size_t i = 0; i < tolerance_.size(); ++i) tolerance_.data()[i] = tolerance_at(current_->depth.data()[i]);
+  carry_scores();
+  for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
+  const size_t count = views_.size(), chosen = std::min(count, static_cast<size_t>(options_.views_per_frame));
+  for (size_t i = 0; i < chosen; ++i) compare(*views_[(turn_ + i * count / chosen) % count]);
   ++turn_;
-  decide();
+  find_openings();
+  smoothing_.set_surface(current_->depth, open_);
+  weigh();
+  smoothing_.smooth(weighted_, weights_);
+  update_scores();
   return mask();
 }
 
-void MotionSegmenter::carry() {
-  std::fill(current_->score.data(), current_->score.data() + current_->score.size(), 0.0f);
-  known_ = Image<float>(rays_.width(), rays_.height(), 0.0f);
+// Each cell takes over the score of the same surface in the frame before.
+void MotionSegmenter::carry_scores() {
+  clear(current_->score);
+  std::fill(known_.data(), known_.data() + known_.size(), uint8_t{0});
   if (!previous_) return;
-  const Transform move(previous_->cam_from_world * current_->cam_from_world.inverse());
-  const float keep = static_cast<float>(std::exp(-std::max(0.0, current_->time - previous_->time) / options_.memory));
-  const float keep_hole = static_cast<float>(std::exp(-std::max(0.0, current_->time - previous_->time) / options_.hole_memory));
-  const int w = rays_.width(), h = rays_.height();
-  for (int y = 0, i = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x, ++i) {
-      const float z = current_->depth.data()[i] > 0 ? current_->depth.data()[i] : 0.45f;
-      float px, py, pz;
-      const auto& ray = rays_.ray(static_cast<size_t>(i));
-      move.apply(ray.x(), ray.y(), z, px, py, pz);
-      if (pz < 0.1f) continue;
-      const int c = rays_.cell_of(px, py, pz);
-      if (c < 0) continue;
-      if (!(current_->depth.data()[i] > 0)) {
-        if (previous_->depth.data()[c] < static_cast<float>(options_.near_range)) { current_->score.data()[i] = keep_hole * std::max(0.0f, previous_->score.data()[c]); known_.data()[i] = 1; }
-        continue;
-      }
-      const float tol = tolerance_.data()[i];
-      const float d = previous_->depth.data()[c];
-      if (d > 0 && std::abs(d - pz) < tol + 0.03f) { known_.data()[i] = 1; current_->score.data()[i] = keep * previous_->score.data()[c]; continue; }
-      // moved: nearest cell of the same depth around
-      const int cx = c % w, cy = c / w;
-      float best = tol + 0.03f, score = 0;
-      for (int dy = -2; dy <= 2; ++dy)
-        for (int dx = -2; dx <= 2; ++dx) {
-          if (!previous_->depth.contains(cx + dx, cy + dy)) continue;
-          const float e = previous_->depth(cx + dx, cy + dy);
-          if (e > 0 && std::abs(e - pz) < best) { best = std::abs(e - pz); score = previous_->score(cx + dx, cy + dy); known_.data()[i] = 1; }
-        }
-      current_->score.data()[i] = keep * score;
-    }
-}
-
-void MotionSegmenter::compare(const MotionDepthGrid& view) {
-  const Transform move(view.cam_from_world * current_->cam_from_world.inverse());
-  const int n = rays_.width() * rays_.height();
-  const float trust = static_cast<float>(std::min(1.0, (current_->time - view.time) / options_.age));
-  for (int i = 0; i < n; ++i) {
-    const bool hole = !(current_->depth.data()[i] > 0);
-    const float z = hole ? 0.45f : current_->depth.data()[i];
-    float px, py, pz;
-    const auto& ray = rays_.ray(static_cast<size_t>(i));
-    move.apply(ray.x(), ray.y(), z, px, py, pz);
-    if (pz < 0.1f) continue;
-    const int c = rays_.cell_of(px, py, pz);
-    if (c < 0) continue;
+  const RayMotion motion(previous_->cam_from_world * current_->cam_from_world.inverse());
+  const double interval = std::max(0.0, current_->time - previous_->time);
+  const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
+  const auto keep_hole = static_cast<float>(std::exp(-interval / options_.hole_memory));
+  const auto near = static_cast<float>(options_.smoothing.near_range);
+  const Image<float>& before = previous_->depth;
+  for (size_t i = 0; i < current_->score.size(); ++i) {
+    const float z = current_->depth.data()[i];
+    const bool hole = !(z > 0);
+    const Eigen::Vector3f point = motion(rays_.ray(i), hole ? kTooNear : z);
+    if (point.z() < kNearestDepth) continue;
+    const int at = rays_.cell_of(point.x(), point.y(), point.z());
+    if (at < 0) continue;
     if (hole) {
-      votes_.data()[i] += view.depth.data()[c] > 0 && view.depth(c % rays_.width(), c / rays_.width()) > pz ? 1.0f : 0.0f;
+      if (before.data()[at] >= near) continue;
+      current_->score.data()[i] = keep_hole * std::max(0.0f, previous_->score.data()[at]);
+      known_.data()[i] = 1;
       continue;
     }
-    const float near = view.nearest.data()[c], far = view.farthest.data()[c];
-    if (!(far > 0)) continue;
-    const float tol = tolerance_.data()[i];
-    if (pz + tol < near) {
-      if (!(view.depth.data()[c] > 0)) continue;
-      const float b = near - 0.4f;
-      const float tn = static_cast<float>(options_.tolerance_base) + static_cast<float>(options_.tolerance_sigmas) * (0.0012f + 0.0019f * b * b);
-      if (pz + std::max(tol, tn) + static_cast<float>(options_.slope) * (far - near) < near) votes_.data()[i] += 1;
-    } else if (pz < far + tol && view.score.data()[c] < 0.3f) {
-      const bool contour = current_->farthest.data()[i] > z + 2 * tol + 0.03f * z;
-      const bool contour_then = far > pz + 2 * tol + 0.03f * pz;
-      match_.data()[i] += trust;
-      still_.data()[i] += trust * (contour ? (contour_then ? static_cast<float>(options_.contour) : 0.0f) : static_cast<float>(options_.interior));
+    float bound = tolerance_.data()[i] + kMotionPerFrame;
+    if (before.data()[at] > 0 && std::abs(before.data()[at] - point.z()) < bound) {
+      current_->score.data()[i] = keep * previous_->score.data()[at];
+      known_.data()[i] = 1;
+      continue;
+    }
+    // It has moved: the cell around that fits best in depth.
+    const int x = at % before.width(), y = at / before.width();
+    for (int v = std::max(0, y - kCarryRadius); v <= std::min(before.height() - 1, y + kCarryRadius); ++v)
+      for (int u = std::max(0, x - kCarryRadius); u <= std::min(before.width() - 1, x + kCarryRadius); ++u) {
+        const float difference = std::abs(before(u, v) - point.z());
+        if (!(before(u, v) > 0) || difference >= bound) continue;
+        bound = difference;
+        current_->score.data()[i] = keep * previous_->score(u, v);
+        known_.data()[i] = 1;
+      }
+  }
+}
+
+// What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
+void MotionSegmenter::compare(const MotionDepthGrid& view) {
+  const RayMotion motion(view.cam_from_world * current_->cam_from_world.inverse());
+  const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / options_.settle, 0.0, 1.0));
+  const float contour_weight = trust * static_cast<float>(options_.contour);
+  const float interior_weight = trust * static_cast<float>(options_.interior);
+  const auto slope = static_cast<float>(options_.slope);
+  // From this much farther on, the surface behind does not hang together with the one in front.
+  const auto beyond = [](float z, float tolerance) { return z + 2.0f * tolerance + 0.03f * z; };
+  for (size_t i = 0; i < current_->depth.size(); ++i) {
+    const float z = current_->depth.data()[i];
+    const bool hole = !(z > 0);
+    const Eigen::Vector3f point = motion(rays_.ray(i), hole ? kTooNear : z);
+    if (point.z() < kNearestDepth) continue;
+    const int at = rays_.cell_of(point.x(), point.y(), point.z());
+    if (at < 0) continue;
+    if (hole) {
+      intrusions_.data()[i] += view.depth.data()[at] > point.z() ? 1.0f : 0.0f;
+      continue;
+    }
+    const float nearest = view.nearest.data()[at], farthest = view.farthest.data()[at],
+                tolerance = tolerance_.data()[i];
+    if (!(farthest > 0)) continue;
+    if (point.z() + tolerance < nearest) {
+      const float margin = std::max(tolerance, tolerance_at(nearest)) + slope * (farthest - nearest);
+      if (view.depth.data()[at] > 0 && point.z() + margin < nearest) intrusions_.data()[i] += 1.0f;
+    } else if (point.z() < farthest + tolerance && view.score.data()[at] < kUnmarked) {
+      agreements_.data()[i] += trust;
+      const bool outline = current_->farthest.data()[i] > beyond(z, tolerance);
+      if (!outline)
+        still_.data()[i] += interior_weight;
+      else if (farthest > beyond(point.z(), tolerance))
+        still_.data()[i] += contour_weight;
     }
   }
 }
 
-void MotionSegmenter::decide() {
-  const int w = rays_.width(), h = rays_.height();
-  const size_t n = static_cast<size_t>(w) * static_cast<size_t>(h);
-  Image<float>& s = current_->score;
-  const Image<float>& depth = current_->depth;
-  if (link_x_.empty()) link_x_ = link_y_ = num_ = den_ = inverse_ = crease_ = Image<float>(w, h);
-  for (size_t i = 0; i < n; ++i) inverse_.data()[i] = depth.data()[i] > 0 ? 1.0f / depth.data()[i] : 0.0f;
-  const int k = 3;
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x) {
-      const float q = inverse_(x, y);
-      const float l = inverse_(std::max(0, x - k), y), r = inverse_(std::min(w - 1, x + k), y);
-      const float u = inverse_(x, std::max(0, y - k)), d = inverse_(x, std::min(h - 1, y + k));
-      const float cx = l > 0 && r > 0 && x >= k && x + k < w ? l + r - 2 * q : 0, cy = u > 0 && d > 0 && y >= k && y + k < h ? u + d - 2 * q : 0;
-      crease_(x, y) = std::max(cx, cy);
-    }
-  const auto joined = [](float a, float b) { return std::abs(a - b) < 0.015f + 0.02f * std::min(a, b); };
-  ++frames_;
-  if (hole_share_.empty()) hole_share_ = Image<float>(w, h, 0.0f);
-  for (size_t i = 0; i < n; ++i) hole_share_.data()[i] += ((depth.data()[i] > 0 ? 0.0f : 1.0f) - hole_share_.data()[i]) / static_cast<float>(std::min(frames_, 300));
-  const auto opened = [&](int x, int y) { return votes_(x, y) > 0 && hole_share_(x, y) < 0.9f; };
-  const float fade = static_cast<float>(1.414 * options_.cell / (camera_.fx * options_.reach));  // per cell and metre of depth
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x) {
-      const float z = depth(x, y);
-      const auto link = [&](int x2, int y2) {
-        const float z2 = depth(x2, y2);
-        if (!(z > 0) || !(z2 > 0)) return std::max(z, z2) < static_cast<float>(options_.near_range) && (z > 0 || opened(x, y)) && (z2 > 0 || opened(x2, y2)) ? 1.0f / (1.0f + fade * 0.45f) : 0.0f;
-        if (!joined(z, z2)) return 0.0f;
-        return (std::max(crease_(x, y), crease_(x2, y2)) > static_cast<float>(options_.crease) ? 0.3f : 1.0f) / (1.0f + fade * z);
-      };
-      link_x_(x, y) = x > 0 ? link(x - 1, y) : 0;
-      link_y_(x, y) = y > 0 ? link(x, y - 1) : 0;
-    }
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x) {
-      const size_t i = static_cast<size_t>(y * w + x);
-      float plus = 0;
-      if (votes_.data()[i] > 0 && depth.data()[i] > 0 && x > 0 && y > 0 && x + 1 < w && y + 1 < h) {
-        int support = 0;
-        for (int dy = -1; dy <= 1; ++dy) for (int dx = -1; dx <= 1; ++dx) support += votes_(x + dx, y + dy) > 0 && depth(x + dx, y + dy) > 0;
-        if (support >= 5) plus = votes_.data()[i] / (votes_.data()[i] + match_.data()[i]);
-      }
-      if (plus_.empty()) plus_ = Image<float>(w, h);
-      plus_.data()[i] = plus;
-      const float minus = plus > 0 ? 0 : std::min(still_.data()[i], 1.0f);
-      const float state = std::clamp(s.data()[i], -1.0f, 1.0f), weight = static_cast<float>(options_.state) * std::abs(state);
-      const float prior = static_cast<float>(depth.data()[i] > 0 ? options_.prior : options_.hole_prior);
-      num_.data()[i] = plus - minus + weight * state - prior;
-      den_.data()[i] = plus + minus + weight + prior;
-    }
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int y = 0; y < h; ++y) {
-      float* a = num_.row(y); float* b = den_.row(y); const float* l = link_x_.row(y);
-      for (int x = 1; x < w; ++x) { a[x] += l[x] * (a[x - 1] - a[x]); b[x] += l[x] * (b[x - 1] - b[x]); }
-      for (int x = w - 2; x >= 0; --x) { a[x] += l[x + 1] * (a[x + 1] - a[x]); b[x] += l[x + 1] * (b[x + 1] - b[x]); }
-    }
-    for (int y = 1; y < h; ++y)
-      for (int x = 0; x < w; ++x) { const float l = link_y_(x, y); num_(x, y) += l * (num_(x, y - 1) - num_(x, y)); den_(x, y) += l * (den_(x, y - 1) - den_(x, y)); }
-    for (int y = h - 2; y >= 0; --y)
-      for (int x = 0; x < w; ++x) { const float l = link_y_(x, y + 1); num_(x, y) += l * (num_(x, y + 1) - num_(x, y)); den_(x, y) += l * (den_(x, y + 1) - den_(x, y)); }
+// Depth that is missing where a view had some, but not always missing (as at the image's border).
+void MotionSegmenter::find_openings() {
+  constexpr float kAlways = 0.9f;
+  frames_ = std::min(frames_ + 1, kLongRun);
+  const float gain = 1.0f / static_cast<float>(frames_);
+  for (size_t i = 0; i < missing_.size(); ++i) {
+    float& share = missing_.data()[i];
+    const bool hole = !(current_->depth.data()[i] > 0);
+    share += gain * ((hole ? 1.0f : 0.0f) - share);
+    open_.data()[i] = hole && intrusions_.data()[i] > 0 && share < kAlways ? 255 : 0;
   }
-  for (size_t i = 0; i < n; ++i) {
-    const float d = den_.data()[i];
-    if (d <= 0) continue;
-    const float m = num_.data()[i] / d, conf = std::min(1.0f, d / static_cast<float>(options_.full_evidence));
-    s.data()[i] = std::clamp((known_.data()[i] > 0 ? s.data()[i] : m) + m * conf, -static_cast<float>(options_.low), 3.0f);
+}
+
+void MotionSegmenter::weigh() {
+  const int width = rays_.width(), height = rays_.height();
+  const auto state_weight = static_cast<float>(options_.state), prior = static_cast<float>(options_.prior);
+  const auto hole_prior = static_cast<float>(options_.hole_prior);
+  const Image<float>& depth = current_->depth;
+  const auto supported = [&](int x, int y) {
+    if (x == 0 || y == 0 || x + 1 == width || y + 1 == height) return false;
+    int support = 0;
+    for (int v = y - 1; v <= y + 1; ++v)
+      for (int u = x - 1; u <= x + 1; ++u) support += intrusions_(u, v) > 0 && depth(u, v) > 0;
+    return support >= kSupport;
+  };
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const bool hole = !(depth(x, y) > 0);
+      const float votes = hole ? 0.0f : intrusions_(x, y);
+      const float moves = votes > 0 && supported(x, y) ? votes / (votes + agreements_(x, y)) : 0.0f;
+      const float stands = moves > 0 ? 0.0f : std::min(1.0f, still_(x, y));
+      const float state = std::clamp(current_->score(x, y), -1.0f, 1.0f), weight = state_weight * std::abs(state);
+      const float doubt = hole ? hole_prior : prior;
+      weighted_(x, y) = moves - stands + weight * state - doubt;
+      weights_(x, y) = moves + stands + weight + doubt;
+    }
+}
+
+void MotionSegmenter::update_scores() {
+  const float gain = 1.0f / static_cast<float>(options_.full_evidence);
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const float weight = weights_.data()[i];
+    if (!(weight > 0)) continue;
+    const float mean = weighted_.data()[i] / weight;
+    float& score = current_->score.data()[i];
+    const float before = known_.data()[i] != 0 ? score : mean;  // what is new is what it hangs together with
+    score = std::clamp(before + mean * std::min(1.0f, weight * gain), kLowest, kHighest);
   }
 }
 
 MoverMask MotionSegmenter::mask() const {
-  MoverMask m;
-  m.cell = options_.cell;
-  const int w = rays_.width(), h = rays_.height();
-  m.cells = Image<uint8_t>(w, h);
-  for (size_t i = 0; i < m.cells.size(); ++i) m.cells.data()[i] = current_->score.data()[i] > static_cast<float>(options_.on) ? 255 : 0;
-  dilate(m, 1);
-  return m;
+  MoverMask result;
+  result.cell = options_.cell;
+  result.cells = Image<uint8_t>(rays_.width(), rays_.height());
+  const auto threshold = static_cast<float>(options_.threshold);
+  for (size_t i = 0; i < result.cells.size(); ++i)
+    result.cells.data()[i] = current_->score.data()[i] > threshold ? 255 : 0;
+  dilate(result, options_.rim);
+  return result;
 }
 
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
   if (!current_) return;
-  if (!cam_from_world) { reset(); return; }
-  current_->cam_from_world = at_depth_time(*cam_from_world, image_time_, depth_time_);
-  last_ = Pose{image_time_, *cam_from_world};
-  if (previous_) {
-    if (views_.empty() || (views_.size() == 1 && previous_->time - views_.back()->time > 0.06) || previous_->time - views_.back()->time >= options_.view_interval) {
-      views_.push_back(std::move(previous_));
-      if (views_.size() > static_cast<size_t>(options_.views)) {
-        // thin out: drop the view whose loss leaves the smallest relative gap
-        size_t drop = 1; double best = 1e9;
-        for (size_t i = 1; i + 1 < views_.size(); ++i) {
-          const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (views_.back()->time - views_[i]->time + 0.3);
-          if (gap < best) { best = gap; drop = i; }
-        }
-        if (views_.back()->time - views_.front()->time > 15) drop = 0;
-        spare_.push_back(std::move(views_[drop]));
-        views_.erase(views_.begin() + static_cast<long>(drop));
+  if (!cam_from_world) {
+    reset();
+    return;
+  }
+  current_->cam_from_world = at_depth_time(*cam_from_world);
+  last_ = Stamped{image_time_, *cam_from_world};
+  if (previous_) keep_as_view(std::move(previous_));
+  previous_ = std::move(current_);
+}
+
+// The newest views lie `view_interval` apart; of more than `views`, the one goes whose loss leaves the smallest gap in
+// proportion to its age.
+void MotionSegmenter::keep_as_view(std::unique_ptr<MotionDepthGrid> grid) {
+  const double interval = views_.size() == 1 ? 0.3 * options_.view_interval : options_.view_interval;
+  if (!views_.empty() && grid->time - views_.back()->time < interval) {
+    spare_.push_back(std::move(grid));
+    return;
+  }
+  views_.push_back(std::move(grid));
+  const double now = views_.back()->time;
+  size_t drop = 0;
+  if (now - views_.front()->time <= options_.view_age) {
+    if (views_.size() <= static_cast<size_t>(options_.views)) return;
+    double smallest = 0;
+    for (size_t i = 1; i + 1 < views_.size(); ++i) {
+      const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (now - views_[i]->time + options_.view_interval);
+      if (drop == 0 || gap < smallest) {
+        smallest = gap;
+        drop = i;
       }
-    } else {
-      spare_.push_back(std::move(previous_));
     }
   }
-  previous_ = std::move(current_);
+  spare_.push_back(std::move(views_[drop]));
+  views_.erase(views_.begin() + static_cast<std::ptrdiff_t>(drop));
 }
 
 }  // namespace dkb

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "dkb/dynamics/motion_depth_grid.h"
+#include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
@@ -15,55 +16,86 @@
 namespace dkb {
 
 struct MotionOptions {
-  int cell = 4;                   // [px] 2 ... 16
-  int views = 8;
-  int views_per_frame = 3;
-  double view_interval = 0.2;     // [s]
-  double tolerance_base = 0.02, tolerance_sigmas = 6;
-  double on = 0.5;
-  double memory = 6.0;  // [s]
-  double reach = 0.4;  // [m]
-  double near_range = 0.7, hole_memory = 1;
-  double hole_prior = 0.02;
-  double slope = 1;
-  double prior = 0.01;
-  double state = 0.02, age = 0.5;
-  double interior = 0.02, contour = 0.3, low = 1.5;
-  double crease = 0.012;  // [1/m]
-  double full_evidence = 0.05;
-  void check() const;
+  int cell = 4;                // [px] side of the cells that are judged, 2 ... 32
+  int views = 8;               // past views kept, >= 2
+  int views_per_frame = 4;     // of them compared with each frame, in turn, >= 1
+  double view_interval = 0.2;  // [s] between views when they are taken; with age they thin out, > 0
+  double view_age = 15;        // [s] older views are dropped, so that a parked chair becomes part of the room, > 0
+  double tolerance = 0.02;     // [m] what poses and calibration may be off in depth, >= 0
+  double tolerance_sigmas =
+      6;                   // standard deviations of the sensor's depth noise (flat-wall figure of SensorNoise), >= 0
+  double slope = 1;        // share of a view's depth range over 3 x 3 cells added to the tolerance, >= 0
+  double settle = 0.5;     // [s] agreement with a view counts in proportion to its age up to this, > 0
+  double memory = 6;       // [s] time constant in which a mover that stands still is forgotten, > 0
+  double hole_memory = 1;  // [s] the same for what is too near for the sensor, > 0
+  // Weights of evidence beside that of an intrusion into space seen empty, which is 1. All >= 0.
+  double contour = 0.3;         // an outline that is where a view had it: still
+  double interior = 0.05;       // a surface that is where a view had it: still, but so is the inside of one that sways
+  double state = 0.02;          // what the cell was before
+  double prior = 0.015;         // nothing moves until something says so
+  double hole_prior = 0.02;     // the same where depth is missing
+  double full_evidence = 0.05;  // mean weight around a cell at which one frame says all it can, > 0
+  double threshold = 0.5;       // score from which a cell moves; one frame adds at most 1, (0, 2]
+  int rim = 1;                  // [cells] the mask is widened by, >= 0
+  MotionSmoothingOptions smoothing;
+  void check() const;  // throws InvalidOption
 };
 
+// Finds what moves against the camera's own motion, of any class, without a model: people, a pushed chair, a carried
+// box. A surface in space that an earlier view saw empty has come in; its evidence is shared with what it hangs
+// together with, and carried along with the surface, so that who stops moving stays marked for seconds. Who is there
+// from the first frame is found as soon as his outline has moved by about two cells.
+//
+// Works on depth alone, on a coarse grid. Deterministic. Keeps its buffers from frame to frame; one object per thread.
+// Calls alternate: segment() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
-  MotionSegmenter(const CameraModel& camera, const MotionOptions& options);
-  MoverMask segment(const std::shared_ptr<const RgbdImage>& image, const Rigid3& cam_from_world_predicted);
+  explicit MotionSegmenter(const CameraModel& camera, const MotionOptions& options = {});
+
+  // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
+  // Throws InputError when the depth image is not of the camera's size.
+  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected);
+  // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
   void commit(const std::optional<Rigid3>& cam_from_world);
+  // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
+  void move_world(const Rigid3& new_from_old);
   void reset();
-  // dev
-  Image<float> votes_, plus_;
+  // Per cell of the frame last segmented: from -3, surely still, to 3, surely moving; 0 = nothing known.
   const Image<float>& score() const { return (current_ ? current_ : previous_)->score; }
 
  private:
-  struct Pose { double time; Rigid3 cam_from_world; };
-  Rigid3 at_depth_time(const Rigid3& cam_from_world, double time, double depth_time) const;
-  void carry();
+  struct Stamped {
+    double time = 0;
+    Rigid3 cam_from_world;
+  };
+
+  Rigid3 at_depth_time(const Rigid3& cam_from_world) const;
+  float tolerance_at(float depth) const;
+  void carry_scores();
   void compare(const MotionDepthGrid& view);
-  void decide();
+  void find_openings();
+  void weigh();
+  void update_scores();
   MoverMask mask() const;
+  void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
+  std::unique_ptr<MotionDepthGrid> take_spare();
 
   CameraModel camera_;
   MotionOptions options_;
   MotionRays rays_;
+  MotionSmoothing smoothing_;
   std::unique_ptr<MotionDepthGrid> current_, previous_;
-  std::deque<std::unique_ptr<MotionDepthGrid>> views_;  // oldest first
+  std::vector<std::unique_ptr<MotionDepthGrid>> views_;  // oldest first
   std::vector<std::unique_ptr<MotionDepthGrid>> spare_;
-  std::optional<Pose> last_;
-  double image_time_ = 0, depth_time_ = 0;
+  std::optional<Stamped> last_;  // colour image last committed
+  double image_time_ = 0;
   size_t turn_ = 0;
-  Image<float> tolerance_;
   int frames_ = 0;
-  Image<float> hole_share_, known_, match_, still_, link_x_, link_y_, num_, den_, inverse_, crease_;
+  Image<float> tolerance_;                        // [m] by cell
+  Image<float> intrusions_, agreements_, still_;  // votes of the views
+  Image<float> missing_;                          // share of the frames without depth there
+  Image<float> weighted_, weights_;
+  Image<uint8_t> known_, open_;
 };
 
 }  // namespace dkb

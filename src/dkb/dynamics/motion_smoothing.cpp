@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/motion_smoothing.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+void MotionSmoothingOptions::check() const {
+  require_option(reach > 0, "motion.reach", reach, "greater than 0 m");
+  require_option(step_base >= 0, "motion.step_base", step_base, "at least 0 m");
+  require_option(step_slope >= 0, "motion.step_slope", step_slope, "at least 0");
+  require_option(crease > 0, "motion.crease", crease, "greater than 0 per metre");
+  require_option(crease_link >= 0 && crease_link <= 1, "motion.crease_link", crease_link, "in 0 ... 1");
+  require_option(near_range >= 0, "motion.near_range", near_range, "at least 0 m");
+}
+
+MotionSmoothing::MotionSmoothing(const CameraModel& camera, int cell, const MotionSmoothingOptions& options)
+    : options_(options), fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.reach))) {
+  options_.check();
+  const int width = (camera.width + cell - 1) / cell, height = (camera.height + cell - 1) / cell;
+  for (Image<float>* i : {&inverse_, &damping_, &left_, &up_}) *i = Image<float>(width, height);
+}
+
+void MotionSmoothing::find_creases(const Image<float>& depth) {
+  constexpr int kArm = 3;  // [cells] far enough for a fold to rise above the noise, near enough for a foot or a hand
+  const int width = depth.width(), height = depth.height();
+  const auto bound = static_cast<float>(options_.crease), folded = static_cast<float>(options_.crease_link);
+  for (size_t i = 0; i < depth.size(); ++i) inverse_.data()[i] = depth.data()[i] > 0 ? 1.0f / depth.data()[i] : 0.0f;
+  for (int y = 0; y < height; ++y) {
+    const float* here = inverse_.row(y);
+    float* out = damping_.row(y);
+    std::fill(out, out + width, 1.0f);
+    const auto mark = [&](const float* before, const float* after, int begin, int end) {
+      for (int x = begin; x < end; ++x) {
+        const float bend = before[x] + after[x] - 2.0f * here[x];
+        const bool known = (before[x] > 0) & (after[x] > 0);
+        out[x] = known & (bend > bound) ? folded : out[x];
+      }
+    };
+    mark(here - kArm, here + kArm, kArm, width - kArm);
+    if (y >= kArm && y + kArm < height) mark(inverse_.row(y - kArm), inverse_.row(y + kArm), 0, width);
+  }
+}
+
+void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t>& open) {
+  find_creases(depth);
+  const auto near = static_cast<float>(options_.near_range);
+  const auto base = static_cast<float>(options_.step_base), slope = static_cast<float>(options_.step_slope);
+  const auto link = [&](size_t a, size_t b) {
+    const float za = depth.data()[a], zb = depth.data()[b];
+    const float low = std::min(za, zb), high = std::max(za, zb);
+    const bool joined = high - low < base + slope * low;
+    const bool too_near = (high < near) & ((za > 0) | (open.data()[a] != 0)) & ((zb > 0) | (open.data()[b] != 0));
+    const float strength =
+        low > 0 ? (joined ? std::min(damping_.data()[a], damping_.data()[b]) : 0.0f) : (too_near ? 1.0f : 0.0f);
+    return strength / (1.0f + fade_ * std::max(high, 0.5f * near));
+  };
+  const auto width = static_cast<size_t>(depth.width());
+  for (size_t y = 0, i = 0; y < static_cast<size_t>(depth.height()); ++y)
+    for (size_t x = 0; x < width; ++x, ++i) {
+      left_.data()[i] = x > 0 ? link(i, i - 1) : 0.0f;
+      up_.data()[i] = y > 0 ? link(i, i - width) : 0.0f;
+    }
+}
+
+void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
+  const int width = weighted.width(), height = weighted.height();
+  const auto take_row = [width](float* to, const float* from, const float* link) {
+    for (int x = 0; x < width; ++x) to[x] += link[x] * (from[x] - to[x]);
+  };
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int y = 0; y < height; ++y) {
+      float* a = weighted.row(y);
+      float* b = weights.row(y);
+      const float* link = left_.row(y);
+      for (int x = 1; x < width; ++x) {
+        a[x] += link[x] * (a[x - 1] - a[x]);
+        b[x] += link[x] * (b[x - 1] - b[x]);
+      }
+      for (int x = width - 2; x >= 0; --x) {
+        a[x] += link[x + 1] * (a[x + 1] - a[x]);
+        b[x] += link[x + 1] * (b[x + 1] - b[x]);
+      }
+    }
+    for (int y = 1; y < height; ++y) {
+      take_row(weighted.row(y), weighted.row(y - 1), up_.row(y));
+      take_row(weights.row(y), weights.row(y - 1), up_.row(y));
+    }
+    for (int y = height - 2; y >= 0; --y) {
+      take_row(weighted.row(y), weighted.row(y + 1), up_.row(y + 1));
+      take_row(weights.row(y), weights.row(y + 1), up_.row(y + 1));
+    }
+  }
+}
+
+}  // namespace dkb

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "dkb/geometry/camera.h"
+#include "dkb/image/image.h"
+
+namespace dkb {
+
+struct MotionSmoothingOptions {
+  double reach = 0.4;        // [m] along the surface over which cells of one object speak for each other, > 0
+  double step_base = 0.015;  // [m] depth step between neighbouring cells of one surface: this ...
+  double step_slope = 0.02;  // ... plus this share of their depth, >= 0
+  double crease =
+      0.012;  // [1/m] second difference of inverse depth in a fold between object and support (noise: 0.005), > 0
+  double crease_link = 0.3;  // share of what is said that crosses such a fold, 0 ... 1
+  double near_range =
+      0.55;            // [m] a surface nearer than this may go on where depth is missing, being too near for the sensor
+  void check() const;  // throws InvalidOption
+};
+
+// Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)
+// by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth steps and
+// concave folds. A fold is where inverse depth, which is linear in the image on every plane, bends away from the
+// viewer.
+class MotionSmoothing {
+ public:
+  MotionSmoothing(const CameraModel& camera, int cell, const MotionSmoothingOptions& options);
+
+  // `depth`: of the cells' middles [m], 0 = none. `open`: 255 where missing depth may be a surface too near for the
+  // sensor. Sets what smooth() stops at.
+  void set_surface(const Image<float>& depth, const Image<uint8_t>& open);
+  // Smooths both in place: sum of weight times evidence, and sum of weights.
+  void smooth(Image<float>& weighted, Image<float>& weights) const;
+
+ private:
+  void find_creases(const Image<float>& depth);
+
+  MotionSmoothingOptions options_;
+  float fade_ = 0;                  // [1 / m of depth] of a link per cell
+  Image<float> inverse_, damping_;  // 1 / depth; crease_link in folds, else 1
+  Image<float> left_, up_;          // link to the neighbour, 0 ... 1
+};
+
+}  // namespace dkb
