@@ -31,8 +31,8 @@ std::vector<std::string> kinds_of(const DetectorArguments& arguments, const std:
 
 }  // namespace
 
-DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera, const std::vector<double>& stamps,
-                           bool threaded, bool realtime) {
+DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera,
+                           const std::vector<double>& stamps, bool threaded, bool realtime) {
   DetectorSet set;
   std::string model = arguments.model;
   if (const char* from_environment = std::getenv("DKB_SLAM_MODEL"); model.empty() && from_environment != nullptr)
@@ -41,7 +41,8 @@ DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
   if (has("yolo")) {
     if (model.empty())
-      throw InputError("--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
+      throw InputError(
+          "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
     OnnxOptions options;
     options.model = model;
     options.labels = arguments.labels;

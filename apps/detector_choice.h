@@ -17,7 +17,7 @@ struct DetectorArguments {
 };
 
 // Makes them; every fault of a model or file is thrown here, before any frame (InputError).
-DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera, const std::vector<double>& stamps,
-                           bool threaded, bool realtime);
+DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera,
+                           const std::vector<double>& stamps, bool threaded, bool realtime);
 
 }  // namespace dkb

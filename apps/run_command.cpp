@@ -14,6 +14,7 @@
 #include <optional>
 #include <sstream>
 
+#include "detector_choice.h"
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/dataset/rgbd_reader.h"
@@ -23,7 +24,6 @@
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
 #include "dkb/util/settings.h"
-#include "detector_choice.h"
 #include "run_outputs.h"
 
 namespace dkb {
@@ -44,7 +44,9 @@ struct RunArguments {
 };
 
 std::atomic<bool> interrupted{false};
-void on_interrupt(int) { interrupted = true; }
+void on_interrupt(int) {
+  interrupted = true;
+}
 
 // One line that renews itself on a terminal; plain lines now and then elsewhere.
 class Progress {
@@ -97,7 +99,8 @@ DisabledParts parse_disabled(const std::string& list) {
   for (std::string name; std::getline(names, name, ',');) {
     const auto at = std::find(known.begin(), known.end(), name);
     if (at == known.end())
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) + "; parts: dr, kf, ba, loop");
+      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
+                       "; parts: dr, kf, ba, loop");
     *switches[at - known.begin()] = true;
   }
   return parts;
@@ -135,7 +138,8 @@ int run(const RunArguments& args) {
   const fs::path out = args.out.empty() ? default_output(args.dataset) : fs::path(args.out);
   make_output_folder(out);
   if (!args.quiet)
-    fmt::print("{} pairs by {}, camera {}, results in {}\n", dataset.pairs.size(), dataset.list, camera.origin, out.string());
+    fmt::print("{} pairs by {}, camera {}, results in {}\n", dataset.pairs.size(), dataset.list, camera.origin,
+               out.string());
 
   interrupted = false;
   std::signal(SIGINT, on_interrupt);
@@ -161,7 +165,9 @@ int run(const RunArguments& args) {
     }
     facts.stamps.push_back(frame->stamp);
     const FrameResult result = slam.process(frame->image);
-    if (const auto warning = slam.take_warning()) warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
+    for (const Mover& mover : result.movers) facts.movers.push_back({frame->timestamp, frame->stamp, mover});
+    if (const auto warning = slam.take_warning())
+      warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
     if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
     progress.frame(frame->index + 1, &result);
   }
@@ -179,11 +185,13 @@ int run(const RunArguments& args) {
 
   const SlamStatistics s = slam.statistics();
   if (!args.quiet)
-    fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked, facts.offered,
-               s.keyframes, s.map_points, s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+    fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked,
+               facts.offered, s.keyframes, s.map_points,
+               s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (interrupted) return 130;
   if (s.tracked == 0) {
-    fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n", options.tracking.initial_points);
+    fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
+               options.tracking.initial_points);
     return 1;
   }
   return 0;
@@ -200,13 +208,16 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
   command->add_option("--set", args->set, "key=value, any setting of config.yaml; may be repeated");
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
-  command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) { args->has_seed = true; });
+  command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) {
+    args->has_seed = true;
+  });
   DetectorArguments& detection = args->detection;
   command->add_option("--detector", detection.detector, "auto, yolo, motion, file, none; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)");
-  command->add_option("--detect-latency", detection.latency, "[frames] until a detection is used (default: by the model's size)");
+  command->add_option("--detect-latency", detection.latency,
+                      "[frames] until a detection is used (default: by the model's size)");
   command->add_option("--boxes", detection.boxes, "Boxes of the file detector: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");

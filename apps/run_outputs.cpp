@@ -27,7 +27,9 @@ double peak_rss_mb() {
 double cpu_seconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
@@ -59,14 +61,18 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
   auto stages = times.summaries();
   stages.insert(s.stages.begin(), s.stages.end());
   for (const auto& [name, stage] : stages)
-    j["stages"][name] = {{"mean_ms", stage.mean_ms}, {"median_ms", stage.median_ms}, {"p95_ms", stage.p95_ms},
-                         {"max_ms", stage.max_ms},   {"count", stage.count}};
+    j["stages"][name] = {{"mean_ms", stage.mean_ms},
+                         {"median_ms", stage.median_ms},
+                         {"p95_ms", stage.p95_ms},
+                         {"max_ms", stage.max_ms},
+                         {"count", stage.count}};
   for (const char* rule : {"first", "adaptive", "floor", "baseline"}) {
     const auto it = s.keyframe_rules.find(rule);
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.mapping.points_retracted}};
-  j["detector"] = {{"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
+  j["detector"] = {
+      {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
   j["mapping"] = {{"points_created", s.mapping.points_created},
                   {"points_culled", s.mapping.points_culled},
                   {"points_fused", s.mapping.points_fused},
@@ -99,6 +105,7 @@ void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, 
   save_map(folder / "map.dkb", *map, {slam.camera(), orb.scale, orb.levels});
   write_file_atomically(folder / "map.ply", point_cloud_ply(*map));
   write_file_atomically(folder / "config.yaml", facts.config_yaml);
+  write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
   write_file_atomically(folder / "stats.json", stats_json(slam.statistics(), facts));
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "dkb/dynamics/movers_file.h"
 #include "dkb/slam/slam_system.h"
 #include "dkb/util/timing.h"
 
@@ -17,7 +18,8 @@ struct RunFacts {
   double startup_s = 0, wall_s = 0;
   std::string config_yaml;
   std::string features_csv;  // empty = not asked for
-  StageTimes times;          // decoding
+  MoverRows movers;
+  StageTimes times;  // decoding
 };
 
 // Seconds since this process was started, by the kernel's account.

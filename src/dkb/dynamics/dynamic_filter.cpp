@@ -32,9 +32,11 @@ std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<
   std::vector<int> box(features.size(), -1);
   for (size_t i = 0; i < features.size(); ++i)
     for (size_t b = 0; b < boxes.size(); ++b) {
-      if (!boxes[b].box.contains(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y())))
+      if (!boxes[b].box.contains(static_cast<float>(features[i].image_pixel.x()),
+                                 static_cast<float>(features[i].image_pixel.y())))
         continue;
-      if (box[i] < 0 || boxes[b].box.area() < boxes[static_cast<size_t>(box[i])].box.area()) box[i] = static_cast<int>(b);
+      if (box[i] < 0 || boxes[b].box.area() < boxes[static_cast<size_t>(box[i])].box.area())
+        box[i] = static_cast<int>(b);
     }
   return box;
 }
@@ -47,7 +49,8 @@ std::vector<uint8_t> box_filter(std::span<const FilterFeature> features, std::sp
 }
 
 std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
-                                  const CameraModel& camera, const Rigid3& current_from_previous, const PaperFilterOptions& options) {
+                                  const CameraModel& camera, const Rigid3& current_from_previous,
+                                  const PaperFilterOptions& options) {
   std::vector<uint8_t> dynamic(features.size(), 0);
   const auto box = box_of_each(features, boxes);
   for (size_t i = 0; i < features.size(); ++i) {
@@ -76,12 +79,14 @@ std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, st
   std::vector<uint8_t> dynamic(features.size(), 0);
   const auto box = box_of_each(features, boxes);
   for (size_t i = 0; i < features.size(); ++i)
-    dynamic[i] = box[i] >= 0 && features[i].flowed && epipolar_distance(features[i], camera, current_from_previous) > options.threshold;
+    dynamic[i] = box[i] >= 0 && features[i].flowed &&
+                 epipolar_distance(features[i], camera, current_from_previous) > options.threshold;
   return dynamic;
 }
 
-std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features, std::span<const Eigen::Vector3d> seen_in_camera,
-                                      const CameraModel& camera, const DepthImage& depth, const MultiviewFilterOptions& options) {
+std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
+                                      std::span<const Eigen::Vector3d> seen_in_camera, const CameraModel& camera,
+                                      const DepthImage& depth, const MultiviewFilterOptions& options) {
   struct Spot {
     Eigen::Vector2d image_pixel;
     double depth;
@@ -109,7 +114,8 @@ std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features, s
 std::vector<uint8_t> mask_filter(std::span<const FilterFeature> features, const MoverMask& mask) {
   std::vector<uint8_t> dynamic(features.size(), 0);
   for (size_t i = 0; i < features.size(); ++i)
-    dynamic[i] = mask.at(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y()));
+    dynamic[i] =
+        mask.at(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y()));
   return dynamic;
 }
 

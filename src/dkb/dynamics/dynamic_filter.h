@@ -40,10 +40,12 @@ std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<
 // 1 = dynamic, per feature.
 std::vector<uint8_t> box_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes);
 
-// The paper's filter (eqs. 9-13): flow residual against the camera's motion, then the depth test on what is left in each
-// box. `current_from_previous`: motion of the camera between the two images. Without depth, distance to the epipolar line.
+// The paper's filter (eqs. 9-13): flow residual against the camera's motion, then the depth test on what is left in
+// each box. `current_from_previous`: motion of the camera between the two images. Without depth, distance to the
+// epipolar line.
 std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
-                                  const CameraModel& camera, const Rigid3& current_from_previous, const PaperFilterOptions& options);
+                                  const CameraModel& camera, const Rigid3& current_from_previous,
+                                  const PaperFilterOptions& options);
 
 struct EpipolarFilterOptions {
   double threshold = 1.0;  // [px] distance to the epipolar line, > 0
@@ -54,9 +56,9 @@ std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, st
                                      const EpipolarFilterOptions& options);
 
 struct MultiviewFilterOptions {
-  double depth_step = 0.4;   // [m] a surface must lie so far before what was seen there, > 0 (DynaSLAM, RA-L 2018)
-  double radius = 15;        // [px] features so near to such a spot and at its depth are dynamic too, > 0
-  int keyframes = 5;         // earlier keyframes compared, >= 1 (the same source)
+  double depth_step = 0.4;  // [m] a surface must lie so far before what was seen there, > 0 (DynaSLAM, RA-L 2018)
+  double radius = 15;       // [px] features so near to such a spot and at its depth are dynamic too, > 0
+  int keyframes = 5;        // earlier keyframes compared, >= 1 (the same source)
   void check() const {
     require_option(depth_step > 0, "depth_step", depth_step, "greater than 0 m");
     require_option(radius > 0, "radius", radius, "greater than 0 px");
@@ -64,8 +66,9 @@ struct MultiviewFilterOptions {
   }
 };
 // `seen_in_camera`: points [m] of earlier keyframes in the current camera, by the predicted pose.
-std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features, std::span<const Eigen::Vector3d> seen_in_camera,
-                                      const CameraModel& camera, const DepthImage& depth, const MultiviewFilterOptions& options);
+std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
+                                      std::span<const Eigen::Vector3d> seen_in_camera, const CameraModel& camera,
+                                      const DepthImage& depth, const MultiviewFilterOptions& options);
 
 // Features on marked cells.
 std::vector<uint8_t> mask_filter(std::span<const FilterFeature> features, const MoverMask& mask);

@@ -7,7 +7,8 @@ namespace dkb {
 
 void unite(MoverMask& into, const MoverMask& other, int width, int height) {
   if (other.empty()) return;
-  if (into.empty()) into.cells = Image<uint8_t>((width + into.cell - 1) / into.cell, (height + into.cell - 1) / into.cell);
+  if (into.empty())
+    into.cells = Image<uint8_t>((width + into.cell - 1) / into.cell, (height + into.cell - 1) / into.cell);
   for (int y = 0; y < into.cells.height(); ++y)
     for (int x = 0; x < into.cells.width(); ++x) {
       const float centre_x = (static_cast<float>(x) + 0.5f) * static_cast<float>(into.cell);

@@ -10,7 +10,8 @@
 namespace dkb {
 
 struct PointEvidenceOptions {
-  int sightings = 10;  // times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1
+  int sightings =
+      10;  // times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1
   void check() const { require_option(sightings >= 1, "dynamics.evidence.sightings", sightings, "at least 1"); }
 };
 

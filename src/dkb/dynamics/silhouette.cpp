@@ -17,7 +17,8 @@ struct CellRange {
 CellRange cells_of(const Box& box, int cell, int columns, int rows) {
   const auto cut = [](float v, int n) { return std::clamp(static_cast<int>(std::floor(v)), 0, n); };
   const float c = static_cast<float>(cell);
-  return {cut(box.x / c, columns), cut(box.y / c, rows), cut((box.x + box.w) / c + 1, columns), cut((box.y + box.h) / c + 1, rows)};
+  return {cut(box.x / c, columns), cut(box.y / c, rows), cut((box.x + box.w) / c + 1, columns),
+          cut((box.y + box.h) / c + 1, rows)};
 }
 
 Box scaled(const Box& b, double factor) {
@@ -41,8 +42,10 @@ float object_depth(const Image<float>& grid, const CellRange& core, const Silhou
     float depth, weight;
   };
   std::vector<Sample> samples;
-  const float mx = 0.5f * static_cast<float>(core.x0 + core.x1 - 1), my = 0.5f * static_cast<float>(core.y0 + core.y1 - 1);
-  const float sx = std::max(1.0f, 0.5f * static_cast<float>(core.x1 - core.x0)), sy = std::max(1.0f, 0.5f * static_cast<float>(core.y1 - core.y0));
+  const float mx = 0.5f * static_cast<float>(core.x0 + core.x1 - 1),
+              my = 0.5f * static_cast<float>(core.y0 + core.y1 - 1);
+  const float sx = std::max(1.0f, 0.5f * static_cast<float>(core.x1 - core.x0)),
+              sy = std::max(1.0f, 0.5f * static_cast<float>(core.y1 - core.y0));
   float total = 0;
   for (int y = core.y0; y < core.y1; ++y)
     for (int x = core.x0; x < core.x1; ++x) {
@@ -90,7 +93,8 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
   MoverMask mask;
   mask.cell = options.cell;
   if (boxes.empty()) return mask;
-  const int columns = (depth.width() + options.cell - 1) / options.cell, rows = (depth.height() + options.cell - 1) / options.cell;
+  const int columns = (depth.width() + options.cell - 1) / options.cell,
+            rows = (depth.height() + options.cell - 1) / options.cell;
   mask.cells = Image<uint8_t>(columns, rows);
   Image<float> grid(columns, rows);
   for (int y = 0; y < rows; ++y)
@@ -107,7 +111,9 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     }
     Image<uint8_t> mine(columns, rows);
     std::vector<std::pair<int, int>> front;
-    const auto near_layer = [&](float d, double tolerance) { return std::fabs(d - layer) <= static_cast<float>(tolerance); };
+    const auto near_layer = [&](float d, double tolerance) {
+      return std::fabs(d - layer) <= static_cast<float>(tolerance);
+    };
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
         if (grid(x, y) > 0 && near_layer(grid(x, y), options.layer * layer)) {
@@ -122,7 +128,8 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
         const int nx = x + dx, ny = y + dy;
         if (nx < range.x0 || ny < range.y0 || nx >= range.x1 || ny >= range.y1 || mine(nx, ny)) continue;
         const float nd = grid(nx, ny);
-        if (!(nd > 0) || std::fabs(nd - d) > static_cast<float>(options.step) * d || !near_layer(nd, options.reach)) continue;
+        if (!(nd > 0) || std::fabs(nd - d) > static_cast<float>(options.step) * d || !near_layer(nd, options.reach))
+          continue;
         mine(nx, ny) = 255;
         front.emplace_back(nx, ny);
       }

@@ -67,8 +67,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
   RgbdFeatures result;
   result.descriptors = orb.descriptors;
   result.keypoints.resize(orb.corners.size());
-  const Rigid3 colour_cam_from_depth_cam =
-      rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
+  const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
   const Eigen::Matrix3d back = rotation.transpose();
   const bool moved =

@@ -19,7 +19,7 @@ struct Keypoint {
   float angle = 0;              // [rad]
   float response = 0;
   uint8_t octave = 0;
-  bool suspect = false;         // lies where a mover is seen: only well-established map points may be matched here
+  bool suspect = false;  // lies where a mover is seen: only well-established map points may be matched here
   Rgb colour;
 };
 
@@ -35,7 +35,7 @@ struct RgbdFeatures {
 struct DepthOptions {
   float edge_fraction =
       0.05f;  // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
-  bool model_time_offset = true;  // move depths to the colour image's time with the camera's motion
+  bool model_time_offset = true;      // move depths to the colour image's time with the camera's motion
   bool model_rolling_shutter = true;  // move features to where they would lie had the whole image been exposed at once
   void check() const;
 };

@@ -8,8 +8,8 @@
 namespace dkb {
 namespace {
 
-// [s] Colour camera of the first Kinect and its kin. Chosen by the reprojection and pose errors of TUM fr1_xyz; Ringaby and
-// Forssen (ICCV 2011) measured 26 ms with a rig.
+// [s] Colour camera of the first Kinect and its kin. Chosen by the reprojection and pose errors of TUM fr1_xyz; Ringaby
+// and Forssen (ICCV 2011) measured 26 ms with a rig.
 constexpr double kKinectReadout = 0.020;
 
 }  // namespace
@@ -26,7 +26,8 @@ void CameraModel::check() const {
   require_option(std::isfinite(p1), "p1", p1, "finite");
   require_option(std::isfinite(p2), "p2", p2, "finite");
   require_option(std::isfinite(k3), "k3", k3, "finite");
-  require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor, "greater than 0 units per metre");
+  require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
+                 "greater than 0 units per metre");
   require_option(std::isfinite(fps) && fps > 0 && fps <= 1000, "fps", fps, "greater than 0 and at most 1000");
   require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
   require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");

@@ -56,7 +56,9 @@ struct Rigid3 {
 
 // Small motion from its tangent vector [translation m, rotation rad]; first-order coupling is left out, so that
 // translation and rotation stay independent coordinates: T(d) = (exp(d_rot), d_trans).
-inline Rigid3 rigid3_from_tangent(const Vector6d& d) { return {rotation_from_vector(d.tail<3>()), d.head<3>()}; }
+inline Rigid3 rigid3_from_tangent(const Vector6d& d) {
+  return {rotation_from_vector(d.tail<3>()), d.head<3>()};
+}
 
 // Camera centre in the world of a `cam_from_world`.
 inline Eigen::Vector3d centre_in_world(const Rigid3& cam_from_world) {

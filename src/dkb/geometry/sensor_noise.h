@@ -9,11 +9,12 @@ namespace dkb {
 
 // How far corners and depths may be off.
 struct SensorNoise {
-  double pixel_sigma = 1.0;             // [px] of a corner on the finest pyramid level, > 0
-  double scale_exponent = 0.5;          // how it grows with the scale of the level: sigma ~ scale^exponent, 0 ... 1
-  double depth_sigma_base = 0.0012;     // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
+  double pixel_sigma = 1.0;          // [px] of a corner on the finest pyramid level, > 0
+  double scale_exponent = 0.5;       // how it grows with the scale of the level: sigma ~ scale^exponent, 0 ... 1
+  double depth_sigma_base = 0.0012;  // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
   double depth_sigma_quadratic = 0.0019;  // [1/m] growth with (z - 0.4 m)^2, >= 0   (the same source)
-  double depth_sigma_factor = 10.0;      // what edges, registration and calibration add to the source's flat-wall figure, >= 1
+  double depth_sigma_factor =
+      10.0;  // what edges, registration and calibration add to the source's flat-wall figure, >= 1
 
   void check() const {
     require_option(pixel_sigma > 0, "pixel_sigma", pixel_sigma, "greater than 0 px");
@@ -23,7 +24,9 @@ struct SensorNoise {
     require_option(depth_sigma_factor >= 1, "depth_sigma_factor", depth_sigma_factor, "at least 1");
   }
   // Standard deviation [px, full resolution] of a corner found on a pyramid level.
-  double corner_sigma(int octave, double scale_factor) const { return pixel_sigma * std::pow(scale_factor, scale_exponent * octave); }
+  double corner_sigma(int octave, double scale_factor) const {
+    return pixel_sigma * std::pow(scale_factor, scale_exponent * octave);
+  }
   // Standard deviation [m] of a depth z [m].
   double depth_sigma(double z) const {
     return depth_sigma_factor * (depth_sigma_base + depth_sigma_quadratic * (z - 0.4) * (z - 0.4));

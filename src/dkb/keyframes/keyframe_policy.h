@@ -13,14 +13,14 @@ namespace dkb {
 // What a policy may know of a tracked frame.
 struct KeyframeQuery {
   FrameIndex frame = 0;
-  FrameIndex last_keyframe_frame = 0;       // frame of the newest keyframe
+  FrameIndex last_keyframe_frame = 0;  // frame of the newest keyframe
   FrameIndex last_relocalisation_frame = -1000000;
   KeyframeId last_keyframe = kNoKeyframe;
-  bool mapper_idle = true;                  // no keyframe outstanding in logical time
-  int tracked_points = 0;                   // inliers of the final pose
-  int tracked_close_points = 0;             // of these, with a depth below the close limit
-  int creatable_close_points = 0;           // features with such a depth that show no map point
-  int reference_points = 0;                 // points of the reference keyframe that other keyframes see as well
+  bool mapper_idle = true;         // no keyframe outstanding in logical time
+  int tracked_points = 0;          // inliers of the final pose
+  int tracked_close_points = 0;    // of these, with a depth below the close limit
+  int creatable_close_points = 0;  // features with such a depth that show no map point
+  int reference_points = 0;        // points of the reference keyframe that other keyframes see as well
   Rigid3 cam_from_world;
   Rigid3 last_keyframe_cam_from_world;
   // Inliers: what was matched and where.
@@ -55,11 +55,12 @@ class KeyframePolicy {
 
 // The rule published with ORB-SLAM2 (T-RO 2017) for RGB-D cameras, as restated in DKB section 3.2.
 struct BaselineKeyframeOptions {
-  int frames_between = 20;           // [frames] longest wait while mapping is busy; also the wait after a relocalisation, >= 1
-  int least_tracked = 50;            // [points] fewer tracked points make no keyframe, >= 0
-  double reference_ratio = 0.9;      // insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1
-  int few_close = 100;               // [points] fewer tracked close points ...
-  int many_creatable = 70;           // [points] ... while at least so many could be made call for a keyframe
+  int frames_between = 20;  // [frames] longest wait while mapping is busy; also the wait after a relocalisation, >= 1
+  int least_tracked = 50;   // [points] fewer tracked points make no keyframe, >= 0
+  double reference_ratio =
+      0.9;                  // insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1
+  int few_close = 100;      // [points] fewer tracked close points ...
+  int many_creatable = 70;  // [points] ... while at least so many could be made call for a keyframe
   void check() const;
 };
 

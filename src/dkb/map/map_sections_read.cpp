@@ -79,7 +79,7 @@ MapFileContext read_head(std::string_view bytes) {
   c.width = narrow<int>(in, in.u32());
   c.height = narrow<int>(in, in.u32());
   for (double* v : {&c.fx, &c.fy, &c.cx, &c.cy, &c.k1, &c.k2, &c.p1, &c.p2, &c.k3, &c.depth_factor, &c.fps,
-                    &c.depth_min, &c.depth_max})
+                    &c.depth_min, &c.depth_max, &c.readout})
     *v = in.f64();
   context.scale_factor = in.f64();
   context.levels = narrow<int>(in, in.u32());

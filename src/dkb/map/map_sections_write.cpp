@@ -66,8 +66,8 @@ std::string head_section(const MapFileContext& context) {
   const CameraModel& c = context.camera;
   out.u32(static_cast<uint32_t>(c.width));
   out.u32(static_cast<uint32_t>(c.height));
-  for (double v :
-       {c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.depth_factor, c.fps, c.depth_min, c.depth_max})
+  for (double v : {c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.depth_factor, c.fps, c.depth_min,
+                   c.depth_max, c.readout})
     out.f64(v);
   out.f64(context.scale_factor);
   out.u32(static_cast<uint32_t>(context.levels));

@@ -41,7 +41,8 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
       if (count[k] > 0) around.push_back({static_cast<KeyframeId>(k), count[k]});
     std::stable_sort(around.begin(), around.end(),
                      [](const Covisible& a, const Covisible& b) { return a.shared_points > b.shared_points; });
-    if (static_cast<int>(around.size()) > options.fixed_keyframes) around.resize(static_cast<size_t>(options.fixed_keyframes));
+    if (static_cast<int>(around.size()) > options.fixed_keyframes)
+      around.resize(static_cast<size_t>(options.fixed_keyframes));
   }
 
   BaProblem problem;

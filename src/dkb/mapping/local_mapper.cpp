@@ -75,8 +75,9 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   k.frame = packet.frame;
   k.timestamp = packet.timestamp;
   k.features = packet.features;
-  k.cam_from_world = packet.reference == kNoKeyframe ? packet.cam_from_reference
-                                                     : packet.cam_from_reference * map_.cam_from_world(packet.reference);
+  k.cam_from_world = packet.reference == kNoKeyframe
+                         ? packet.cam_from_reference
+                         : packet.cam_from_reference * map_.cam_from_world(packet.reference);
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();
   map_.add_keyframe(std::move(k));
@@ -138,8 +139,8 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
   match.radius = static_cast<float>(options_.fusion_radius);
   match.max_distance = 50;
   match.ratio = 1.0f;
-  const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_, match,
-                                           nullptr, nullptr);
+  const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_,
+                                           match, nullptr, nullptr);
   int fused = 0;
   const auto features = k.features;
   for (const ProjectionMatch& m : matches) {
@@ -158,7 +159,8 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     } else if (there != id) {
       // The better observed point survives; the older one in a tie.
       const MapPoint& other = *map_.point(there);
-      if (other.observations.size() > p->observations.size() || (other.observations.size() == p->observations.size() && there < id))
+      if (other.observations.size() > p->observations.size() ||
+          (other.observations.size() == p->observations.size() && there < id))
         map_.fuse(id, there);
       else
         map_.fuse(there, id);
@@ -248,7 +250,8 @@ void refresh_point(Map& map, PointId id, double scale_factor) {
   const Keyframe& k = *map.keyframe(source.keyframe);
   const Descriptor descriptor = *descriptors[chosen];
   const float distance = static_cast<float>((centre_in_world(k.cam_from_world) - old.position).norm());
-  const float scale = static_cast<float>(std::pow(scale_factor, k.features->keypoints[static_cast<size_t>(source.feature)].octave));
+  const float scale =
+      static_cast<float>(std::pow(scale_factor, k.features->keypoints[static_cast<size_t>(source.feature)].octave));
   MapPoint& p = map.edit_point(id);
   p.normal = sum.normalized().cast<float>();
   p.descriptor = descriptor;

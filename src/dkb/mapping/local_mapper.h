@@ -14,14 +14,14 @@
 namespace dkb {
 
 struct MappingOptions {
-  int least_shared_points = 15;        // [points] shared points that make two keyframes covisible, >= 1
-  double least_found_ratio = 0.25;     // found / visible below which a young point is dropped, 0 ... 1
-  int probation_keyframes = 3;         // [keyframes] after its birth that a point is on probation, >= 1
-  int least_observers = 2;             // keyframes that must see a point by the end of its probation, >= 2
-  double redundant_share = 0.9;        // a keyframe is culled when this share of its points ..., 0 ... 1
-  int redundant_observers = 3;         // ... is seen by so many others at the same scale or finer, >= 1
-  int fusion_keyframes = 10;           // covisible keyframes whose points are fused with a new keyframe's, >= 0
-  double fusion_radius = 3.0;          // [px] at the finest level, > 0
+  int least_shared_points = 15;     // [points] shared points that make two keyframes covisible, >= 1
+  double least_found_ratio = 0.25;  // found / visible below which a young point is dropped, 0 ... 1
+  int probation_keyframes = 3;      // [keyframes] after its birth that a point is on probation, >= 1
+  int least_observers = 2;          // keyframes that must see a point by the end of its probation, >= 2
+  double redundant_share = 0.9;     // a keyframe is culled when this share of its points ..., 0 ... 1
+  int redundant_observers = 3;      // ... is seen by so many others at the same scale or finer, >= 1
+  int fusion_keyframes = 10;        // covisible keyframes whose points are fused with a new keyframe's, >= 0
+  double fusion_radius = 3.0;       // [px] at the finest level, > 0
   PointCreationOptions creation;
   LocalBaOptions ba;
   void check() const;
@@ -31,11 +31,12 @@ struct MappingReport {
   int points_created = 0, points_culled = 0, points_fused = 0, points_retracted = 0, keyframes_culled = 0;
 };
 
-// Turns keyframe packets into map: inserts, culls, creates, fuses, adjusts (DKB sections 3, 3.3). The only writer of the map.
-// Deterministic: the same packets in the same order give the same map.
+// Turns keyframe packets into map: inserts, culls, creates, fuses, adjusts (DKB sections 3, 3.3). The only writer of
+// the map. Deterministic: the same packets in the same order give the same map.
 class LocalMapper {
  public:
-  LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, const MappingOptions& options);
+  LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+              const MappingOptions& options);
 
   // Works a keyframe in and returns the map as it is then.
   MapView process(const KeyframePacket& packet);

@@ -12,8 +12,8 @@ namespace dkb {
 namespace {
 
 // Point nearest to two rays, from the least squares of both; nothing when they are parallel or it lies behind.
-std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a, const Eigen::Vector3d& centre_b,
-                                    const Eigen::Vector3d& ray_b) {
+std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a,
+                                    const Eigen::Vector3d& centre_b, const Eigen::Vector3d& ray_b) {
   const double ab = ray_a.dot(ray_b);
   const double denominator = 1.0 - ab * ab;
   if (denominator < 1e-9) return std::nullopt;
@@ -34,8 +34,9 @@ void PointCreationOptions::check() const {
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "greater than 0");
 }
 
-std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
-                                            double scale_factor, const PointCreationOptions& options) {
+std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera,
+                                            const SensorNoise& noise, double scale_factor,
+                                            const PointCreationOptions& options) {
   std::vector<PointId> made;
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
   const double most_cosine = std::cos(options.least_parallax_deg * M_PI / 180);
@@ -78,7 +79,8 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       if (best_b < 0) continue;
       const Keypoint& kb = b.features->keypoints[static_cast<size_t>(best_b)];
       const Eigen::Vector3d world_ray_a = (world_from_a.rotation * ray_a).normalized();
-      const Eigen::Vector3d world_ray_b = (world_from_b.rotation * camera.unproject(kb.pixel.cast<double>(), 1.0)).normalized();
+      const Eigen::Vector3d world_ray_b =
+          (world_from_b.rotation * camera.unproject(kb.pixel.cast<double>(), 1.0)).normalized();
       if (world_ray_a.dot(world_ray_b) > most_cosine) continue;
       const auto point = meet(world_from_a.translation, world_ray_a, world_from_b.translation, world_ray_b);
       if (!point) continue;
@@ -86,14 +88,16 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
         const double sigma = noise.corner_sigma(k.octave, scale_factor);
-        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma) return false;
+        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma)
+          return false;
         return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < 3 * noise.depth_sigma(k.depth);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;
       found.push_back({static_cast<int>(fa), best_b, best, *point});
     }
     // One new point per feature of b: the best match takes it.
-    std::stable_sort(found.begin(), found.end(), [](const Found& x, const Found& y) { return x.distance < y.distance; });
+    std::stable_sort(found.begin(), found.end(),
+                     [](const Found& x, const Found& y) { return x.distance < y.distance; });
     const KeyframeId id_b = neighbours[n].keyframe;
     for (const Found& f : found) {
       if (map.keyframe(id_b)->points[static_cast<size_t>(f.feature_b)] != kNoPoint) continue;

@@ -19,6 +19,18 @@ std::vector<Detection> detections_of(const auto& carried) {
   return boxes;
 }
 
+// Score of the motion segmentation below which a cell was seen to stand still; it runs from -3 to 3.
+constexpr float kStill = -0.3f;
+
+// What was seen to stand still before the object came is no part of it.
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
+  for (int y = 0; y < mask.cells.height(); ++y)
+    for (int x = 0; x < mask.cells.width(); ++x) {
+      const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;
+      if (score.contains(sx, sy) && score(sx, sy) < kStill) mask.cells(x, y) = 0;
+    }
+}
+
 float depth_near(const DepthImage& depth, float x, float y) {
   const int ix = static_cast<int>(x + 0.5f), iy = static_cast<int>(y + 0.5f);
   return depth.contains(ix, iy) ? depth(ix, iy) : 0.0f;
@@ -36,19 +48,32 @@ void DynamicsOptions::check() const {
   carry.check();
   require_option(points_per_box >= 4, "dynamics.points_per_box", points_per_box, "at least 4");
   require_option(points_outside >= 20, "dynamics.points_outside", points_outside, "at least 20");
+  require_option(support_cell >= 2 && support_cell <= 32, "dynamics.support_cell", support_cell, "2 ... 32 px");
   require_option(missed_results >= 0, "dynamics.missed_results", missed_results, "at least 0");
 }
 
 DynamicStage::DynamicStage(const CameraModel& camera, const DynamicsOptions& options, DetectorSet detectors)
-    : camera_(camera), options_(options), flow_(options.flow), schedule_(detectors.schedule), prompt_(std::move(detectors.prompt)) {
+    : camera_(camera),
+      options_(options),
+      flow_(options.flow),
+      schedule_(detectors.schedule),
+      prompt_(std::move(detectors.prompt)) {
   options_.check();
   schedule_.check();
-  if (detectors.motion) motion_.emplace(camera, options_.motion);
+  segments_motion_ = detectors.motion;
+  // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
+  const bool supports = options_.filter == FilterKind::standard && (detectors.slow != nullptr || !prompt_.empty());
+  if (!detectors.motion) options_.motion.cell = options_.support_cell;
+  if (detectors.motion || supports) motion_.emplace(camera, options_.motion);
   if (detectors.slow) slow_ = std::make_unique<DetectionThread>(std::move(detectors.slow), schedule_);
 }
 
 void DynamicStage::commit(const std::optional<Rigid3>& cam_from_world) {
   if (motion_ && options_.filter != FilterKind::none) motion_->commit(cam_from_world);
+}
+
+void DynamicStage::move_world(const Rigid3& new_world_from_old_world) {
+  if (motion_) motion_->move_world(new_world_from_old_world);
 }
 
 void DynamicStage::note_keyframe() {
@@ -82,9 +107,10 @@ void DynamicStage::mark_keyframes(const PastFrame& source, const Detections& det
     if (!p.keyframe) continue;
     Detections there = detections;
     if (p.frame != source.frame)
-      there = carry(detections, follow(source, *p.pyramid, detections.boxes), std::abs(p.frame - source.frame), camera_.width,
-                    camera_.height, options_.carry);
+      there = carry(detections, follow(source, *p.pyramid, detections.boxes), std::abs(p.frame - source.frame),
+                    camera_.width, camera_.height, options_.carry);
     late_.push_back({p.frame, silhouettes(p.image->depth, there.boxes, options_.silhouette)});
+    if (!p.score.empty()) clear_still(late_.back().mask, p.score, options_.motion.cell);
   }
 }
 
@@ -96,9 +122,10 @@ void DynamicStage::receive(const Context& context, const std::shared_ptr<const I
     Detections now = due.detections;
     if (source != nullptr) {
       // Keyframes since the last detection may have let people into the map meanwhile.
-      if (options_.filter == FilterKind::standard && !due.detections.boxes.empty()) mark_keyframes(*source, due.detections);
-      now = carry(due.detections, follow(*source, *pyramid, due.detections.boxes), context.frame - due.frame, camera_.width,
-                  camera_.height, options_.carry);
+      if (options_.filter == FilterKind::standard && !due.detections.boxes.empty())
+        mark_keyframes(*source, due.detections);
+      now = carry(due.detections, follow(*source, *pyramid, due.detections.boxes), context.frame - due.frame,
+                  camera_.width, camera_.height, options_.carry);
     }
     std::vector<Carried> next;
     for (const Detection& d : now.boxes) next.push_back({d, 0});
@@ -113,7 +140,8 @@ void DynamicStage::receive(const Context& context, const std::shared_ptr<const I
   }
 }
 
-std::vector<FilterFeature> DynamicStage::describe(const Context& context, const ImagePyramid& pyramid, bool with_flow) const {
+std::vector<FilterFeature> DynamicStage::describe(const Context& context, const ImagePyramid& pyramid,
+                                                  bool with_flow) const {
   const auto& corners = context.orb->corners;
   std::vector<FilterFeature> features(corners.size());
   std::vector<Eigen::Vector2f> points(corners.size());
@@ -139,8 +167,8 @@ std::vector<FilterFeature> DynamicStage::describe(const Context& context, const 
 
 // DKB section 3.1, with our decision: the motion comes from points outside all boxes; too few of them, or too lopsided,
 // and it comes from all points by RANSAC around the motion model's.
-Rigid3 DynamicStage::own_motion(const std::vector<FilterFeature>& features, const Rigid3& expected) const {
-  const auto boxes = detections_of(carried_);
+Rigid3 DynamicStage::own_motion(const std::vector<FilterFeature>& features, const std::vector<Detection>& boxes,
+                                const Rigid3& expected) const {
   const auto box = box_of_each(features, boxes);
   const auto observe = [&](bool outside_only) {
     std::vector<PoseObservation> observations;
@@ -214,10 +242,10 @@ DynamicScene DynamicStage::process(const Context& context) {
   MoverMask moving;
   if (motion_) {
     const Stopwatch segmenting;
-    moving = motion_->segment(context.image, context.cam_from_world);
+    moving = motion_->segment(*context.image, context.cam_from_world);
     times_.add("motion", segmenting.ms());
     // The other filters know boxes only.
-    if (options_.filter != FilterKind::standard && !moving.empty())
+    if (options_.filter != FilterKind::standard && segments_motion_ && !moving.empty())
       for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
         const float c = static_cast<float>(moving.cell);
         scene.boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
@@ -229,28 +257,40 @@ DynamicScene DynamicStage::process(const Context& context) {
 
   watch = Stopwatch();
   switch (options_.filter) {
-    case FilterKind::none: break;
-    case FilterKind::box: scene.dynamic = box_filter(features, scene.boxes); break;
+    case FilterKind::none:
+      break;
+    case FilterKind::box:
+      scene.dynamic = box_filter(features, scene.boxes);
+      break;
     case FilterKind::epipolar:
-      scene.dynamic = epipolar_filter(features, scene.boxes, camera_, own_motion(features, context.current_from_previous), options_.epipolar);
+      scene.dynamic =
+          epipolar_filter(features, scene.boxes, camera_,
+                          own_motion(features, scene.boxes, context.current_from_previous), options_.epipolar);
       break;
     case FilterKind::paper:
-      scene.dynamic = paper_filter(features, scene.boxes, camera_, own_motion(features, context.current_from_previous), options_.paper);
+      scene.dynamic = paper_filter(features, scene.boxes, camera_,
+                                   own_motion(features, scene.boxes, context.current_from_previous), options_.paper);
       break;
     case FilterKind::multiview:
-      scene.dynamic = multiview_filter(features, context.keyframe_points_in_camera, camera_, context.image->depth, options_.multiview);
+      scene.dynamic = multiview_filter(features, context.keyframe_points_in_camera, camera_, context.image->depth,
+                                       options_.multiview);
       break;
     case FilterKind::standard:
       scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
+      if (motion_) clear_still(scene.mask, motion_->score(), moving.cell);
       unite(scene.mask, given, camera_.width, camera_.height);
-      unite(scene.mask, moving, camera_.width, camera_.height);
+      if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
       scene.dynamic = mask_filter(features, scene.mask);
       break;
   }
   times_.add("filter", watch.ms());
 
   if (pyramid) {
-    PastFrame now{context.frame, context.image, pyramid, {}};
+    PastFrame now;
+    now.frame = context.frame;
+    now.image = context.image;
+    now.pyramid = pyramid;
+    if (motion_) now.score = motion_->score();
     for (const Corner& c : context.orb->corners) now.corners.emplace_back(c.x, c.y);
     past_.push_back(std::move(now));
     const size_t kept = slow_ ? static_cast<size_t>(schedule_.latency + schedule_.every) + 1 : 1;
@@ -259,20 +299,30 @@ DynamicScene DynamicStage::process(const Context& context) {
   return scene;
 }
 
-std::vector<LateMask> DynamicStage::take_late_masks() { return std::exchange(late_, {}); }
+std::vector<LateMask> DynamicStage::take_late_masks() {
+  return std::exchange(late_, {});
+}
 
-std::optional<std::string> DynamicStage::take_warning() { return slow_ ? slow_->take_error() : std::nullopt; }
+std::optional<std::string> DynamicStage::take_warning() {
+  return slow_ ? slow_->take_error() : std::nullopt;
+}
 
 std::string DynamicStage::detector_kind() const {
   std::string kind = slow_ ? slow_->stats().kind : "";
-  if (motion_) kind += kind.empty() ? "motion" : "+motion";
+  if (segments_motion_) kind += kind.empty() ? "motion" : "+motion";
   for (const auto& d : prompt_) kind += (kind.empty() ? "" : "+") + d->kind();
   return kind.empty() ? "none" : kind;
 }
 
-double DynamicStage::detector_rate_hz() const { return slow_ ? slow_->stats().rate_hz : 0; }
-int DynamicStage::detector_latency() const { return slow_ ? slow_->stats().latency_frames : 0; }
-StageTimes DynamicStage::detector_times() const { return slow_ ? slow_->times() : StageTimes(); }
+double DynamicStage::detector_rate_hz() const {
+  return slow_ ? slow_->stats().rate_hz : 0;
+}
+int DynamicStage::detector_latency() const {
+  return slow_ ? slow_->stats().latency_frames : 0;
+}
+StageTimes DynamicStage::detector_times() const {
+  return slow_ ? slow_->times() : StageTimes();
+}
 void DynamicStage::stop() {
   if (slow_) slow_->stop();
 }

@@ -32,9 +32,10 @@ struct DynamicsOptions {
   MotionOptions motion;
   OpticalFlowOptions flow;
   CarryOptions carry;
-  int points_per_box = 80;        // features followed to carry a box, >= 4
-  int points_outside = 200;       // features outside the boxes that tell the camera's own motion, >= 20
-  int missed_results = 2;         // detector results that may miss an object before its box is dropped, >= 0
+  int support_cell = 8;      // [px] cells of the motion segmentation when it only supports another detector, 2 ... 32
+  int points_per_box = 40;   // features followed to carry a box, >= 4
+  int points_outside = 200;  // features outside the boxes that tell the camera's own motion, >= 20
+  int missed_results = 2;    // detector results that may miss an object before its box is dropped, >= 0
   void check() const;
 };
 
@@ -48,9 +49,9 @@ struct DetectorSet {
 
 // What is known of movers in the current image.
 struct DynamicScene {
-  std::vector<uint8_t> dynamic;   // per corner: 1 = must not be used
-  std::vector<Detection> boxes;   // in the current image
-  MoverMask mask;                 // where movers are (filter `standard` only)
+  std::vector<uint8_t> dynamic;  // per corner: 1 = must not be used
+  std::vector<Detection> boxes;  // in the current image
+  MoverMask mask;                // where movers are (filter `standard` only)
 };
 
 // A silhouette that came too late for the frame it belongs to.
@@ -59,8 +60,8 @@ struct LateMask {
   MoverMask mask;
 };
 
-// The filter stage (DKB section 3.1): detections made beside tracking are carried to the current image by flow; the chosen
-// filter then says which corners move. Deterministic.
+// The filter stage (DKB section 3.1): detections made beside tracking are carried to the current image by flow; the
+// chosen filter then says which corners move. Deterministic.
 class DynamicStage {
  public:
   DynamicStage(const CameraModel& camera, const DynamicsOptions& options, DetectorSet detectors);
@@ -71,15 +72,18 @@ class DynamicStage {
     std::shared_ptr<const RgbdImage> image;
     const OrbFeatures* orb = nullptr;
     const UndistortionTable* undistort = nullptr;
-    Rigid3 current_from_previous;                     // expected motion of the camera
-    Rigid3 cam_from_world;                            // expected pose
-    std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes, expected pose
+    Rigid3 current_from_previous;  // expected motion of the camera
+    Rigid3 cam_from_world;         // expected pose
+    std::vector<Eigen::Vector3d>
+        keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes, expected pose
   };
   // Hands the image to the detector and waits for what is due at this frame (a real-time run waits only for the first).
   void begin_frame(FrameIndex frame, std::shared_ptr<const RgbdImage> image);
   DynamicScene process(const Context& context);
   // After tracking: the pose of the frame just processed; nothing when lost.
   void commit(const std::optional<Rigid3>& cam_from_world);
+  // The map was corrected.
+  void move_world(const Rigid3& new_world_from_old_world);
   // The frame just processed became a keyframe: its silhouette is given again once its own detections are in.
   void note_keyframe();
 
@@ -103,13 +107,16 @@ class DynamicStage {
     std::shared_ptr<const RgbdImage> image;
     std::shared_ptr<const ImagePyramid> pyramid;
     std::vector<Eigen::Vector2f> corners;  // image pixels
+    Image<float> score;                    // of the motion segmentation; empty without it
     bool keyframe = false;
   };
-  std::vector<PointMotion> follow(const PastFrame& from, const ImagePyramid& to, const std::vector<Detection>& boxes) const;
+  std::vector<PointMotion> follow(const PastFrame& from, const ImagePyramid& to,
+                                  const std::vector<Detection>& boxes) const;
   void mark_keyframes(const PastFrame& source, const Detections& detections);
   void receive(const Context& context, const std::shared_ptr<const ImagePyramid>& pyramid);
   std::vector<FilterFeature> describe(const Context& context, const ImagePyramid& pyramid, bool with_flow) const;
-  Rigid3 own_motion(const std::vector<FilterFeature>& features, const Rigid3& expected) const;
+  Rigid3 own_motion(const std::vector<FilterFeature>& features, const std::vector<Detection>& boxes,
+                    const Rigid3& expected) const;
 
   CameraModel camera_;
   DynamicsOptions options_;
@@ -118,13 +125,14 @@ class DynamicStage {
   std::unique_ptr<DetectionThread> slow_;
   std::vector<std::unique_ptr<Detector>> prompt_;
   std::optional<MotionSegmenter> motion_;
-  std::deque<PastFrame> past_;         // newest last; as many as the detector's latency needs
+  bool segments_motion_ = false;  // as a detector of its own
+  std::deque<PastFrame> past_;    // newest last; as many as the detector's latency needs
   struct Carried {
     Detection detection;
     int missed = 0;
   };
-  std::vector<DueDetections> due_;     // results to be worked in at this frame
-  std::vector<Carried> carried_;       // boxes of the slow detector in the newest image
+  std::vector<DueDetections> due_;  // results to be worked in at this frame
+  std::vector<Carried> carried_;    // boxes of the slow detector in the newest image
   std::vector<LateMask> late_;
   StageTimes times_;
 };

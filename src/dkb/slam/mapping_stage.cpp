@@ -9,14 +9,17 @@ namespace {
 constexpr size_t kSlots = 1024;
 }  // namespace
 
-MappingStage::MappingStage(LocalMapper mapper, bool threaded) : mapper_(std::move(mapper)), packets_(kSlots), views_(kSlots) {
+MappingStage::MappingStage(LocalMapper mapper, bool threaded)
+    : mapper_(std::move(mapper)), packets_(kSlots), views_(kSlots) {
   if (threaded)
     thread_ = std::thread([this] {
       while (auto packet = packets_.pop()) views_.push(mapper_.process(*packet));
     });
 }
 
-MappingStage::~MappingStage() { stop(); }
+MappingStage::~MappingStage() {
+  stop();
+}
 
 void MappingStage::push(KeyframePacket packet, FrameIndex due) {
   due_.push_back(due);
@@ -37,7 +40,9 @@ std::optional<MapView> MappingStage::take_due(FrameIndex now, bool wait) {
   return newest;
 }
 
-std::optional<MapView> MappingStage::drain() { return take_due(std::numeric_limits<FrameIndex>::max(), true); }
+std::optional<MapView> MappingStage::drain() {
+  return take_due(std::numeric_limits<FrameIndex>::max(), true);
+}
 
 void MappingStage::stop() {
   packets_.close();

@@ -11,8 +11,8 @@
 
 namespace dkb {
 
-// Runs the mapper beside tracking. What becomes of keyframe k is visible at a fixed later frame (logical time), so results
-// do not depend on how fast either thread is. Without a thread the same work is done inside push().
+// Runs the mapper beside tracking. What becomes of keyframe k is visible at a fixed later frame (logical time), so
+// results do not depend on how fast either thread is. Without a thread the same work is done inside push().
 class MappingStage {
  public:
   MappingStage(LocalMapper mapper, bool threaded);

@@ -20,6 +20,7 @@ void SlamOptions::check() const {
   mapping.check();
   dynamics.check();
   evidence.check();
+  movers.check();
   pipeline.check();
 }
 
@@ -28,13 +29,14 @@ SlamOptions preset(const std::string& name) {
   SlamOptions o;
   if (name == "default") return o;
   if (name != "paper" && name != "orb")
-    throw InputError("--preset: there is no preset \"" + name + "\"" + did_you_mean(name, names) + "; presets: default, paper, orb");
+    throw InputError("--preset: there is no preset \"" + name + "\"" + did_you_mean(name, names) +
+                     "; presets: default, paper, orb");
   // What the paper does not have: the camera's own motion within an image and between images.
   o.depth.model_rolling_shutter = false;
   o.depth.model_time_offset = false;
   o.dynamics.filter = FilterKind::paper;
   o.keyframe_policy = KeyframePolicyKind::adaptive;
-  o.adaptive_keyframes.visibility_levels = 4;
+  o.adaptive_keyframes = paper_keyframe_options();
   if (name == "orb") disable_parts(o, {.dynamic_removal = true, .keyframes = true, .weighted_ba = true});
   return o;
 }
@@ -52,19 +54,22 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("features.levels", &o.features.levels, "pyramid levels");
   s.bind("features.scale", &o.features.scale, "size of a pyramid level over the next smaller one");
   s.bind("features.fast_threshold", &o.features.fast_threshold, "[grey levels] corner threshold");
-  s.bind("features.fast_threshold_min", &o.features.fast_threshold_min, "[grey levels] threshold of cells without corners");
+  s.bind("features.fast_threshold_min", &o.features.fast_threshold_min,
+         "[grey levels] threshold of cells without corners");
   s.bind("features.subpixel", &o.features.subpixel, "refine corners below the pixel");
 
   s.bind("depth.edge_fraction", &o.depth.edge_fraction, "[1] depth step in a 3 x 3 window that voids a depth");
   s.bind("depth.model_time_offset", &o.depth.model_time_offset, "carry depths to the colour image's time");
 
-  s.bind("depth.model_rolling_shutter", &o.depth.model_rolling_shutter, "undo the rolling shutter (needs the camera's readout)");
+  s.bind("depth.model_rolling_shutter", &o.depth.model_rolling_shutter,
+         "undo the rolling shutter (needs the camera's readout)");
 
   s.bind("noise.pixel_sigma", &o.noise.pixel_sigma, "[px] of a corner on the finest level");
   s.bind("noise.scale_exponent", &o.noise.scale_exponent, "growth of that with the level's scale");
   s.bind("noise.depth_sigma_base", &o.noise.depth_sigma_base, "[m] depth noise at 0.4 m");
   s.bind("noise.depth_sigma_quadratic", &o.noise.depth_sigma_quadratic, "[1/m] growth with (z - 0.4 m)^2");
-  s.bind("noise.depth_sigma_factor", &o.noise.depth_sigma_factor, "factor on both for edges, registration, calibration");
+  s.bind("noise.depth_sigma_factor", &o.noise.depth_sigma_factor,
+         "factor on both for edges, registration, calibration");
 
   TrackingOptions& t = o.tracking;
   s.bind("tracking.initial_points", &t.initial_points, "features with depth that the first frame needs");
@@ -78,11 +83,14 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.radius_local_map", &t.radius_local_map, "[px] search for local map points");
   s.bind("tracking.match_distance", &t.match_distance, "[bits] of a match with a map point");
   s.bind("tracking.match_ratio", &t.match_ratio, "best over second best distance of such a match");
-  s.bind("tracking.established_frames", &t.established_frames, "[frames] since its birth before a point may be found where a mover is");
+  s.bind("tracking.established_frames", &t.established_frames,
+         "[frames] since its birth before a point may be found where a mover is");
   s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
   s.bind("tracking.recovery_keyframes", &t.recovery_keyframes, "newest keyframes that a lost tracker tries");
-  s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes, "keyframes that share most points with the frame");
-  s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each, "covisible keyframes added for each");
+  s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes,
+         "keyframes that share most points with the frame");
+  s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each,
+         "covisible keyframes added for each");
   s.bind("tracking.local_map.keyframes", &t.local_map.keyframes, "keyframes of the local map, at most");
 
   s.bind("keyframes.policy", &o.keyframe_policy,
@@ -90,12 +98,16 @@ void bind_settings(Settings& s, SlamOptions& o) {
          "who decides that a frame becomes a keyframe");
   AdaptiveKeyframeOptions& a = o.adaptive_keyframes;
   s.bind("keyframes.window", &a.parallax.window, "[frames] parallaxes averaged (DKB eqs. 17, 18)");
-  s.bind("keyframes.threshold_min", &a.parallax.threshold_min, "parallax that opens the gate in fast motion (DKB eq. 25)");
+  s.bind("keyframes.threshold_min", &a.parallax.threshold_min,
+         "parallax that opens the gate in fast motion (DKB eq. 25)");
   s.bind("keyframes.threshold_max", &a.parallax.threshold_max, "the same at rest");
   s.bind("keyframes.rotation_max", &a.parallax.rotation_max, "[deg] Theta_max (DKB eq. 24)");
   s.bind("keyframes.translation_max", &a.parallax.translation_max, "[unit] t_max (DKB eq. 24)");
   s.bind("keyframes.translation_unit", &a.parallax.translation_unit,
-         {{"metre", TranslationUnit::metre}, {"centimetre", TranslationUnit::centimetre}}, "of translations in the gate");
+         {{"metre", TranslationUnit::metre},
+          {"centimetre", TranslationUnit::centimetre},
+          {"depth_percent", TranslationUnit::depth_percent}},
+         "of translations in the gate");
   s.bind("keyframes.similarity", &a.similarity, {{"printed", Similarity::printed}, {"pks", Similarity::pks}},
          "S as the paper prints it or as its source has it (DKB eq. 34)");
   s.bind("keyframes.normals", &a.normals, {{"oriented", NormalSum::oriented}, {"plain", NormalSum::plain}},
@@ -105,26 +117,33 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("keyframes.floor_least_tracked", &a.floor_least_tracked, "[points] fewer make a keyframe whatever the votes");
   s.bind("keyframes.floor_few_close", &a.floor_few_close, "[points] fewer tracked close points ...");
   s.bind("keyframes.floor_many_creatable", &a.floor_many_creatable, "[points] ... with so many to be made do so too");
-  s.bind("keyframes.floor_reference_ratio", &a.floor_reference_ratio, "likewise a smaller share of the reference's points");
+  s.bind("keyframes.floor_reference_ratio", &a.floor_reference_ratio,
+         "likewise a smaller share of the reference's points");
+  s.bind("keyframes.floor_kept_ratio", &a.floor_kept_ratio, "or of the points tracked right after the last keyframe");
 
   BaselineKeyframeOptions& b = o.baseline_keyframes;
   s.bind("keyframes.baseline.frames_between", &b.frames_between, "[frames] longest wait while mapping is busy");
   s.bind("keyframes.baseline.least_tracked", &b.least_tracked, "[points] fewer make no keyframe");
-  s.bind("keyframes.baseline.reference_ratio", &b.reference_ratio, "share of the reference's points below which a keyframe is due");
+  s.bind("keyframes.baseline.reference_ratio", &b.reference_ratio,
+         "share of the reference's points below which a keyframe is due");
   s.bind("keyframes.baseline.few_close", &b.few_close, "[points] fewer tracked close points ...");
-  s.bind("keyframes.baseline.many_creatable", &b.many_creatable, "[points] ... with so many to be made call for a keyframe");
+  s.bind("keyframes.baseline.many_creatable", &b.many_creatable,
+         "[points] ... with so many to be made call for a keyframe");
 
   MappingOptions& m = o.mapping;
   s.bind("mapping.least_shared_points", &m.least_shared_points, "[points] that make two keyframes covisible");
   s.bind("mapping.least_found_ratio", &m.least_found_ratio, "found / visible below which a young point is dropped");
   s.bind("mapping.probation_keyframes", &m.probation_keyframes, "[keyframes] that a point is on probation");
   s.bind("mapping.least_observers", &m.least_observers, "keyframes that must see a point by then");
-  s.bind("mapping.redundant_share", &m.redundant_share, "share of points seen elsewhere that makes a keyframe redundant");
+  s.bind("mapping.redundant_share", &m.redundant_share,
+         "share of points seen elsewhere that makes a keyframe redundant");
   s.bind("mapping.redundant_observers", &m.redundant_observers, "by at least so many other keyframes");
-  s.bind("mapping.fusion_keyframes", &m.fusion_keyframes, "covisible keyframes whose points are fused with a new one's");
+  s.bind("mapping.fusion_keyframes", &m.fusion_keyframes,
+         "covisible keyframes whose points are fused with a new one's");
   s.bind("mapping.fusion_radius", &m.fusion_radius, "[px] search for the same point");
   s.bind("mapping.creation.neighbours", &m.creation.neighbours, "covisible keyframes to triangulate with");
-  s.bind("mapping.creation.least_parallax_deg", &m.creation.least_parallax_deg, "[deg] between the rays of a new point");
+  s.bind("mapping.creation.least_parallax_deg", &m.creation.least_parallax_deg,
+         "[deg] between the rays of a new point");
   s.bind("mapping.creation.max_distance", &m.creation.max_distance, "[bits] of an epipolar match");
   s.bind("mapping.creation.chi2_epipolar", &m.creation.chi2_epipolar, "squared epipolar distance over sigma^2");
   s.bind("mapping.creation.chi2_pixel", &m.creation.chi2_pixel, "squared reprojection error over sigma^2");
@@ -138,8 +157,12 @@ void bind_settings(Settings& s, SlamOptions& o) {
 
   DynamicsOptions& d = o.dynamics;
   s.bind("dynamics.filter", &d.filter,
-         {{"none", FilterKind::none}, {"box", FilterKind::box}, {"epipolar", FilterKind::epipolar}, {"multiview", FilterKind::multiview},
-          {"paper", FilterKind::paper}, {"default", FilterKind::standard}},
+         {{"none", FilterKind::none},
+          {"box", FilterKind::box},
+          {"epipolar", FilterKind::epipolar},
+          {"multiview", FilterKind::multiview},
+          {"paper", FilterKind::paper},
+          {"default", FilterKind::standard}},
          "which features are kept from tracking");
   s.bind("dynamics.paper.flow_threshold", &d.paper.flow_threshold, "[px] d_th (DKB eq. 9)");
   s.bind("dynamics.paper.compensate", &d.paper.compensate, "flow against the camera's own motion; false = raw eq. 9");
@@ -149,18 +172,23 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.multiview.keyframes", &d.multiview.keyframes, "earlier keyframes compared");
   s.bind("dynamics.silhouette.cell", &d.silhouette.cell, "[px] grid on which depth is looked at");
   s.bind("dynamics.silhouette.core", &d.silhouette.core, "share of a box in which the object is sought");
-  s.bind("dynamics.silhouette.least_share", &d.silhouette.least_share, "of the core's weight that the object's depth layer needs");
+  s.bind("dynamics.silhouette.least_share", &d.silhouette.least_share,
+         "of the core's weight that the object's depth layer needs");
   s.bind("dynamics.silhouette.layer", &d.silhouette.layer, "half-width of that layer relative to its depth");
   s.bind("dynamics.silhouette.step", &d.silhouette.step, "relative depth step within one surface");
   s.bind("dynamics.silhouette.reach", &d.silhouette.reach, "[m] parts of an object before or behind its layer");
   s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
   s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
+  s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
+  s.bind("dynamics.support_cell", &d.support_cell, "[px] the same when it only supports another detector");
   s.bind("dynamics.flow.window", &d.flow.window, "[px] of optical flow");
   s.bind("dynamics.points_per_box", &d.points_per_box, "features followed to carry a box");
-  s.bind("dynamics.missed_results", &d.missed_results, "detector results that may miss an object before its box is dropped");
+  s.bind("dynamics.missed_results", &d.missed_results,
+         "detector results that may miss an object before its box is dropped");
   s.bind("dynamics.evidence_sightings", &o.evidence.sightings, "times on a mover before a map point is retracted");
 
-  s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency, "[frames] after which a keyframe's mapping becomes visible");
+  s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency,
+         "[frames] after which a keyframe's mapping becomes visible");
   s.bind("pipeline.mapper_queue", &o.pipeline.mapper_queue, "[keyframes] outstanding at most in a real-time run");
 }
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "dkb/dynamics/mover_tracker.h"
+#include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
@@ -11,19 +13,18 @@
 #include "dkb/keyframes/adaptive_policy.h"
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
-#include "dkb/tracking/tracker.h"
-#include "dkb/dynamics/point_evidence.h"
 #include "dkb/slam/dynamic_stage.h"
+#include "dkb/tracking/tracker.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
 
 // How the stages run. None of it changes a dataset run's result, except mapper_latency.
 struct PipelineOptions {
-  bool threaded = true;      // mapping on its own thread; false: the same bytes from one thread
-  bool realtime = false;     // never wait for mapping; take its results when they are there
-  int mapper_latency = 2;    // [frames] after which a keyframe's mapping becomes visible to tracking, >= 1
-  int mapper_queue = 4;      // [keyframes] outstanding at most in a real-time run, >= 1
+  bool threaded = true;    // mapping on its own thread; false: the same bytes from one thread
+  bool realtime = false;   // never wait for mapping; take its results when they are there
+  int mapper_latency = 2;  // [frames] after which a keyframe's mapping becomes visible to tracking, >= 1
+  int mapper_queue = 4;    // [keyframes] outstanding at most in a real-time run, >= 1
   void check() const;
 };
 
@@ -34,15 +35,16 @@ struct SlamOptions {
   DepthOptions depth;
   SensorNoise noise;
   TrackingOptions tracking;
-  KeyframePolicyKind keyframe_policy = KeyframePolicyKind::baseline;
+  KeyframePolicyKind keyframe_policy = KeyframePolicyKind::adaptive;
   AdaptiveKeyframeOptions adaptive_keyframes;
   BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
   DynamicsOptions dynamics;
   PointEvidenceOptions evidence;
+  MoverTrackerOptions movers;
   PipelineOptions pipeline;
-  uint64_t seed = 1;         // reaches every source of randomness
-  Rigid3 base_from_cam;      // mount: the world is the robot's base at the first tracked frame
+  uint64_t seed = 1;     // reaches every source of randomness
+  Rigid3 base_from_cam;  // mount: the world is the robot's base at the first tracked frame
 
   void check() const;
 };

@@ -12,10 +12,14 @@ namespace dkb {
 
 const char* name_of(FeatureState state) {
   switch (state) {
-    case FeatureState::used: return "used";
-    case FeatureState::outlier: return "outlier";
-    case FeatureState::dynamic: return "dynamic";
-    case FeatureState::unused: break;
+    case FeatureState::used:
+      return "used";
+    case FeatureState::outlier:
+      return "outlier";
+    case FeatureState::dynamic:
+      return "dynamic";
+    case FeatureState::unused:
+      break;
   }
   return "unused";
 }
@@ -47,8 +51,9 @@ class SlamSystem::Impl {
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<MappingStage> mapping_;
   DynamicStage dynamics_;
-  DynamicScene scene_;               // of the last frame
+  DynamicScene scene_;  // of the last frame
   std::optional<PointEvidence> evidence_;
+  std::optional<MoverTracker> movers_;
 
   // A frame of the trajectory hangs on a keyframe, since the world may still move.
   struct Record {
@@ -65,8 +70,8 @@ class SlamSystem::Impl {
   FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
   Rigid3 world_from_odom_;
   bool localise_only_ = false;
-  std::vector<size_t> kept_;                   // features given to tracking, as indices of all
-  std::vector<uint8_t> suspect_;               // of these, which may move
+  std::vector<size_t> kept_;                    // features given to tracking, as indices of all
+  std::vector<uint8_t> suspect_;                // of these, which may move
   std::vector<FeatureReport> feature_reports_;  // all features of the last frame
   struct RecentKeyframe {
     FrameIndex frame;
@@ -79,6 +84,7 @@ class SlamSystem::Impl {
 
  private:
   void take_map(bool wait);
+  void take_view(const MapView& view);
   void extract(const RgbdImage& image);
   void filter_dynamic(std::shared_ptr<const RgbdImage> image);
   // Index among all extracted features.
@@ -96,13 +102,14 @@ class SlamSystem::Impl {
 void SlamSystem::Impl::start() {
   mapping_.reset();
   const OrbOptions& orb = options_.features;
-  tracker_ = std::make_unique<Tracker>(camera_, options_.noise, orb.scale, orb.levels, options_.tracking, options_.seed);
+  tracker_ =
+      std::make_unique<Tracker>(camera_, options_.noise, orb.scale, orb.levels, options_.tracking, options_.seed);
   if (options_.keyframe_policy == KeyframePolicyKind::adaptive)
     policy_ = std::make_unique<AdaptiveKeyframePolicy>(options_.adaptive_keyframes, camera_.width, camera_.height);
   else
     policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
-  mapping_ = std::make_unique<MappingStage>(LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping),
-                                            options_.pipeline.threaded);
+  mapping_ = std::make_unique<MappingStage>(
+      LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping), options_.pipeline.threaded);
   records_.clear();
   next_frame_ = 0;
   next_keyframe_ = 0;
@@ -112,6 +119,7 @@ void SlamSystem::Impl::start() {
   feature_reports_.clear();
   scene_ = {};
   evidence_.emplace(options_.evidence);
+  movers_.emplace(camera_, options_.movers);
   recent_keyframes_.clear();
   statistics_ = {};
   times_ = {};
@@ -119,7 +127,14 @@ void SlamSystem::Impl::start() {
 
 void SlamSystem::Impl::take_map(bool wait) {
   const auto view = mapping_->take_due(next_frame_, wait);
-  if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
+  if (view) take_view(*view);
+}
+
+void SlamSystem::Impl::take_view(const MapView& view) {
+  const Rigid3 new_world_from_old = tracker_->take_view(view);
+  world_from_odom_ = new_world_from_old * world_from_odom_;
+  dynamics_.move_world(new_world_from_old);
+  movers_->rebase(new_world_from_old);
 }
 
 void SlamSystem::Impl::extract(const RgbdImage& image) {
@@ -162,7 +177,8 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
   OrbFeatures kept;
   suspect_.clear();
   for (size_t i = 0; i < orb_.corners.size(); ++i) {
-    feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y, scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
+    feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y,
+                           scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
     if (scene_.dynamic[i] && !suspects) continue;
     kept_.push_back(i);
     suspect_.push_back(scene_.dynamic[i]);
@@ -201,7 +217,8 @@ void SlamSystem::Impl::weigh_evidence() {
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) return;
     const double surface = depth(x, y);
-    if (std::abs(surface - z) < 0.05 * surface + 0.05 && !std::binary_search(matched.begin(), matched.end(), id)) evidence_->on_mover(id);
+    if (std::abs(surface - z) < 0.05 * surface + 0.05 && !std::binary_search(matched.begin(), matched.end(), id))
+      evidence_->on_mover(id);
   });
   tracker_->retract(evidence_->take_convicted());
 }
@@ -214,7 +231,8 @@ void SlamSystem::Impl::retract_late() {
       std::vector<PointId> points;
       for (size_t f = 0; f < k.features->size(); ++f) {
         const Keypoint& p = k.features->keypoints[f];
-        if (late.mask.at(p.image_pixel.x(), p.image_pixel.y())) points.push_back(make_point_id(k.id, static_cast<int>(f)));
+        if (late.mask.at(p.image_pixel.x(), p.image_pixel.y()))
+          points.push_back(make_point_id(k.id, static_cast<int>(f)));
       }
       tracker_->retract(points);
     }
@@ -224,7 +242,8 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
   const TrackedFrame& frame = outcome.frame;
   if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, ""};
   if (localise_only_) return {};
-  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue) return {};
+  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue)
+    return {};
   KeyframeQuery q;
   q.frame = frame.index;
   q.last_keyframe_frame = last_keyframe_frame_;
@@ -251,12 +270,13 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
 void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
   const KeyframeId id = next_keyframe_++;
   KeyframePacket packet = tracker_->make_keyframe(id, frame);
-  for (const ProvisionalPoint& p : packet.new_points) 
+  for (const ProvisionalPoint& p : packet.new_points)
     feature_reports_[source_feature(frame, static_cast<size_t>(p.feature))].state = FeatureState::used;
   dynamics_.note_keyframe();
   recent_keyframes_.push_back({frame.index, id, frame.features});
   const DetectionSchedule& schedule = dynamics_.schedule();
-  while (recent_keyframes_.front().frame < frame.index - 2 * (schedule.latency + schedule.every)) recent_keyframes_.pop_front();
+  while (recent_keyframes_.front().frame < frame.index - 2 * (schedule.latency + schedule.every))
+    recent_keyframes_.pop_front();
   mapping_->push(std::move(packet), frame.index + options_.pipeline.mapper_latency);
   last_keyframe_frame_ = frame.index;
   frame.reference = id;
@@ -321,10 +341,13 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
     result.world_from_cam = frame.cam_from_world.inverse();
     result.world_from_odom = world_from_odom_;
     result.odom_from_cam = world_from_odom_.inverse() * result.world_from_cam;
+    if (options_.dynamics.filter == FilterKind::standard)
+      result.movers = movers_->update(image.timestamp, image.depth, scene_.mask, scene_.boxes, result.world_from_cam);
     result.covariance = frame.covariance;
     result.inliers = frame.inliers;
     result.reference = frame.reference;
-    records_.push_back({frame.index, frame.timestamp, frame.reference, frame.cam_from_reference, result.world_from_cam});
+    records_.push_back(
+        {frame.index, frame.timestamp, frame.reference, frame.cam_from_reference, result.world_from_cam});
     ++statistics_.tracked;
   } else if (outcome.state == TrackingState::lost) {
     ++statistics_.lost;
@@ -338,14 +361,16 @@ void SlamSystem::Impl::finish() {
   KeyframePacket report = tracker_->make_report();
   if (next_keyframe_ > 0) mapping_->push(std::move(report), next_frame_);
   const auto view = mapping_->drain();
-  if (view) world_from_odom_ = tracker_->take_view(*view).inverse() * world_from_odom_;
+  if (view) take_view(*view);
 }
 
 SlamSystem::SlamSystem(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
     : impl_(std::make_unique<Impl>(camera, options, std::move(detectors))) {}
 SlamSystem::~SlamSystem() = default;
 
-FrameResult SlamSystem::process(std::shared_ptr<const RgbdImage> image) { return impl_->process(std::move(image)); }
+FrameResult SlamSystem::process(std::shared_ptr<const RgbdImage> image) {
+  return impl_->process(std::move(image));
+}
 
 FrameResult SlamSystem::process(double timestamp, const uint8_t* colour, int channels, const uint16_t* depth) {
   if (channels != 1 && channels != 3) throw InputError("frame: colour images have 1 or 3 channels");
@@ -367,14 +392,21 @@ FrameResult SlamSystem::process(double timestamp, const uint8_t* colour, int cha
   return impl_->process(std::move(image));
 }
 
-void SlamSystem::finish() { impl_->finish(); }
-void SlamSystem::reset() { impl_->start(); }
-void SlamSystem::set_localise_only(bool on) { impl_->localise_only_ = on; }
+void SlamSystem::finish() {
+  impl_->finish();
+}
+void SlamSystem::reset() {
+  impl_->start();
+}
+void SlamSystem::set_localise_only(bool on) {
+  impl_->localise_only_ = on;
+}
 
 std::vector<TrajectoryFrame> SlamSystem::trajectory() const {
   std::vector<TrajectoryFrame> result;
   for (const auto& r : impl_->records_)
-    result.push_back({r.frame, r.timestamp, (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse()});
+    result.push_back(
+        {r.frame, r.timestamp, (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse()});
   return result;
 }
 
@@ -394,13 +426,27 @@ std::vector<TrajectoryFrame> SlamSystem::keyframes() const {
   return result;
 }
 
-MapView SlamSystem::map() const { return impl_->tracker_->shared_view(); }
-const std::vector<FeatureReport>& SlamSystem::features() const { return impl_->feature_reports_; }
-const MoverMask& SlamSystem::mover_mask() const { return impl_->scene_.mask; }
-const std::vector<Detection>& SlamSystem::detections() const { return impl_->scene_.boxes; }
-std::optional<std::string> SlamSystem::take_warning() { return impl_->dynamics_.take_warning(); }
-const CameraModel& SlamSystem::camera() const { return impl_->camera_; }
-const SlamOptions& SlamSystem::options() const { return impl_->options_; }
+MapView SlamSystem::map() const {
+  return impl_->tracker_->shared_view();
+}
+const std::vector<FeatureReport>& SlamSystem::features() const {
+  return impl_->feature_reports_;
+}
+const MoverMask& SlamSystem::mover_mask() const {
+  return impl_->scene_.mask;
+}
+const std::vector<Detection>& SlamSystem::detections() const {
+  return impl_->scene_.boxes;
+}
+std::optional<std::string> SlamSystem::take_warning() {
+  return impl_->dynamics_.take_warning();
+}
+const CameraModel& SlamSystem::camera() const {
+  return impl_->camera_;
+}
+const SlamOptions& SlamSystem::options() const {
+  return impl_->options_;
+}
 
 SlamStatistics SlamSystem::statistics() const {
   SlamStatistics s = impl_->statistics_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dkb/dynamics/mover.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/map.h"
@@ -19,17 +20,18 @@ namespace dkb {
 // What became of one frame.
 struct FrameResult {
   FrameIndex frame = 0;
-  double timestamp = 0;                // [s]
+  double timestamp = 0;  // [s]
   TrackingState state = TrackingState::initialising;
   // Camera axes: x right, y down, z forward. Valid when tracking or relocalised.
-  Rigid3 world_from_cam;               // world: the first tracked camera (or the robot's base there, see base_from_cam)
-  Rigid3 odom_from_cam;                // smooth: never jumps when the map is corrected; steer by this
-  Rigid3 world_from_odom;              // takes the jumps; world_from_cam = world_from_odom * odom_from_cam
+  Rigid3 world_from_cam;   // world: the first tracked camera (or the robot's base there, see base_from_cam)
+  Rigid3 odom_from_cam;    // smooth: never jumps when the map is corrected; steer by this
+  Rigid3 world_from_odom;  // takes the jumps; world_from_cam = world_from_odom * odom_from_cam
   Matrix6d covariance = Matrix6d::Zero();  // of the right perturbation of world_from_cam, [m, rad], camera axes
-  int inliers = 0;                     // map points that the pose rests on
-  KeyframeId reference = kNoKeyframe;  // keyframe that shows most of them
-  bool keyframe = false;               // the frame became a keyframe
-  double tracking_ms = 0, wait_ms = 0;  // steady clock: own work, waiting for mapping
+  int inliers = 0;                         // map points that the pose rests on
+  KeyframeId reference = kNoKeyframe;      // keyframe that shows most of them
+  bool keyframe = false;                   // the frame became a keyframe
+  std::vector<Mover> movers;               // obstacles that move by themselves, seen in this frame
+  double tracking_ms = 0, wait_ms = 0;     // steady clock: own work, waiting for mapping
 
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
 };
@@ -56,7 +58,7 @@ struct SlamStatistics {
   size_t map_points = 0;
   MappingReport mapping;
   std::map<std::string, int> keyframe_rules;
-  long features_removed = 0;           // features that the filter kept from tracking
+  long features_removed = 0;  // features that the filter kept from tracking
   std::string detector = "none";
   double detector_rate_hz = 0;
   int detector_latency_frames = 0;
@@ -76,8 +78,8 @@ class SlamSystem {
 
   // Tracks the next frame. Throws InputError when its size is not the camera's or its stamp does not rise.
   FrameResult process(std::shared_ptr<const RgbdImage> image);
-  // The same for callers with raw buffers: copies them. `colour` is 8-bit RGB (3 bytes per pixel) or grey (1); `depth` in
-  // units of 1 / camera.depth_factor metres, 0 = no data. Rows are packed.
+  // The same for callers with raw buffers: copies them. `colour` is 8-bit RGB (3 bytes per pixel) or grey (1); `depth`
+  // in units of 1 / camera.depth_factor metres, 0 = no data. Rows are packed.
   FrameResult process(double timestamp, const uint8_t* colour, int channels, const uint16_t* depth);
 
   // A warning that a person should see, once each: the detector failed and the run goes on without it.
@@ -102,7 +104,7 @@ class SlamSystem {
   // Where movers are in the last image.
   const MoverMask& mover_mask() const;
   const std::vector<Detection>& detections() const;
-  SlamStatistics statistics() const;     // stages of other threads are complete after finish()
+  SlamStatistics statistics() const;  // stages of other threads are complete after finish()
   const CameraModel& camera() const;
   const SlamOptions& options() const;
 

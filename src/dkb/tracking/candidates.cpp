@@ -18,8 +18,8 @@ float angle_between(float a, float b) {
 }  // namespace
 
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
-                                                 const CameraModel& camera, const Rigid3& cam_from_world, double scale_factor,
-                                                 int levels, const ProjectionMatchOptions& options,
+                                                 const CameraModel& camera, const Rigid3& cam_from_world,
+                                                 double scale_factor, int levels, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
   const Eigen::Matrix3f rotation = cam_from_world.matrix3().cast<float>();
   const Eigen::Vector3f translation = cam_from_world.translation.cast<float>();
@@ -56,7 +56,9 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     features.grid.for_each_near(u, v, radius, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
       if (k.octave < level - 1 || k.octave > level + 1) return;
-      if (k.suspect && (!c.established || !(k.depth > 0) || std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z())) return;
+      if (k.suspect &&
+          (!c.established || !(k.depth > 0) || std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z()))
+        return;
       if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;
       const int d = hamming_distance(c.descriptor, features.descriptors[static_cast<size_t>(f)]);
       if (d < best) {
@@ -72,7 +74,8 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     });
     if (best_feature < 0 || best > options.max_distance) continue;
     if (second_level == best_level && static_cast<float>(best) > options.ratio * static_cast<float>(second)) continue;
-    if (c.angle >= 0 && angle_between(c.angle, features.keypoints[static_cast<size_t>(best_feature)].angle) > 0.6f) continue;
+    if (c.angle >= 0 && angle_between(c.angle, features.keypoints[static_cast<size_t>(best_feature)].angle) > 0.6f)
+      continue;
     ProjectionMatch& match = best_of_feature[static_cast<size_t>(best_feature)];
     if (best < match.distance) match = {best_feature, static_cast<int>(i), best};
   }

@@ -14,21 +14,21 @@ namespace dkb {
 // A map point as matching sees it.
 struct Candidate {
   PointId id = kNoPoint;
-  Eigen::Vector3d position;         // [m] in the world
-  Eigen::Vector3f normal;           // mean unit direction to the cameras that saw it; zero = unknown
-  float reference_distance = 0;     // [m] from the camera that gave the descriptor
-  float reference_scale = 1;        // pyramid scale there
-  float angle = -1;                 // [rad] orientation of the feature to match with, -1 = unknown
+  Eigen::Vector3d position;      // [m] in the world
+  Eigen::Vector3f normal;        // mean unit direction to the cameras that saw it; zero = unknown
+  float reference_distance = 0;  // [m] from the camera that gave the descriptor
+  float reference_scale = 1;     // pyramid scale there
+  float angle = -1;              // [rad] orientation of the feature to match with, -1 = unknown
   Descriptor descriptor;
-  bool established = false;         // known still for long enough that it may be found even where a mover is suspected
+  bool established = false;  // known still for long enough that it may be found even where a mover is suspected
 };
 
 struct ProjectionMatchOptions {
   float suspect_depth_gate = 0.03f;  // [1] largest depth difference, relative, at features that are suspected to move
-  float radius = 4.0f;              // [px] search radius at the finest level, > 0; grows with the predicted scale
-  int max_distance = 64;            // [bits] largest Hamming distance of a match, 0 ... 256
-  float ratio = 0.8f;               // best distance must be below this share of the second best on the same level, 0 ... 1
-  float min_view_cosine = 0.5f;     // least cosine between the viewing ray and the point's mean direction
+  float radius = 4.0f;               // [px] search radius at the finest level, > 0; grows with the predicted scale
+  int max_distance = 64;             // [bits] largest Hamming distance of a match, 0 ... 256
+  float ratio = 0.8f;            // best distance must be below this share of the second best on the same level, 0 ... 1
+  float min_view_cosine = 0.5f;  // least cosine between the viewing ray and the point's mean direction
 };
 
 struct ProjectionMatch {
@@ -37,12 +37,12 @@ struct ProjectionMatch {
   int distance = 256;
 };
 
-// Matches candidates to features near their projections. One match per feature and candidate: the smaller distance wins,
-// ties go to the earlier candidate. Features in `taken` (non-zero) are left alone. `visible` (when given) is set to 1 for
-// each candidate whose projection lies in view. Deterministic; result by increasing feature.
+// Matches candidates to features near their projections. One match per feature and candidate: the smaller distance
+// wins, ties go to the earlier candidate. Features in `taken` (non-zero) are left alone. `visible` (when given) is set
+// to 1 for each candidate whose projection lies in view. Deterministic; result by increasing feature.
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
-                                                 const CameraModel& camera, const Rigid3& cam_from_world, double scale_factor,
-                                                 int levels, const ProjectionMatchOptions& options,
+                                                 const CameraModel& camera, const Rigid3& cam_from_world,
+                                                 double scale_factor, int levels, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible);
 
 }  // namespace dkb

@@ -10,17 +10,18 @@
 
 namespace dkb {
 
-// A frame with its pose, as tracking leaves it. The pose hangs on a keyframe, since the world may move under the tracker.
+// A frame with its pose, as tracking leaves it. The pose hangs on a keyframe, since the world may move under the
+// tracker.
 struct TrackedFrame {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
   std::shared_ptr<const RgbdFeatures> features;
-  std::vector<PointId> points;    // per feature: the map point it shows (inliers of the pose), else kNoPoint
-  std::vector<uint8_t> outlier;   // per feature: 1 = matched, but rejected by the robust pose
-  std::vector<int> source;        // per feature: its index among the features that tracking was given
+  std::vector<PointId> points;   // per feature: the map point it shows (inliers of the pose), else kNoPoint
+  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<int> source;       // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;
   Rigid3 cam_from_reference;
-  Rigid3 cam_from_world;          // by the map as tracking knew it at the time
+  Rigid3 cam_from_world;                       // by the map as tracking knew it at the time
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
   int inliers = 0;
 };

@@ -35,17 +35,26 @@ void TrackingOptions::check() const {
 
 const char* name_of(TrackingState state) {
   switch (state) {
-    case TrackingState::initialising: return "initialising";
-    case TrackingState::tracking: return "tracking";
-    case TrackingState::lost: return "lost";
-    case TrackingState::relocalised: return "relocalised";
+    case TrackingState::initialising:
+      return "initialising";
+    case TrackingState::tracking:
+      return "tracking";
+    case TrackingState::lost:
+      return "lost";
+    case TrackingState::relocalised:
+      return "relocalised";
   }
   return "?";
 }
 
 Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
                  const TrackingOptions& options, uint64_t seed)
-    : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), options_(options), seed_(seed),
+    : camera_(camera),
+      noise_(noise),
+      scale_factor_(scale_factor),
+      levels_(levels),
+      options_(options),
+      seed_(seed),
       view_(std::make_shared<const Map>()) {
   options_.check();
   noise_.check();
@@ -134,7 +143,8 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (!at) continue;
     const Keypoint& k = last_->features->keypoints[f];
     candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
-                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle, last_->features->descriptors[f], established(id, last_->index)});
+                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle,
+                          last_->features->descriptors[f], established(id, last_->index)});
   }
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
@@ -165,7 +175,8 @@ std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const Rg
       positions.push_back(p->position);
     }
   std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
-  std::erase_if(matches, [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
+  std::erase_if(matches,
+                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   for (const DescriptorMatch& m : matches) {
@@ -204,7 +215,8 @@ bool Tracker::established(PointId id, FrameIndex now) const {
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.source.clear();
   for (size_t f = 0; f < frame.points.size(); ++f)
-    if (!frame.features->keypoints[f].suspect || frame.points[f] != kNoPoint) frame.source.push_back(static_cast<int>(f));
+    if (!frame.features->keypoints[f].suspect || frame.points[f] != kNoPoint)
+      frame.source.push_back(static_cast<int>(f));
   if (frame.source.size() == frame.points.size()) return;
   RgbdFeatures left = subset(*frame.features, frame.source);
   for (Keypoint& k : left.keypoints) k.suspect = false;
@@ -252,7 +264,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   std::vector<uint8_t> visible(candidates.size(), 0);
   const auto matches =
       match_by_projection(candidates, features, camera_, initial, scale_factor_, levels_, match, &taken, &visible);
-  for (const auto& m : matches) points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
+  for (const auto& m : matches)
+    points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
   std::vector<std::pair<int, Eigen::Vector3d>> pairs;
   for (size_t f = 0; f < points.size(); ++f)
@@ -336,7 +349,8 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
 
   if (state_ == TrackingState::initialising) {
     int with_depth = 0;
-    for (size_t f = 0; f < n; ++f) with_depth += frame.features->keypoints[f].depth > 0 && !frame.features->keypoints[f].suspect;
+    for (size_t f = 0; f < n; ++f)
+      with_depth += frame.features->keypoints[f].depth > 0 && !frame.features->keypoints[f].suspect;
     if (with_depth < options_.initial_points) return outcome;
     outcome.wants_first_keyframe = true;
     outcome.state = state_ = TrackingState::tracking;
@@ -350,11 +364,12 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   bool tracked = false;
   if (state_ != TrackingState::lost && last_) {
     const double dt = timestamp - last_->timestamp;
-    std::optional<Rigid3> pose =
-        track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, *frame.features, points);
+    std::optional<Rigid3> pose = track_last_frame(expected_motion(dt) * last_->cam_from_world,
+                                                  options_.radius_last_frame, *frame.features, points);
     if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, *frame.features, points);
     if (!pose)
-      if (const Keyframe* k = view_->live_keyframe(last_->reference)) pose = match_keyframe(*k, *frame.features, points);
+      if (const Keyframe* k = view_->live_keyframe(last_->reference))
+        pose = match_keyframe(*k, *frame.features, points);
     tracked = pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
   }
   bool found_again = false;
@@ -366,7 +381,8 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
       const auto pose = match_keyframe(*view_->keyframe(keyframes[keyframes.size() - 1 - i]), *frame.features, points);
       if (!pose) continue;
       candidates_made_ = -1;
-      tracked = track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, points, frame);
+      tracked =
+          track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, points, frame);
       found_again = tracked;
     }
   }
@@ -378,8 +394,8 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   if (found_again || !last_ || timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {
-    // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to now.
-    // The full half would carry the noise of both steps into every feature.
+    // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
+    // now. The full half would carry the noise of both steps into every feature.
     const Vector6d before = velocity_.value_or(velocity_to(frame));
     const Vector6d step = velocity_to(frame);
     refine_at_velocity(step + kAccelerationShare * (step - before), features_at, frame);
@@ -408,7 +424,9 @@ KeyframePacket Tracker::make_report() {
   return packet;
 }
 
-bool Tracker::is_retracted(PointId id) const { return std::binary_search(retracted_.begin(), retracted_.end(), id); }
+bool Tracker::is_retracted(PointId id) const {
+  return std::binary_search(retracted_.begin(), retracted_.end(), id);
+}
 
 void Tracker::retract(const std::vector<PointId>& points) {
   for (PointId id : points) {
@@ -429,7 +447,8 @@ void Tracker::visit_points_in_view(const std::function<void(PointId, const Eigen
     const Eigen::Vector3d p = last_->cam_from_world * world;
     if (p.z() < 0.1) return;
     const Eigen::Vector2d pixel = camera_.project(p);
-    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height) visit(id, pixel, p.z());
+    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height)
+      visit(id, pixel, p.z());
   };
   for (const Candidate& c : candidates_)
     if (!is_retracted(c.id)) offer(c.id, c.position);
@@ -449,8 +468,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   std::vector<std::pair<float, int>> by_depth;
   for (size_t f = 0; f < frame.points.size(); ++f) {
     const float z = frame.features->keypoints[f].depth;
-    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f])
-      by_depth.emplace_back(z, static_cast<int>(f));
+    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f]) by_depth.emplace_back(z, static_cast<int>(f));
   }
   std::sort(by_depth.begin(), by_depth.end());
   for (const auto& [z, f] : by_depth) {
@@ -471,7 +489,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
   if (last_ && last_->index == frame.index) {
     for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
-    last_->reference = id;  // from here on the frame hangs on its own keyframe
+    last_->reference = id;                         // from here on the frame hangs on its own keyframe
     last_->cam_from_world = frame.cam_from_world;  // the first one's is the caller's choice
     last_->cam_from_reference = {};
   }

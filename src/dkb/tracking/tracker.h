@@ -19,20 +19,21 @@
 namespace dkb {
 
 struct TrackingOptions {
-  int initial_points = 100;          // features with depth that the first frame of a map needs, >= 10
-  int least_matches = 20;            // matches with the last frame that make a pose worth trying, >= 6
-  int least_inliers = 20;            // inliers of the final pose; fewer: lost, >= 6
+  int initial_points = 100;            // features with depth that the first frame of a map needs, >= 10
+  int least_matches = 20;              // matches with the last frame that make a pose worth trying, >= 6
+  int least_inliers = 20;              // inliers of the final pose; fewer: lost, >= 6
   int least_inliers_found_again = 30;  // the same when coming back from a loss, >= 6
-  double close_depth = 4.0;          // [m] depths below make map points at once, > 0
-  int least_new_points = 100;        // nearest depths that make points at a keyframe whatever close_depth says, >= 0
-  double radius_last_frame = 10.0;   // [px] search around the motion model's prediction, > 0
-  double radius_wide = 30.0;         // [px] second try, > 0
-  double radius_local_map = 4.0;     // [px] search for local map points under the first pose, > 0
-  int match_distance = 90;           // [bits] largest Hamming distance of a match with a map point, 0 ... 256
-  double match_ratio = 0.8;          // best over second best distance of such a match, 0 ... 1
-  int established_frames = 20;       // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
-  int refresh_frames = 5;            // [frames] the choice of local map points is renewed at least so often, >= 1
-  int recovery_keyframes = 8;        // newest keyframes that a lost tracker tries, >= 1
+  double close_depth = 4.0;            // [m] depths below make map points at once, > 0
+  int least_new_points = 100;          // nearest depths that make points at a keyframe whatever close_depth says, >= 0
+  double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
+  double radius_wide = 30.0;           // [px] second try, > 0
+  double radius_local_map = 4.0;       // [px] search for local map points under the first pose, > 0
+  int match_distance = 90;             // [bits] largest Hamming distance of a match with a map point, 0 ... 256
+  double match_ratio = 0.8;            // best over second best distance of such a match, 0 ... 1
+  int established_frames =
+      20;                      // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
+  int refresh_frames = 5;      // [frames] the choice of local map points is renewed at least so often, >= 1
+  int recovery_keyframes = 8;  // newest keyframes that a lost tracker tries, >= 1
   LocalMapOptions local_map;
   void check() const;
 };
@@ -42,7 +43,7 @@ const char* name_of(TrackingState state);
 
 struct TrackOutcome {
   TrackingState state = TrackingState::initialising;
-  TrackedFrame frame;           // pose valid when tracking or relocalised
+  TrackedFrame frame;                 // pose valid when tracking or relocalised
   bool wants_first_keyframe = false;  // the frame starts the map
 };
 
@@ -50,8 +51,8 @@ struct TrackOutcome {
 // Deterministic: the same frames and views in the same order give the same poses.
 class Tracker {
  public:
-  Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, const TrackingOptions& options,
-          uint64_t seed);
+  Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+          const TrackingOptions& options, uint64_t seed);
 
   // A newer view: the last pose is re-expressed through its reference keyframe. Returns how the world moved under the
   // camera: new_world_from_old_world.
@@ -64,8 +65,8 @@ class Tracker {
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
   Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
-  // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once for
-  // the expected velocity, and again for the one that the first pose shows.
+  // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once
+  // for the expected velocity, and again for the one that the first pose shows.
   using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
   TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at);
 
@@ -94,8 +95,10 @@ class Tracker {
                       const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
                                          std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features, std::vector<PointId>& points) const;
-  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points, TrackedFrame& frame);
+  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
+                                       std::vector<PointId>& points) const;
+  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
+                       TrackedFrame& frame);
   bool is_retracted(PointId id) const;
   void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
@@ -117,17 +120,17 @@ class Tracker {
     KeyframeId id, reference;
     Rigid3 cam_from_reference;
   };
-  std::vector<PendingKeyframe> pending_;            // keyframes not in the view yet, by id
+  std::vector<PendingKeyframe> pending_;  // keyframes not in the view yet, by id
   std::map<PointId, ProvisionalPoint> provisional_;
   std::map<PointId, PointSighting> sightings_;
-  std::vector<PointId> retracted_;                  // increasing; until the view has dropped them
-  std::vector<PointId> unreported_;                 // of these, what mapping was not told yet
+  std::vector<PointId> retracted_;   // increasing; until the view has dropped them
+  std::vector<PointId> unreported_;  // of these, what mapping was not told yet
 
   TrackingState state_ = TrackingState::initialising;
-  std::optional<TrackedFrame> last_;                // last frame with a pose
-  std::optional<Vector6d> velocity_;                // [m/s, rad/s] tangent of now_cam_from_before_cam
-  std::vector<Candidate> candidates_;               // from the view
-  FrameIndex candidates_made_ = -1;                 // frame of the last refresh; -1 = the view is newer
+  std::optional<TrackedFrame> last_;   // last frame with a pose
+  std::optional<Vector6d> velocity_;   // [m/s, rad/s] tangent of now_cam_from_before_cam
+  std::vector<Candidate> candidates_;  // from the view
+  FrameIndex candidates_made_ = -1;    // frame of the last refresh; -1 = the view is newer
 };
 
 }  // namespace dkb

@@ -27,11 +27,13 @@ std::string read_file(const fs::path& path) {
 
 void write_file_atomically(const fs::path& path, std::string_view content) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  const std::string temporary = (folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()))).string();
+  const std::string temporary =
+      (folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()))).string();
   const auto fail = [&](const char* what) {
     const std::string reason = std::strerror(errno);
     ::unlink(temporary.c_str());
-    throw OutputError(path.string() + ": cannot be written (" + what + ": " + reason + "); the previous file, if any, is kept");
+    throw OutputError(path.string() + ": cannot be written (" + what + ": " + reason +
+                      "); the previous file, if any, is kept");
   };
   const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) fail("open");
@@ -66,8 +68,8 @@ void make_output_folder(const fs::path& path) {
   std::error_code ec;
   fs::create_directories(path, ec);
   if (ec || !fs::is_directory(path, ec))
-    throw OutputError(path.string() + ": cannot make this output folder (" + (ec ? ec.message() : "a file is in the way") +
-                      "); choose another with --out");
+    throw OutputError(path.string() + ": cannot make this output folder (" +
+                      (ec ? ec.message() : "a file is in the way") + "); choose another with --out");
   if (::access(path.c_str(), W_OK | X_OK) != 0)
     throw OutputError(path.string() + ": this output folder cannot be written; choose another with --out");
 }

@@ -21,7 +21,8 @@ std::map<std::string, StageSummary> StageTimes::summaries() const {
     double sum = 0;
     for (float s : sorted) sum += s;
     const size_t n = sorted.size();
-    result[stage] = {sum / static_cast<double>(n), sorted[n / 2], sorted[std::min(n - 1, n * 95 / 100)], sorted.back(), n};
+    result[stage] = {sum / static_cast<double>(n), sorted[n / 2], sorted[std::min(n - 1, n * 95 / 100)], sorted.back(),
+                     n};
   }
   return result;
 }
