@@ -14,7 +14,7 @@ namespace {
 constexpr float kTooNear = 0.45f;                  // [m] taken for the depth of what is too near for the sensor
 constexpr float kNearestDepth = 0.1f;              // [m] in front of the camera
 constexpr float kMotionPerFrame = 0.03f;           // [m] that a surface comes nearer or goes away from frame to frame
-constexpr float kHighest = 3.0f, kLowest = -1.5f;  // bounds of scores: a still cell is convinced sooner than a mover
+constexpr float kHighest = 3.0f, kLowest = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
@@ -98,15 +98,15 @@ std::unique_ptr<MotionDepthGrid> MotionSegmenter::take_spare() {
 }
 
 // Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time.
-Rigid3 MotionSegmenter::at_depth_time(const Rigid3& cam_from_world) const {
+Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
   constexpr double kLongestGap = 0.2;  // [s] over which motion is taken to be even
-  if (!last_) return cam_from_world;
+  if (!last_) return {};
   const double interval = image_time_ - last_->time, offset = current_->time - image_time_;
-  if (!(interval > 0) || interval > kLongestGap || std::abs(offset) > interval) return cam_from_world;
+  if (!(interval > 0) || interval > kLongestGap || std::abs(offset) > interval) return {};
   const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
   Vector6d part;
   part << step.translation, vector_from_rotation(step.rotation);
-  return rigid3_from_tangent(offset / interval * part) * cam_from_world;
+  return rigid3_from_tangent(offset / interval * part);
 }
 
 float MotionSegmenter::tolerance_at(float depth) const {
@@ -125,7 +125,8 @@ MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_fro
   image_time_ = image.timestamp;
   current_->set_depth(image.depth, rays_);
   current_->time = image.depth_timestamp;
-  current_->cam_from_world = at_depth_time(cam_from_world_expected);
+  const Rigid3 depth_from_colour = depth_cam_from_cam(cam_from_world_expected);
+  current_->cam_from_world = depth_from_colour * cam_from_world_expected;
   for (size_t i = 0; i < tolerance_.size(); ++i) tolerance_.data()[i] = tolerance_at(current_->depth.data()[i]);
   carry_scores();
   for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
@@ -137,7 +138,7 @@ MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_fro
   weigh();
   smoothing_.smooth(weighted_, weights_);
   update_scores();
-  return mask();
+  return mask(depth_from_colour);
 }
 
 // Each cell takes over the score of the same surface in the frame before.
@@ -270,13 +271,19 @@ void MotionSegmenter::update_scores() {
   }
 }
 
-MoverMask MotionSegmenter::mask() const {
+// Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
+MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) const {
   MoverMask result;
   result.cell = options_.cell;
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
   const auto threshold = static_cast<float>(options_.threshold);
-  for (size_t i = 0; i < result.cells.size(); ++i)
-    result.cells.data()[i] = current_->score.data()[i] > threshold ? 255 : 0;
+  const RayMotion motion(depth_from_colour);
+  for (size_t i = 0; i < result.cells.size(); ++i) {
+    const float z = current_->depth.data()[i];
+    const Eigen::Vector3f point = motion(rays_.ray(i), z > 0 ? z : kTooNear);
+    const int at = point.z() > kNearestDepth ? rays_.cell_of(point.x(), point.y(), point.z()) : -1;
+    if (at >= 0 && current_->score.data()[at] > threshold) result.cells.data()[i] = 255;
+  }
   dilate(result, options_.rim);
   return result;
 }
@@ -287,7 +294,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
     reset();
     return;
   }
-  current_->cam_from_world = at_depth_time(*cam_from_world);
+  current_->cam_from_world = depth_cam_from_cam(*cam_from_world) * *cam_from_world;
   last_ = Stamped{image_time_, *cam_from_world};
   if (previous_) keep_as_view(std::move(previous_));
   previous_ = std::move(current_);

@@ -30,7 +30,7 @@ struct MotionOptions {
   double hole_memory = 1;  // [s] the same for what is too near for the sensor, > 0
   // Weights of evidence beside that of an intrusion into space seen empty, which is 1. All >= 0.
   double contour = 0.3;         // an outline that is where a view had it: still
-  double interior = 0.05;       // a surface that is where a view had it: still, but so is the inside of one that sways
+  double interior = 0.1;        // a surface that is where a view had it: still, but so is the inside of one that sways
   double state = 0.02;          // what the cell was before
   double prior = 0.015;         // nothing moves until something says so
   double hole_prior = 0.02;     // the same where depth is missing
@@ -60,8 +60,11 @@ class MotionSegmenter {
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
   void move_world(const Rigid3& new_from_old);
   void reset();
-  // Per cell of the frame last segmented: from -3, surely still, to 3, surely moving; 0 = nothing known.
-  const Image<float>& score() const { return (current_ ? current_ : previous_)->score; }
+  // Per cell of the frame last segmented: from -3, surely still, to 3, surely moving; 0 = nothing known;
+  // empty before the first frame and after reset().
+  const Image<float>& score() const {
+    return current_ ? current_->score : previous_ ? previous_->score : nothing_;
+  }
 
  private:
   struct Stamped {
@@ -69,14 +72,14 @@ class MotionSegmenter {
     Rigid3 cam_from_world;
   };
 
-  Rigid3 at_depth_time(const Rigid3& cam_from_world) const;
+  Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   float tolerance_at(float depth) const;
   void carry_scores();
   void compare(const MotionDepthGrid& view);
   void find_openings();
   void weigh();
   void update_scores();
-  MoverMask mask() const;
+  MoverMask mask(const Rigid3& depth_from_colour) const;
   void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
   std::unique_ptr<MotionDepthGrid> take_spare();
 
@@ -91,6 +94,7 @@ class MotionSegmenter {
   double image_time_ = 0;
   size_t turn_ = 0;
   int frames_ = 0;
+  const Image<float> nothing_;
   Image<float> tolerance_;                        // [m] by cell
   Image<float> intrusions_, agreements_, still_;  // votes of the views
   Image<float> missing_;                          // share of the frames without depth there
