@@ -13,7 +13,7 @@ namespace dkb {
 namespace {
 
 constexpr float kBin = 0.05f;        // [m] of depth histograms
-constexpr size_t kMostPoints = 500;  // per object, that medians are taken of
+constexpr size_t kMostPoints = 300;  // per object, that medians are taken of
 
 float median(std::vector<float>& v) {
   const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
@@ -36,6 +36,7 @@ void MoverObserverOptions::check() const {
   require_option(margin >= 0, "margin", margin, "at least 0");
   require_option(layer > 0, "layer", layer, "greater than 0 m");
   require_option(step > 0, "step", step, "greater than 0");
+  require_option(inner_share > 0 && inner_share <= 1, "inner_share", inner_share, "greater than 0, at most 1");
   require_option(gap >= 0, "gap", gap, "at least 0 cells");
   require_option(step_merged > 0, "step_merged", step_merged, "greater than 0 m");
 }
@@ -195,9 +196,11 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
   std::vector<Part> parts;
   const auto width = static_cast<size_t>(columns_);
   std::vector<float> depths;
+  std::vector<size_t> part_of(rays_.size(), 0);  // seed + 1
   for (size_t seed = 0; seed < free.size(); ++seed) {
     if (!free[seed]) continue;
     free[seed] = 0;
+    part_of[seed] = seed + 1;
     std::vector<size_t> cells{seed};
     CellRange bounds{columns_, rows_, 0, 0};
     depths.clear();
@@ -210,6 +213,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
       const auto visit = [&](bool there, size_t j) {
         if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.step) * d) return;
         free[j] = 0;
+        part_of[j] = seed + 1;
         cells.push_back(j);
       };
       visit(x > 0, i - 1);
@@ -217,7 +221,15 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
       visit(y > 0, i - width);
       visit(y + 1 < rows_, i + width);
     }
-    if (cells.size() < 4) continue;  // specks would bridge objects
+    // The mask's rim lies on what is behind the movers: a ring one or two cells wide is no object, nor are specks.
+    size_t inner = 0;
+    for (size_t i : cells) {
+      const size_t x = i % width, y = i / width;
+      const auto mine = [&](size_t j) { return part_of[j] == seed + 1; };
+      inner += (x == 0 || mine(i - 1)) && (x + 1 == width || mine(i + 1)) && (y == 0 || mine(i - width)) &&
+               (i + width >= part_of.size() || mine(i + width));
+    }
+    if (static_cast<double>(inner) < options_.inner_share * static_cast<double>(cells.size())) continue;
     parts.push_back({{bounds, std::move(cells)}, median(depths), parts.size()});
   }
   // Holes of the depth image and arms held out cut bodies into parts.
@@ -249,6 +261,18 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
   return regions;
 }
 
+void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
+  depth_.assign(rays_.size(), 0.0f);
+  const float middle = 0.5f * static_cast<float>(options_.cell);
+  const bool same_cells = mask.cell == options_.cell && mask.cells.width() == columns_ && mask.cells.height() == rows_;
+  for_each_cell({0, 0, columns_, rows_}, [&](size_t i, int x, int y) {
+    if (same_cells
+            ? mask.cells(x, y) != 0
+            : mask.at(static_cast<float>(x * options_.cell) + middle, static_cast<float>(y * options_.cell) + middle))
+      depth_[i] = depth_near(depth, x, y);
+  });
+}
+
 std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, const MoverMask& mask,
                                                      std::span<const Detection> boxes, const Rigid3& world_from_cam) {
   if (depth.width() != camera_.width || depth.height() != camera_.height)
@@ -257,20 +281,11 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
                      std::to_string(camera_.height));
   if (mask.empty()) return {};
   world_from_cam_ = world_from_cam;
-  depth_.assign(rays_.size(), 0.0f);
+  take_masked_depth(depth, mask);
   std::vector<char> claimed(rays_.size(), 0);  // by a box or its rim
   for (const Detection& d : boxes)
     for_each_cell(cells_in(d.box, options_.margin), [&](size_t i, int, int) { claimed[i] = 1; });
-  bool loose = false;
-  const float middle = 0.5f * static_cast<float>(options_.cell);
-  for_each_cell({0, 0, columns_, rows_}, [&](size_t i, int x, int y) {
-    if (!mask.at(static_cast<float>(x * options_.cell) + middle, static_cast<float>(y * options_.cell) + middle))
-      return;
-    depth_[i] = depth_near(depth, x, y);
-    loose |= !claimed[i];
-  });
   std::vector<MoverObservation> observations = observe_boxes(boxes);
-  if (!loose) return observations;
   std::vector<float> depths;
   for (const Region& r : find_regions(claimed)) {
     depths.clear();

@@ -20,7 +20,8 @@ struct MoverObserverOptions {
   double margin = 0.1;  // share of a box's size by which its rim reaches; mask in the rim is no object of its own, >= 0
   double layer = 0.45;  // [m] an object reaches so far before and behind its main depth layer, > 0
   double step = 0.05;   // [1] depth step between neighbouring cells of one region, relative to depth, > 0
-  int gap = 4;          // [cells] regions so near to each other in the image and `step_merged` in depth are one, >= 0
+  double inner_share = 0.4;  // of a region's cells must have all four neighbours in it: others are rims, (0, 1]
+  int gap = 4;  // [cells] regions so near to each other in the image and `step_merged` in depth are one, >= 0
   double step_merged = 0.25;  // [m] > 0
   void check() const;         // throws InvalidOption
 };
@@ -57,6 +58,7 @@ class MoverObserver {
   void for_each_cell(const CellRange& range, const Function& function) const;
   float depth_near(const DepthImage& depth, int x, int y) const;
   Eigen::Vector3d median_position(std::span<const size_t> cells) const;
+  void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
   std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellRange>& ranges) const;
   std::vector<MoverObservation> observe_boxes(std::span<const Detection> boxes) const;

@@ -33,6 +33,7 @@ void MoverTrackerOptions::check() const {
   require_option(doubt_memory > 0, "doubt_memory", doubt_memory, "greater than 0 s");
   require_option(sightings >= 2, "sightings", sightings, "at least 2");
   require_option(apart >= 0, "apart", apart, "at least 0 m");
+  require_option(regions_apart >= 0, "regions_apart", regions_apart, "at least 0 m");
 }
 
 MoverTracker::MoverTracker(const CameraModel& camera, const MoverTrackerOptions& options)
@@ -125,7 +126,12 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];
     if (taken[k]) continue;
-    const auto near = [&](const Eigen::Vector3d& p) { return (p - o.position_in_world).norm() < options_.apart; };
+    // Parts of one body may be taken for several regions, one above the other.
+    const double apart = o.class_name.empty() ? options_.regions_apart : options_.apart;
+    const auto near = [&](const Eigen::Vector3d& p) {
+      const Eigen::Vector3d off = p - o.position_in_world;
+      return (o.class_name.empty() ? (off - off.dot(axes.col(1)) * axes.col(1)).norm() : off.norm()) < apart;
+    };
     if (std::any_of(seen.begin(), seen.end(), near)) continue;
     seen.push_back(o.position_in_world);
     Track t;

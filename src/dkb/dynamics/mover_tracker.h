@@ -12,7 +12,7 @@
 namespace dkb {
 
 struct MoverTrackerOptions {
-  MoverObserverOptions observer;
+  MoverObserverOptions observer = {};
   double sd_across = 0.12;     // [m] standard deviation of an observed position along the image's rows, > 0
   double sd_down = 0.45;       // [m] along its columns: clutter and other movers hide legs and bodies, > 0
   double sd_deep = 0.12;       // [m] along the optical axis, > 0
@@ -28,6 +28,7 @@ struct MoverTrackerOptions {
   double doubt_memory = 0.2;   // [s] the same before it is confirmed, > 0
   int sightings = 3;           // that confirm a mover and give it its id, >= 2
   double apart = 0.35;         // [m] nothing is found so near to a mover already seen in the frame, >= 0
+  double regions_apart = 0.6;  // [m] the same for regions without a box, across and along the optical axis, >= 0
   void check() const;          // throws InvalidOption
 };
 

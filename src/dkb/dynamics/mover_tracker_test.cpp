@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/mover_tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/dynamics/mover_test_scene.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kStep = 1 / 30.0;  // [s]
+
+// A person 0.5 m wide and 1.4 m tall whose middle is at (x, 0, z) before the camera.
+void add_person(double x, double z, MoverTestScene* scene, bool with_box = true) {
+  const auto column = [&](double m) { return static_cast<int>(std::lround(250 * m / z + 159.5)); };
+  const int half_height = static_cast<int>(std::lround(250 * 0.7 / z));
+  scene->add(std::max(0, column(x - 0.25)), std::max(0, 120 - half_height), std::min(320, column(x + 0.25)),
+             std::min(240, 120 + half_height), static_cast<float>(z), with_box);
+}
+
+std::vector<Mover> show(MoverTracker* tracker, double time, const MoverTestScene& scene,
+                        const Rigid3& world_from_cam = {}) {
+  return tracker->update(time, scene.depth, scene.mask, scene.boxes, world_from_cam);
+}
+
+MoverTestScene one_person(double x, double z) {
+  MoverTestScene scene;
+  add_person(x, z, &scene);
+  return scene;
+}
+
+TEST(MoverTracker, TheThirdSightingGivesAnId) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  EXPECT_TRUE(show(&tracker, 0, one_person(0, 2)).empty());
+  EXPECT_TRUE(show(&tracker, kStep, one_person(0, 2)).empty());
+  const auto movers = show(&tracker, 2 * kStep, one_person(0, 2));
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].id, 1);
+  EXPECT_EQ(movers[0].class_name, "person");
+  EXPECT_NEAR(movers[0].position_in_world.z(), 2, 1e-6);
+}
+
+TEST(MoverTracker, VelocityIsThatOfTheMover) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  for (int i = 0; i < 30; ++i) movers = show(&tracker, i * kStep, one_person(-0.5 + i * kStep, 2.5));
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_NEAR(movers[0].velocity_in_world.x(), 1.0, 0.15);
+  EXPECT_NEAR(movers[0].velocity_in_world.z(), 0.0, 0.1);
+}
+
+TEST(MoverTracker, ACameraThatMovesDoesNotMoveTheMovers) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  for (int i = 0; i < 30; ++i) {
+    const double shift = 0.5 * i * kStep;
+    movers = show(&tracker, i * kStep, one_person(0.3 - shift, 2.5), {Eigen::Quaterniond::Identity(), {shift, 0, 0}});
+  }
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_NEAR(movers[0].position_in_world.x(), 0.3, 0.02);
+  EXPECT_LT(movers[0].velocity_in_world.norm(), 0.15);
+}
+
+void expect_ids_kept_through_a_crossing(bool with_boxes) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  int left_id = 0, right_id = 0, hidden = 0;
+  for (int i = 0; i <= 60; ++i) {
+    // The near one walks right and hides the far one, who walks left, for a while.
+    const double t = i * kStep;
+    MoverTestScene scene;
+    add_person(-0.9 + 0.9 * t, 1.8, &scene, with_boxes);
+    add_person(1.1 - 0.9 * t, 3.0, &scene, with_boxes);
+    movers = show(&tracker, t, scene);
+    hidden += i > 5 && movers.size() < 2;
+    if (i == 10) {
+      ASSERT_EQ(movers.size(), 2u);
+      left_id = movers[0].position_in_world.x() < 0 ? movers[0].id : movers[1].id;
+      right_id = 3 - left_id;
+    }
+  }
+  EXPECT_GT(hidden, 3);
+  ASSERT_EQ(movers.size(), 2u);
+  for (const Mover& m : movers) EXPECT_EQ(m.id, m.position_in_world.z() < 2.4 ? left_id : right_id);
+}
+
+TEST(MoverTracker, IdsAreKeptThroughACrossing) {
+  expect_ids_kept_through_a_crossing(true);
+}
+TEST(MoverTracker, IdsAreKeptThroughACrossingWithoutBoxes) {
+  expect_ids_kept_through_a_crossing(false);
+}
+
+int id_after_gap(double seconds) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  double t = 0;
+  for (; t < 0.5; t += kStep) show(&tracker, t, one_person(0, 2));
+  t += seconds;
+  std::vector<Mover> movers;
+  for (int i = 0; i < 3; ++i) movers = show(&tracker, t + i * kStep, one_person(0, 2));
+  return movers.empty() ? 0 : movers[0].id;
+}
+
+TEST(MoverTracker, AMoverIsKnownAgainAfterOneSecondAndForgottenAfterTwo) {
+  EXPECT_EQ(id_after_gap(1.0), 1);
+  EXPECT_EQ(id_after_gap(2.0), 2);
+}
+
+TEST(MoverTracker, UnseenMoversAreNotReported) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  EXPECT_TRUE(show(&tracker, 5 * kStep, MoverTestScene()).empty());
+}
+
+TEST(MoverTracker, AThingInTwoBoxesIsOneMover) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  for (int i = 0; i < 6; ++i) {
+    MoverTestScene scene = one_person(0, 2);
+    scene.boxes.push_back(scene.boxes[0]);
+    movers = show(&tracker, i * kStep, scene);
+  }
+  EXPECT_EQ(movers.size(), 1u);
+}
+
+TEST(MoverTracker, RegionsWithoutABoxAreObjects) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  for (int i = 0; i < 3; ++i) {
+    MoverTestScene scene;
+    add_person(0, 2, &scene, false);
+    movers = show(&tracker, i * kStep, scene);
+  }
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].class_name, "object");
+}
+
+TEST(MoverTracker, RebasingMovesWhatIsRemembered) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  const Rigid3 new_from_old(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {5, 0, -3});
+  tracker.rebase(new_from_old);
+  const auto movers = show(&tracker, 5 * kStep, one_person(0, 2), new_from_old);
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].id, 1);
+}
+
+TEST(MoverTracker, ResetForgetsMoversAndGoesOnCounting) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  for (int i = 0; i < 3; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  tracker.reset();
+  EXPECT_TRUE(show(&tracker, 3 * kStep, one_person(0, 2)).empty());
+  show(&tracker, 4 * kStep, one_person(0, 2));
+  EXPECT_EQ(show(&tracker, 5 * kStep, one_person(0, 2)).at(0).id, 2);
+}
+
+TEST(MoverTracker, OptionsAreChecked) {
+  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.sightings = 1}), InvalidOption);
+  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.memory = 0}), InvalidOption);
+  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.observer = {.cell = 99}}), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb

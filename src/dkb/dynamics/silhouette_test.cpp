@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/silhouette.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+void fill(DepthImage* depth, int x0, int y0, int x1, int y1, float z) {
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) (*depth)(x, y) = z;
+}
+
+// A person at 1.5 m before a wall at 3 m: pixels 60 ... 99, 20 ... 99 of 160 x 120.
+DepthImage person_before_wall() {
+  DepthImage depth(160, 120, 3.0f);
+  fill(&depth, 60, 20, 100, 100, 1.5f);
+  return depth;
+}
+
+MoverMask silhouette_in(const DepthImage& depth, const Box& box, const SilhouetteOptions& options = {}) {
+  return silhouettes(depth, std::vector<Detection>{{"person", box, 1}}, options);
+}
+
+TEST(Silhouette, HoldsThePersonAndARimButNotTheWallBesideIt) {
+  const MoverMask mask = silhouette_in(person_before_wall(), {40, 10, 80, 100});
+  EXPECT_EQ(mask.cells.width(), 40);
+  EXPECT_EQ(mask.cells.height(), 30);
+  for (int y = 20; y < 100; ++y)
+    for (int x = 60; x < 100; ++x) ASSERT_TRUE(mask.at(static_cast<float>(x), static_cast<float>(y))) << x << " " << y;
+  EXPECT_TRUE(mask.at(57, 60));   // one cell of rim
+  EXPECT_FALSE(mask.at(55, 60));  // wall inside the box
+  EXPECT_FALSE(mask.at(104, 60));
+  EXPECT_FALSE(mask.at(80, 15));
+}
+
+TEST(Silhouette, ARimOfZeroStopsAtTheEdge) {
+  SilhouetteOptions options;
+  options.rim = 0;
+  const MoverMask mask = silhouette_in(person_before_wall(), {40, 10, 80, 100}, options);
+  EXPECT_TRUE(mask.at(60, 60));
+  EXPECT_FALSE(mask.at(59, 60));
+}
+
+TEST(Silhouette, AnArmReachingForwardHangsTogetherWithTheBody) {
+  DepthImage depth = person_before_wall();
+  for (int x = 100; x < 116; ++x) fill(&depth, x, 40, x + 1, 52, 1.5f - 0.005f * static_cast<float>(x - 99));
+  EXPECT_TRUE(silhouette_in(depth, {40, 10, 80, 100}).at(112, 46));
+}
+
+TEST(Silhouette, WhatLiesBeyondTheReachIsNotPartOfThePerson) {
+  DepthImage depth = person_before_wall();
+  // A ramp behind the person's side: its steps are as small as those of one surface, but it leads away.
+  for (int x = 100; x < 150; ++x) fill(&depth, x, 20, x + 1, 100, 1.5f + 0.0069f * static_cast<float>(x - 99));
+  SilhouetteOptions options;
+  options.rim = 0;
+  options.reach = 0.2;
+  const MoverMask mask = silhouette_in(depth, {20, 10, 120, 100}, options);
+  EXPECT_TRUE(mask.at(122, 60));   // 0.16 m behind the front
+  EXPECT_FALSE(mask.at(142, 60));  // 0.30 m
+  options.reach = 0.6;
+  EXPECT_TRUE(silhouette_in(depth, {20, 10, 120, 100}, options).at(142, 60));
+}
+
+TEST(Silhouette, TheNearerOfTwoHeavyLayersIsTheObject) {
+  DepthImage depth(160, 120, 3.0f);
+  for (int x = 60; x < 78; ++x)
+    fill(&depth, x, 20, x + 1, 100, 1.45f + 0.005f * static_cast<float>(x - 60));  // less than half of the core
+  const MoverMask mask = silhouette_in(depth, {50, 10, 60, 100});
+  EXPECT_TRUE(mask.at(70, 60));
+  EXPECT_FALSE(mask.at(100, 60));
+}
+
+TEST(Silhouette, AThinThingInFrontIsNotTheObject) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 80, 0, 83, 120, 0.7f);  // a pole
+  EXPECT_TRUE(silhouette_in(depth, {60, 20, 40, 80}).at(66, 60));
+}
+
+TEST(Silhouette, HolesInThePersonAreFilled) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 76, 56, 84, 64, 0);
+  EXPECT_TRUE(silhouette_in(depth, {60, 20, 40, 80}).at(80, 60));
+}
+
+TEST(Silhouette, HolesInTheWallAreNot) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 120, 40, 128, 48, 0);
+  EXPECT_FALSE(silhouette_in(depth, {40, 10, 110, 100}).at(124, 44));
+}
+
+TEST(Silhouette, ABoxWithoutDepthIsTakenWhole) {
+  const MoverMask mask = silhouette_in(DepthImage(160, 120), {40, 20, 40, 60});
+  EXPECT_TRUE(mask.at(41, 21));
+  EXPECT_TRUE(mask.at(79, 79));
+  EXPECT_FALSE(mask.at(100, 50));
+}
+
+TEST(Silhouette, NoBoxesNoMask) {
+  EXPECT_TRUE(silhouettes(person_before_wall(), {}, {}).empty());
+}
+
+TEST(Silhouette, BoxesBeyondTheImageAreHarmless) {
+  EXPECT_NO_THROW(silhouette_in(person_before_wall(), {-50, -50, 60, 60}));
+  EXPECT_NO_THROW(silhouette_in(person_before_wall(), {150, 110, 500, 500}));
+  EXPECT_NO_THROW(silhouette_in(person_before_wall(), {300, 300, 10, 10}));
+  EXPECT_NO_THROW(silhouette_in(person_before_wall(), {80, 60, 0, 0}));
+}
+
+TEST(Silhouette, TheMasksOfSeveralBoxesAreUnited) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 110, 20, 140, 100, 2.0f);
+  const std::vector<Detection> boxes = {{"person", {60, 20, 40, 80}, 1}, {"person", {110, 20, 30, 80}, 1}};
+  const MoverMask mask = silhouettes(depth, boxes, {});
+  EXPECT_TRUE(mask.at(80, 60));
+  EXPECT_TRUE(mask.at(125, 60));
+  EXPECT_FALSE(mask.at(30, 60));
+}
+
+TEST(Silhouette, OptionsAreChecked) {
+  EXPECT_THROW(SilhouetteOptions{.cell = 0}.check(), InvalidOption);
+  EXPECT_THROW(SilhouetteOptions{.core = 1.5}.check(), InvalidOption);
+  EXPECT_THROW(SilhouetteOptions{.layer = 1}.check(), InvalidOption);
+  EXPECT_THROW(SilhouetteOptions{.rim = -1}.check(), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb
