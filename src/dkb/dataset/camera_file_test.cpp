@@ -2,6 +2,7 @@
 #include "dkb/dataset/camera_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <functional>
@@ -74,7 +75,7 @@ TEST(CameraFile, FilesInConfigAreTheBuiltInCameras) {
 
 class ChooseCamera : public testing::Test {
  protected:
-  ChooseCamera() : root(fs::path(testing::TempDir()) / "dkb_choose_camera") { fs::remove_all(root); }
+  ChooseCamera() : root(fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_choose_camera")) { fs::remove_all(root); }
   ~ChooseCamera() override { fs::remove_all(root); }
   fs::path folder(const std::string& name) const {
     fs::create_directories(root / name);

@@ -2,6 +2,7 @@
 #include "dkb/dataset/image_codecs.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -219,7 +220,7 @@ TEST(ImageCodecs, MutatedImagesThrowNothingButInputErrors) {
 }
 
 TEST(ImageCodecs, FilesAreWrittenAndReadBack) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "dkb_codec.png";
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_codec.png");
   write_image_file(path, encode_png(colour_picture()));
   EXPECT_EQ(read_picture(path).colour, colour_picture());
   EXPECT_EQ(read_grey(path), grey_from_colour(colour_picture()));

@@ -2,6 +2,7 @@
 #include "dkb/dataset/rgbd_reader.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <filesystem>
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 class RgbdReaderTest : public testing::Test {
  protected:
   static constexpr int kPairs = 12;
-  RgbdReaderTest() : folder(fs::path(testing::TempDir()) / "dkb_rgbd_reader") {
+  RgbdReaderTest() : folder(fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_rgbd_reader")) {
     fs::remove_all(folder);
     fs::create_directories(folder);
     camera.width = 32, camera.height = 24, camera.cx = 16, camera.cy = 12;

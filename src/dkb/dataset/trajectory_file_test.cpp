@@ -2,6 +2,7 @@
 #include "dkb/dataset/trajectory_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -54,7 +55,7 @@ TEST(TrajectoryFile, WritesStampsAsReadAndNineDecimals) {
 }
 
 TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "dkb_trajectory.txt";
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_trajectory.txt");
   const Trajectory t = parse_trajectory("1.25 0.1 0.2 0.3 0.5 0.5 0.5 0.5\n3 -1 -2 -3 0 0 0 1\n", "t.txt");
   write_trajectory(path, t);
   EXPECT_EQ(trajectory_to_text(read_trajectory(path)), trajectory_to_text(t));

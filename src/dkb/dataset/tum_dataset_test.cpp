@@ -2,6 +2,7 @@
 #include "dkb/dataset/tum_dataset.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <functional>
@@ -17,7 +18,7 @@ using Pairs = std::vector<std::pair<size_t, size_t>>;
 
 class TumFolder : public testing::Test {
  protected:
-  TumFolder() : folder(fs::path(testing::TempDir()) / "dkb_tum_folder") {
+  TumFolder() : folder(fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_tum_folder")) {
     fs::remove_all(folder);
     fs::create_directories(folder);
   }

@@ -2,6 +2,7 @@
 #include "dkb/dynamics/movers_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -47,7 +48,7 @@ TEST(MoversFile, ByteOrderMarksCarriageReturnsAndEmptyLinesAreTolerated) {
 }
 
 TEST(MoversFile, WhatIsWrittenIsReadBack) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "movers_file_test.csv";
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "movers_file_test.csv");
   write_movers(path, {example()});
   EXPECT_EQ(read_movers(path), (MoverRows{example()}));
   std::filesystem::remove(path);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <thread>
@@ -66,7 +67,7 @@ TEST(BoundedQueue, DropsTheOldestWhenAskedNotToWait) {
 }
 
 TEST(Files, AtomicWriteReplacesTheWholeFile) {
-  const fs::path folder = fs::path(::testing::TempDir()) / "dkb_files_test";
+  const fs::path folder = fs::path(::testing::TempDir()) / (std::to_string(::getpid()) + "dkb_files_test");
   make_output_folder(folder);
   write_file_atomically(folder / "a.txt", "first, and longer");
   write_file_atomically(folder / "a.txt", "second");
