@@ -43,15 +43,55 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
   cx_ = (static_cast<float>(camera.cx) + 0.5f) / scale, cy_ = (static_cast<float>(camera.cy) + 0.5f) / scale;
   k1_ = static_cast<float>(camera.k1), k2_ = static_cast<float>(camera.k2), k3_ = static_cast<float>(camera.k3);
   p1_ = static_cast<float>(camera.p1), p2_ = static_cast<float>(camera.p2);
-  rays_.reserve(static_cast<size_t>(width_) * static_cast<size_t>(height_));
+  x_.reserve(static_cast<size_t>(width_) * static_cast<size_t>(height_));
+  y_.reserve(x_.capacity());
   r2_max_ = 0;
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
       const Eigen::Vector2d pixel = camera.undistort({(x + 0.5) * cell - 0.5, (y + 0.5) * cell - 0.5});
-      rays_.push_back(camera.unproject(pixel, 1.0).head<2>().cast<float>());
-      r2_max_ = std::max(r2_max_, rays_.back().squaredNorm());
+      const Eigen::Vector3d ray = camera.unproject(pixel, 1.0);
+      x_.push_back(static_cast<float>(ray.x()));
+      y_.push_back(static_cast<float>(ray.y()));
+      r2_max_ = std::max(r2_max_, static_cast<float>(ray.head<2>().squaredNorm()));
     }
   r2_max_ *= 1.02f;  // far outside the image the distortion polynomial folds back
+}
+
+void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here,
+                         MotionProjection& result) const {
+  constexpr float kNearest = 0.1f;  // [m] in front of the camera
+  const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
+  const Eigen::Vector3f t = there_from_here.translation.cast<float>();
+  const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
+  const float r20 = r(2, 0), r21 = r(2, 1), r22 = r(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
+  const float fx = fx_, fy = fy_, cx = cx_ + 1.0f, cy = cy_ + 1.0f, k1 = k1_, k2 = k2_, k3 = k3_, p1 = p1_, p2 = p2_;
+  const float r2_max = r2_max_, right = static_cast<float>(width_) + 1.0f, bottom = static_cast<float>(height_) + 1.0f;
+  const int32_t width = width_, height = height_;
+  const size_t count = x_.size();
+  result.cell.resize(count);
+  result.depth.resize(count);
+  const float* const xs = x_.data();
+  const float* const ys = y_.data();
+  const float* const zs = depth.data();
+  int32_t* const cells = result.cell.data();
+  float* const depths = result.depth.data();
+  // No branches, so that the compiler can take four cells at a time. Coordinates are counted from 1 and cut to one cell
+  // around the grid: 0 and size + 1 are outside.
+  for (size_t i = 0; i < count; ++i) {
+    const float z = zs[i] > 0.0f ? zs[i] : missing;
+    const float px = z * (r00 * xs[i] + r01 * ys[i] + r02) + tx;
+    const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
+    const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
+    const float inverse = 1.0f / std::max(pz, kNearest), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
+    const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const float u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
+    const float v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
+    const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
+    const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
+    const bool seen = (pz > kNearest) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);
+    cells[i] = seen ? iy * width + ix : -1;
+    depths[i] = pz;
+  }
 }
 
 void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays) {

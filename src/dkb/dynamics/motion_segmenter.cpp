@@ -12,27 +12,12 @@ namespace dkb {
 namespace {
 
 constexpr float kTooNear = 0.45f;                  // [m] taken for the depth of what is too near for the sensor
-constexpr float kNearestDepth = 0.1f;              // [m] in front of the camera
 constexpr float kMotionPerFrame = 0.03f;           // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kHighest = 3.0f, kLowest = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
 constexpr int kLongRun = 300;      // [frames] over which missing depth is averaged
-
-// A rigid motion in floats, applied to points given by ray and depth.
-struct RayMotion {
-  Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;
-
-  explicit RayMotion(const Rigid3& motion)
-      : rotation(motion.matrix3().cast<float>()), translation(motion.translation.cast<float>()) {}
-  Eigen::Vector3f operator()(const Eigen::Vector2f& ray, float z) const {
-    return {z * (rotation(0, 0) * ray.x() + rotation(0, 1) * ray.y() + rotation(0, 2)) + translation.x(),
-            z * (rotation(1, 0) * ray.x() + rotation(1, 1) * ray.y() + rotation(1, 2)) + translation.y(),
-            z * (rotation(2, 0) * ray.x() + rotation(2, 1) * ray.y() + rotation(2, 2)) + translation.z()};
-  }
-};
 
 void clear(Image<float>& image) {
   std::fill(image.data(), image.data() + image.size(), 0.0f);
@@ -52,6 +37,7 @@ void MotionOptions::check() const {
   require_option(settle > 0, "motion.settle", settle, "greater than 0 s");
   require_option(memory > 0, "motion.memory", memory, "greater than 0 s");
   require_option(hole_memory > 0, "motion.hole_memory", hole_memory, "greater than 0 s");
+  require_option(revision >= 0 && revision <= 1, "motion.revision", revision, "in 0 ... 1");
   require_option(contour >= 0, "motion.contour", contour, "at least 0");
   require_option(interior >= 0, "motion.interior", interior, "at least 0");
   require_option(state >= 0, "motion.state", state, "at least 0");
@@ -146,7 +132,7 @@ void MotionSegmenter::carry_scores() {
   clear(current_->score);
   std::fill(known_.data(), known_.data() + known_.size(), uint8_t{0});
   if (!previous_) return;
-  const RayMotion motion(previous_->cam_from_world * current_->cam_from_world.inverse());
+  rays_.project(current_->depth, kTooNear, previous_->cam_from_world * current_->cam_from_world.inverse(), projection_);
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
   const auto keep_hole = static_cast<float>(std::exp(-interval / options_.hole_memory));
@@ -155,10 +141,9 @@ void MotionSegmenter::carry_scores() {
   for (size_t i = 0; i < current_->score.size(); ++i) {
     const float z = current_->depth.data()[i];
     const bool hole = !(z > 0);
-    const Eigen::Vector3f point = motion(rays_.ray(i), hole ? kTooNear : z);
-    if (point.z() < kNearestDepth) continue;
-    const int at = rays_.cell_of(point.x(), point.y(), point.z());
+    const int at = projection_.cell[i];
     if (at < 0) continue;
+    const float depth_there = projection_.depth[i];
     if (hole) {
       if (before.data()[at] >= near) continue;
       current_->score.data()[i] = keep_hole * std::max(0.0f, previous_->score.data()[at]);
@@ -166,7 +151,7 @@ void MotionSegmenter::carry_scores() {
       continue;
     }
     float bound = tolerance_.data()[i] + kMotionPerFrame;
-    if (before.data()[at] > 0 && std::abs(before.data()[at] - point.z()) < bound) {
+    if (before.data()[at] > 0 && std::abs(before.data()[at] - depth_there) < bound) {
       current_->score.data()[i] = keep * previous_->score.data()[at];
       known_.data()[i] = 1;
       continue;
@@ -175,7 +160,7 @@ void MotionSegmenter::carry_scores() {
     const int x = at % before.width(), y = at / before.width();
     for (int v = std::max(0, y - kCarryRadius); v <= std::min(before.height() - 1, y + kCarryRadius); ++v)
       for (int u = std::max(0, x - kCarryRadius); u <= std::min(before.width() - 1, x + kCarryRadius); ++u) {
-        const float difference = std::abs(before(u, v) - point.z());
+        const float difference = std::abs(before(u, v) - depth_there);
         if (!(before(u, v) > 0) || difference >= bound) continue;
         bound = difference;
         current_->score.data()[i] = keep * previous_->score(u, v);
@@ -185,37 +170,39 @@ void MotionSegmenter::carry_scores() {
 }
 
 // What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
-void MotionSegmenter::compare(const MotionDepthGrid& view) {
-  const RayMotion motion(view.cam_from_world * current_->cam_from_world.inverse());
+void MotionSegmenter::compare(MotionDepthGrid& view) {
+  rays_.project(current_->depth, kTooNear, view.cam_from_world * current_->cam_from_world.inverse(), projection_);
   const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / options_.settle, 0.0, 1.0));
   const float contour_weight = trust * static_cast<float>(options_.contour);
   const float interior_weight = trust * static_cast<float>(options_.interior);
-  const auto slope = static_cast<float>(options_.slope);
+  const auto slope = static_cast<float>(options_.slope), revision = static_cast<float>(options_.revision);
   // From this much farther on, the surface behind does not hang together with the one in front.
   const auto beyond = [](float z, float tolerance) { return z + 2.0f * tolerance + 0.03f * z; };
   for (size_t i = 0; i < current_->depth.size(); ++i) {
     const float z = current_->depth.data()[i];
     const bool hole = !(z > 0);
-    const Eigen::Vector3f point = motion(rays_.ray(i), hole ? kTooNear : z);
-    if (point.z() < kNearestDepth) continue;
-    const int at = rays_.cell_of(point.x(), point.y(), point.z());
+    const int at = projection_.cell[i];
     if (at < 0) continue;
+    const float depth_there = projection_.depth[i];
     if (hole) {
-      intrusions_.data()[i] += view.depth.data()[at] > point.z() ? 1.0f : 0.0f;
+      intrusions_.data()[i] += view.depth.data()[at] > depth_there ? 1.0f : 0.0f;
       continue;
     }
     const float nearest = view.nearest.data()[at], farthest = view.farthest.data()[at],
                 tolerance = tolerance_.data()[i];
     if (!(farthest > 0)) continue;
-    if (point.z() + tolerance < nearest) {
+    if (depth_there + tolerance < nearest) {
       const float margin = std::max(tolerance, tolerance_at(nearest)) + slope * (farthest - nearest);
-      if (view.depth.data()[at] > 0 && point.z() + margin < nearest) intrusions_.data()[i] += 1.0f;
-    } else if (point.z() < farthest + tolerance && view.score.data()[at] < kUnmarked) {
+      if (view.depth.data()[at] > 0 && depth_there + margin < nearest) intrusions_.data()[i] += 1.0f;
+    } else if (depth_there < farthest + tolerance) {
+      float& score_then = view.score.data()[at];
+      score_then += revision * (current_->score.data()[i] - score_then);
+      if (score_then >= kUnmarked) continue;
       agreements_.data()[i] += trust;
       const bool outline = current_->farthest.data()[i] > beyond(z, tolerance);
       if (!outline)
         still_.data()[i] += interior_weight;
-      else if (farthest > beyond(point.z(), tolerance))
+      else if (farthest > beyond(depth_there, tolerance))
         still_.data()[i] += contour_weight;
     }
   }
@@ -272,16 +259,14 @@ void MotionSegmenter::update_scores() {
 }
 
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
-MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) const {
+MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) {
   MoverMask result;
   result.cell = options_.cell;
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
   const auto threshold = static_cast<float>(options_.threshold);
-  const RayMotion motion(depth_from_colour);
+  rays_.project(current_->depth, kTooNear, depth_from_colour, projection_);
   for (size_t i = 0; i < result.cells.size(); ++i) {
-    const float z = current_->depth.data()[i];
-    const Eigen::Vector3f point = motion(rays_.ray(i), z > 0 ? z : kTooNear);
-    const int at = point.z() > kNearestDepth ? rays_.cell_of(point.x(), point.y(), point.z()) : -1;
+    const int at = projection_.cell[i];
     if (at >= 0 && current_->score.data()[at] > threshold) result.cells.data()[i] = 255;
   }
   dilate(result, options_.rim);

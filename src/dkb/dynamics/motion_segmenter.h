@@ -16,18 +16,18 @@
 namespace dkb {
 
 struct MotionOptions {
-  int cell = 4;                // [px] side of the cells that are judged, 2 ... 32
-  int views = 8;               // past views kept, >= 2
-  int views_per_frame = 4;     // of them compared with each frame, in turn, >= 1
-  double view_interval = 0.2;  // [s] between views when they are taken; with age they thin out, > 0
-  double view_age = 15;        // [s] older views are dropped, so that a parked chair becomes part of the room, > 0
-  double tolerance = 0.02;     // [m] what poses and calibration may be off in depth, >= 0
-  double tolerance_sigmas =
-      6;                   // standard deviations of the sensor's depth noise (flat-wall figure of SensorNoise), >= 0
-  double slope = 1;        // share of a view's depth range over 3 x 3 cells added to the tolerance, >= 0
-  double settle = 0.5;     // [s] agreement with a view counts in proportion to its age up to this, > 0
-  double memory = 6;       // [s] time constant in which a mover that stands still is forgotten, > 0
-  double hole_memory = 1;  // [s] the same for what is too near for the sensor, > 0
+  int cell = 4;                 // [px] side of the cells that are judged, 2 ... 32
+  int views = 8;                // past views kept, >= 2
+  int views_per_frame = 4;      // of them compared with each frame, in turn, >= 1
+  double view_interval = 0.2;   // [s] between views when they are taken; with age they thin out, > 0
+  double view_age = 15;         // [s] older views are dropped, so that a parked chair becomes part of the room, > 0
+  double tolerance = 0.02;      // [m] what poses and calibration may be off in depth, >= 0
+  double tolerance_sigmas = 6;  // standard deviations of the sensor's depth noise on flat walls (SensorNoise), >= 0
+  double slope = 1;             // share of a view's depth range over 3 x 3 cells added to the tolerance, >= 0
+  double settle = 0.5;          // [s] agreement with a view counts in proportion to its age up to this, > 0
+  double memory = 6;            // [s] time constant in which a mover that stands still is forgotten, > 0
+  double hole_memory = 1;       // [s] the same for what is too near for the sensor, > 0
+  double revision = 0.1;  // share of its own verdict that a view gives up for today's on the same surface, 0 ... 1
   // Weights of evidence beside that of an intrusion into space seen empty, which is 1. All >= 0.
   double contour = 0.3;         // an outline that is where a view had it: still
   double interior = 0.1;        // a surface that is where a view had it: still, but so is the inside of one that sways
@@ -44,7 +44,7 @@ struct MotionOptions {
 // Finds what moves against the camera's own motion, of any class, without a model: people, a pushed chair, a carried
 // box. A surface in space that an earlier view saw empty has come in; its evidence is shared with what it hangs
 // together with, and carried along with the surface, so that who stops moving stays marked for seconds. Who is there
-// from the first frame is found as soon as his outline has moved by about two cells.
+// from the first frame is found once his outline has moved by some cells, large things later than small ones.
 //
 // Works on depth alone, on a coarse grid. Deterministic. Keeps its buffers from frame to frame; one object per thread.
 // Calls alternate: segment() with the expected pose, then commit() with the one that tracking found.
@@ -62,9 +62,7 @@ class MotionSegmenter {
   void reset();
   // Per cell of the frame last segmented: from -3, surely still, to 3, surely moving; 0 = nothing known;
   // empty before the first frame and after reset().
-  const Image<float>& score() const {
-    return current_ ? current_->score : previous_ ? previous_->score : nothing_;
-  }
+  const Image<float>& score() const { return current_ ? current_->score : previous_ ? previous_->score : nothing_; }
 
  private:
   struct Stamped {
@@ -75,11 +73,11 @@ class MotionSegmenter {
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   float tolerance_at(float depth) const;
   void carry_scores();
-  void compare(const MotionDepthGrid& view);
+  void compare(MotionDepthGrid& view);
   void find_openings();
   void weigh();
   void update_scores();
-  MoverMask mask(const Rigid3& depth_from_colour) const;
+  MoverMask mask(const Rigid3& depth_from_colour);
   void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
   std::unique_ptr<MotionDepthGrid> take_spare();
 
@@ -94,6 +92,7 @@ class MotionSegmenter {
   double image_time_ = 0;
   size_t turn_ = 0;
   int frames_ = 0;
+  MotionProjection projection_;
   const Image<float> nothing_;
   Image<float> tolerance_;                        // [m] by cell
   Image<float> intrusions_, agreements_, still_;  // votes of the views

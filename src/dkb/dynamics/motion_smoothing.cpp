@@ -2,6 +2,7 @@
 #include "dkb/dynamics/motion_smoothing.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "dkb/util/errors.h"
@@ -66,30 +67,46 @@ void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t
     }
 }
 
+namespace {
+
+// Along rows, to the right and back. Several rows at once, since each value waits for the one before it.
+template <int kRows>
+void sweep_rows(Image<float>& weighted, Image<float>& weights, const Image<float>& links, int first_row) {
+  const int width = weighted.width();
+  std::array<float*, kRows> a, b;
+  std::array<const float*, kRows> link;
+  for (int k = 0; k < kRows; ++k) {
+    const auto row = static_cast<size_t>(k);
+    a[row] = weighted.row(first_row + k), b[row] = weights.row(first_row + k), link[row] = links.row(first_row + k);
+  }
+  for (int x = 1; x < width; ++x)
+    for (size_t k = 0; k < kRows; ++k) {
+      a[k][x] += link[k][x] * (a[k][x - 1] - a[k][x]);
+      b[k][x] += link[k][x] * (b[k][x - 1] - b[k][x]);
+    }
+  for (int x = width - 2; x >= 0; --x)
+    for (size_t k = 0; k < kRows; ++k) {
+      a[k][x] += link[k][x + 1] * (a[k][x + 1] - a[k][x]);
+      b[k][x] += link[k][x + 1] * (b[k][x + 1] - b[k][x]);
+    }
+}
+
+}  // namespace
+
 void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
   const int width = weighted.width(), height = weighted.height();
   const auto take_row = [width](float* to, const float* from, const float* link) {
     for (int x = 0; x < width; ++x) to[x] += link[x] * (from[x] - to[x]);
   };
   for (int pass = 0; pass < 2; ++pass) {
-    for (int y = 0; y < height; ++y) {
-      float* a = weighted.row(y);
-      float* b = weights.row(y);
-      const float* link = left_.row(y);
-      for (int x = 1; x < width; ++x) {
-        a[x] += link[x] * (a[x - 1] - a[x]);
-        b[x] += link[x] * (b[x - 1] - b[x]);
-      }
-      for (int x = width - 2; x >= 0; --x) {
-        a[x] += link[x + 1] * (a[x + 1] - a[x]);
-        b[x] += link[x + 1] * (b[x + 1] - b[x]);
-      }
-    }
-    for (int y = 1; y < height; ++y) {
+    int y = 0;
+    for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
+    for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
+    for (y = 1; y < height; ++y) {
       take_row(weighted.row(y), weighted.row(y - 1), up_.row(y));
       take_row(weights.row(y), weights.row(y - 1), up_.row(y));
     }
-    for (int y = height - 2; y >= 0; --y) {
+    for (y = height - 2; y >= 0; --y) {
       take_row(weighted.row(y), weighted.row(y + 1), up_.row(y + 1));
       take_row(weights.row(y), weights.row(y + 1), up_.row(y + 1));
     }

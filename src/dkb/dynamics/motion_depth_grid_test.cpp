@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/motion_depth_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dkb {
+namespace {
+
+TEST(MotionRays, ProjectEveryCellOntoItselfUnderNoMotion) {
+  for (const char* name : {"fr1", "fr2", "fr3"}) {
+    const CameraModel camera = *builtin_camera(name);
+    const MotionRays rays(camera, 4);
+    MotionProjection projection;
+    rays.project(Image<float>(rays.width(), rays.height(), 2.0f), 1.0f, Rigid3(), projection);
+    for (size_t i = 0; i < projection.cell.size(); ++i) {
+      ASSERT_EQ(projection.cell[i], static_cast<int32_t>(i)) << name;
+      ASSERT_EQ(projection.depth[i], 2.0f);
+    }
+  }
+}
+
+TEST(MotionRays, AgreeWithTheCameraModel) {
+  const CameraModel camera = *builtin_camera("fr1");
+  const MotionRays rays(camera, 4);
+  const Rigid3 motion(rotation_from_vector({0.05, -0.1, 0.2}), {0.1, -0.05, -0.3});
+  const Image<float> depth(rays.width(), rays.height(), 1.5f);
+  MotionProjection projection;
+  rays.project(depth, 1.0f, motion, projection);
+  int seen = 0, different = 0;
+  for (int y = 0; y < rays.height(); ++y)
+    for (int x = 0; x < rays.width(); ++x) {
+      const int cell = projection.cell[static_cast<size_t>(y * rays.width() + x)];
+      if (cell < 0) continue;
+      const Eigen::Vector2d pixel = camera.undistort({4 * x + 1.5, 4 * y + 1.5});
+      const Eigen::Vector2d there = camera.distort(camera.project(motion * camera.unproject(pixel, 1.5)));
+      const int expected_x = static_cast<int>(std::floor((there.x() + 0.5) / 4));
+      const int expected_y = static_cast<int>(std::floor((there.y() + 0.5) / 4));
+      ++seen;
+      different += cell != expected_y * rays.width() + expected_x;
+    }
+  EXPECT_GT(seen, 10000);
+  EXPECT_LT(different, 10);  // positions on the very edge between two cells
+}
+
+TEST(MotionRays, SeeNothingBehindTheCamera) {
+  const MotionRays rays(*builtin_camera("fr3"), 4);
+  MotionProjection projection;
+  rays.project(Image<float>(160, 120, 1.0f), 1.0f, Rigid3(Eigen::Quaterniond::Identity(), {0, 0, -1.5}), projection);
+  for (int32_t cell : projection.cell) ASSERT_EQ(cell, -1);
+}
+
+TEST(MotionDepthGrid, TakesTheLowerMedianAndTheBoundsOfItsNeighbourhood) {
+  const MotionRays rays(*builtin_camera("fr3"), 4);
+  DepthImage image(640, 480, 2.0f);
+  for (int y = 40; y < 80; ++y)
+    for (int x = 40; x < 80; ++x) image(x, y) = 1.0f;  // cells 10 ... 19
+  for (int y = 200; y < 240; ++y)
+    for (int x = 200; x < 240; ++x) image(x, y) = 0.0f;  // cells 50 ... 59
+  MotionDepthGrid grid;
+  grid.set_depth(image, rays);
+  EXPECT_EQ(grid.depth(15, 15), 1.0f);
+  EXPECT_EQ(grid.nearest(15, 15), 1.0f);
+  EXPECT_EQ(grid.farthest(15, 15), 1.0f);
+  EXPECT_EQ(grid.depth(9, 15), 2.0f);
+  EXPECT_EQ(grid.nearest(9, 15), 1.0f);  // its right neighbour is nearer
+  EXPECT_EQ(grid.nearest(8, 15), 2.0f);
+  EXPECT_EQ(grid.farthest(19, 15), 2.0f);  // its right neighbour is farther
+  EXPECT_EQ(grid.depth(55, 55), 0.0f);
+  EXPECT_EQ(grid.farthest(55, 55), 0.0f);
+  EXPECT_TRUE(std::isinf(grid.nearest(55, 55)));
+  EXPECT_EQ(grid.nearest(50, 55), 2.0f);  // missing depth bounds nothing
+}
+
+TEST(MotionDepthGrid, CoversImagesThatAreNoMultipleOfTheCell) {
+  CameraModel camera;
+  camera.width = 101;
+  camera.height = 67;
+  const MotionRays rays(camera, 8);
+  EXPECT_EQ(rays.width(), 13);
+  EXPECT_EQ(rays.height(), 9);
+  MotionDepthGrid grid;
+  grid.set_depth(DepthImage(101, 67, 1.5f), rays);
+  for (size_t i = 0; i < grid.depth.size(); ++i) EXPECT_EQ(grid.depth.data()[i], 1.5f);
+}
+
+}  // namespace
+}  // namespace dkb

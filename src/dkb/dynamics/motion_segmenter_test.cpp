@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/motion_segmenter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+// An upright rectangle parallel to the wall [m, world: x right, y down, z away from the camera's start].
+struct Panel {
+  double x0, y0, x1, y1, z;
+  bool mover = false;
+};
+
+struct Picture {
+  RgbdImage image;
+  GreyImage truth;  // 255 = mover
+};
+
+// A wall 3 m away, a pillar before it, and what the test puts in, seen by a camera that sways and turns.
+class World {
+ public:
+  static constexpr int kWidth = 320, kHeight = 240;
+
+  World() {
+    camera.width = kWidth;
+    camera.height = kHeight;
+    camera.fx = camera.fy = 262;
+    camera.cx = 159.5;
+    camera.cy = 119.5;
+  }
+
+  Rigid3 cam_from_world(int frame) const {
+    const double t = still_camera ? 0.0 : frame / 30.0;
+    const Rigid3 world_from_cam(rotation_from_vector({0.03 * std::sin(2.0 * t), 0.05 * std::sin(1.5 * t), 0}),
+                                {0.15 * std::sin(1.2 * t), 0.05 * std::sin(1.7 * t), 0.1 * std::sin(0.8 * t)});
+    return world_from_cam.inverse();
+  }
+
+  Picture render(int frame, const std::vector<Panel>& movers) const {
+    std::vector<Panel> panels{{-9, -9, 9, 9, 3.0}, {-1.0, -2, -0.7, 2, 2.2}};
+    panels.insert(panels.end(), movers.begin(), movers.end());
+    Picture p;
+    p.image.timestamp = p.image.depth_timestamp = frame / 30.0;
+    p.image.grey = GreyImage(kWidth, kHeight);
+    p.image.depth = DepthImage(kWidth, kHeight);
+    p.truth = GreyImage(kWidth, kHeight);
+    const Rigid3 world_from_cam = cam_from_world(frame).inverse();
+    Random random(static_cast<uint64_t>(frame) + 17);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const Eigen::Vector3d ray = world_from_cam.rotation * camera.unproject(Eigen::Vector2d(x, y), 1.0);
+        double nearest = 99;
+        for (const Panel& panel : panels) {
+          const double z = (panel.z - world_from_cam.translation.z()) / ray.z();  // depth along the optical axis
+          const Eigen::Vector3d point = world_from_cam.translation + z * ray;
+          if (z >= nearest || point.x() < panel.x0 || point.x() > panel.x1 || point.y() < panel.y0 ||
+              point.y() > panel.y1)
+            continue;
+          nearest = z;
+          p.truth(x, y) = panel.mover ? 255 : 0;
+        }
+        const double sigma = 0.0012 + 0.0019 * (nearest - 0.4) * (nearest - 0.4);
+        if (random.uniform() >= holes) p.image.depth(x, y) = static_cast<float>(nearest + sigma * random.normal());
+      }
+    return p;
+  }
+
+  CameraModel camera;
+  bool still_camera = false;
+  double holes = 0;  // share of the pixels without depth
+};
+
+Panel box_at(double x, double z = 1.6) {
+  return {x - 0.25, -0.4, x + 0.25, 0.4, z, true};
+}
+
+struct Figures {
+  double covered = 1;  // share of the mover's pixels marked
+  double wrong = 0;    // share of the rest marked, but for a band of 12 px around the mover
+};
+
+Figures judge(const MoverMask& mask, const GreyImage& truth) {
+  int on = 0, hit = 0, off = 0, wrong = 0;
+  for (int y = 0; y < truth.height(); ++y)
+    for (int x = 0; x < truth.width(); ++x) {
+      const bool marked = mask.at(static_cast<float>(x), static_cast<float>(y));
+      if (truth(x, y) != 0) {
+        ++on, hit += marked;
+        continue;
+      }
+      bool near = false;
+      for (int v = std::max(0, y - 12); v <= std::min(truth.height() - 1, y + 12); v += 4)
+        for (int u = std::max(0, x - 12); u <= std::min(truth.width() - 1, x + 12); u += 4) near |= truth(u, v) != 0;
+      if (!near) ++off, wrong += marked;
+    }
+  return {on > 0 ? static_cast<double>(hit) / on : 1.0, static_cast<double>(wrong) / std::max(1, off)};
+}
+
+// Runs frames 0 ... frames - 1 with poses off by 2 mm and 0.1 degrees, and hands each frame's figures to `look`.
+void run(const World& world, int frames, const std::function<std::vector<Panel>(int)>& movers,
+         const std::function<void(int, const MoverMask&, const Figures&)>& look, MotionOptions options = {}) {
+  MotionSegmenter segmenter(world.camera, options);
+  Random random(3);
+  for (int f = 0; f < frames; ++f) {
+    const Picture p = world.render(f, movers(f));
+    Vector6d error;
+    for (int i = 0; i < 6; ++i) error[i] = (i < 3 ? 0.002 : 0.0017) * random.normal();
+    const MoverMask mask = segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f));
+    look(f, mask, judge(mask, p.truth));
+    segmenter.commit(world.cam_from_world(f));
+  }
+}
+
+TEST(MotionSegmenter, MarksNothingInTheFirstFrame) {
+  run(
+      World(), 1, [](int) { return std::vector{box_at(0)}; },
+      [](int, const MoverMask& mask, const Figures& figures) {
+        EXPECT_EQ(mask.cells.width(), 80);
+        EXPECT_EQ(mask.cells.height(), 60);
+        EXPECT_EQ(figures.covered, 0);
+      });
+}
+
+TEST(MotionSegmenter, LeavesAStillWorldUnmarked) {
+  run(
+      World(), 60, [](int) { return std::vector<Panel>{}; },
+      [](int f, const MoverMask&, const Figures& figures) { EXPECT_LT(figures.wrong, 0.01) << f; });
+}
+
+TEST(MotionSegmenter, FindsABoxThatComesInAndNothingElse) {
+  run(
+      World(), 50, [](int f) { return std::vector{box_at(-1.4 + 0.03 * f)}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f < 20) return;
+        EXPECT_GT(figures.covered, 0.9) << f;
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
+}
+
+TEST(MotionSegmenter, KeepsABoxMarkedThatStops) {
+  run(
+      World(), 120, [](int f) { return std::vector{box_at(std::min(0.1, -1.4 + 0.05 * f))}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f < 30) return;  // stands from here on, for three seconds
+        EXPECT_GT(figures.covered, 0.9) << f;
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
+}
+
+TEST(MotionSegmenter, FreesTheBackgroundAtOnceWhenTheBoxLeaves) {
+  run(
+      World(), 40,
+      [](int f) { return f < 30 ? std::vector{box_at(std::min(0.0, -1.4 + 0.07 * f))} : std::vector<Panel>{}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f >= 31) {
+          EXPECT_LT(figures.wrong, 0.01) << f;
+        }
+      });
+}
+
+TEST(MotionSegmenter, FindsABoxThatWasThereFromTheStartWhenItSways) {
+  run(
+      World(), 90, [](int f) { return std::vector{box_at(0.12 * std::sin(2.5 * f / 30.0))}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f >= 60) {
+          EXPECT_GT(figures.covered, 0.85) << f;
+        }
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
+}
+
+TEST(MotionSegmenter, FindsABoxThatComesNearerBeforeAStillCamera) {
+  World world;
+  world.still_camera = true;
+  run(
+      world, 40, [](int f) { return std::vector{box_at(0.0, 2.2 - 0.02 * f)}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f < 20) return;
+        EXPECT_GT(figures.covered, 0.95) << f;
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
+}
+
+TEST(MotionSegmenter, IsNotConfusedByMissingDepth) {
+  World world;
+  world.holes = 0.3;
+  run(
+      world, 50, [](int f) { return std::vector{box_at(-1.4 + 0.03 * f)}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f < 20) return;
+        EXPECT_GT(figures.covered, 0.9) << f;
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
+}
+
+TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
+  // A box comes up to 0.5 m; then its depth is missing but for a rim.
+  const World world;
+  MotionSegmenter segmenter(world.camera);
+  for (int f = 0; f < 45; ++f) {
+    const double z = std::max(0.5, 2.0 - 0.05 * f);
+    Picture p = world.render(f, {box_at(0, z)});
+    if (f > 32)
+      for (int y = 60; y < 180; ++y)
+        for (int x = 100; x < 220; ++x)
+          if (p.truth(x, y) != 0) p.image.depth(x, y) = 0;
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    if (f > 36) {
+      EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
+      EXPECT_LT(judge(mask, p.truth).wrong, 0.02) << f;
+    }
+    segmenter.commit(world.cam_from_world(f));
+  }
+}
+
+TEST(MotionSegmenter, GivesNothingOnImagesWithoutDepth) {
+  World world;
+  world.holes = 1;
+  run(
+      world, 10, [](int) { return std::vector<Panel>{}; },
+      [](int, const MoverMask&, const Figures& figures) { EXPECT_EQ(figures.wrong, 0); });
+}
+
+TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
+  const World world;
+  MotionSegmenter segmenter(world.camera);
+  for (int f = 0; f < 25; ++f) {
+    const Picture p = world.render(f, {box_at(-1.4 + 0.05 * f)});
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    if (f == 24) {
+      EXPECT_GT(judge(mask, p.truth).covered, 0.9);
+    }
+    segmenter.commit(f == 24 ? std::nullopt : std::optional(world.cam_from_world(f)));
+  }
+  EXPECT_TRUE(segmenter.score().empty());
+  const Picture p = world.render(25, {box_at(-0.2)});
+  EXPECT_EQ(judge(segmenter.segment(p.image, Rigid3()), p.truth).covered, 0);
+}
+
+TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
+  const World world;
+  MotionSegmenter segmenter(world.camera);
+  const Rigid3 new_from_old(rotation_from_vector({0.1, -0.3, 0.2}), {1, 2, 3});
+  for (int f = 0; f < 40; ++f) {
+    const Picture p = world.render(f, {box_at(-1.4 + 0.04 * f)});
+    const Rigid3 cam_from_world = f < 30 ? world.cam_from_world(f) : world.cam_from_world(f) * new_from_old.inverse();
+    const Figures figures = judge(segmenter.segment(p.image, cam_from_world), p.truth);
+    if (f >= 30) {
+      EXPECT_GT(figures.covered, 0.9) << f;
+      EXPECT_LT(figures.wrong, 0.01) << f;
+    }
+    segmenter.commit(cam_from_world);
+    if (f == 29) segmenter.move_world(new_from_old);
+  }
+}
+
+TEST(MotionSegmenter, GivesTheSameMasksAgain) {
+  std::vector<Image<uint8_t>> first, second;
+  for (auto* masks : {&first, &second})
+    run(
+        World(), 30, [](int f) { return std::vector{box_at(-1.4 + 0.05 * f)}; },
+        [&](int, const MoverMask& mask, const Figures&) { masks->push_back(mask.cells); });
+  EXPECT_EQ(first, second);
+}
+
+TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
+  MotionSegmenter segmenter(World().camera);
+  RgbdImage image;
+  image.depth = DepthImage(64, 48);
+  EXPECT_THROW(segmenter.segment(image, Rigid3()), InputError);
+}
+
+TEST(MotionOptions, NamesTheFieldThatIsOutOfRange) {
+  MotionOptions options;
+  options.smoothing.reach = 0;
+  try {
+    options.check();
+    FAIL();
+  } catch (const InvalidOption& e) {
+    EXPECT_NE(std::string(e.what()).find("reach"), std::string::npos);
+  }
+  options = {};
+  options.views = 1;
+  EXPECT_THROW(MotionSegmenter(World().camera, options), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb
