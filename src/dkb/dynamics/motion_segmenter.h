@@ -60,7 +60,7 @@ class MotionSegmenter {
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
   void move_world(const Rigid3& new_from_old);
   void reset();
-  // Per cell of the frame last segmented: from -3, surely still, to 3, surely moving; 0 = nothing known;
+  // Per cell of the frame last segmented: from -1, surely still, to 3, surely moving; 0 = nothing known;
   // empty before the first frame and after reset().
   const Image<float>& score() const { return current_ ? current_->score : previous_ ? previous_->score : nothing_; }
 

@@ -19,7 +19,7 @@ std::vector<Detection> detections_of(const auto& carried) {
   return boxes;
 }
 
-// Score of the motion segmentation below which a cell was seen to stand still; it runs from -3 to 3.
+// Score of the motion segmentation below which a cell was seen to stand still; it runs from -1 to 3.
 constexpr float kStill = -0.3f;
 
 // What was seen to stand still before the object came is no part of it.
