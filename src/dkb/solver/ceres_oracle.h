@@ -100,6 +100,9 @@ inline CeresBa ceres_bundle_adjust(BaProblem& problem, const CeresBaOptions& opt
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = options.solver;
+  // Not CHOLMOD: it hands work to whichever BLAS is installed, and some of those start threads of their own, in which
+  // the thread sanitizer sees races.
+  solver.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
   solver.linear_solver_ordering.reset(ordering);
   solver.max_num_iterations = options.iterations;
   solver.function_tolerance = options.relative_tolerance;
