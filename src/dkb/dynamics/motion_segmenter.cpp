@@ -17,6 +17,7 @@ constexpr float kHighest = 3.0f, kLowest = -1.0f;  // bounds of scores: a still 
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
+constexpr int kHoleRadius = 2;     // [cells] half the width up to which missing depth is a strip
 constexpr int kLongRun = 300;      // [frames] over which missing depth is averaged
 
 void clear(Image<float>& image) {
@@ -45,6 +46,7 @@ void MotionOptions::check() const {
   require_option(hole_prior >= 0, "motion.hole_prior", hole_prior, "at least 0");
   require_option(full_evidence > 0, "motion.full_evidence", full_evidence, "greater than 0");
   require_option(threshold > 0 && threshold <= 2, "motion.threshold", threshold, "in (0, 2]");
+  require_option(lone_hole >= 0 && lone_hole <= 1, "motion.lone_hole", lone_hole, "in 0 ... 1");
   require_option(rim >= 0, "motion.rim", rim, "at least 0 cells");
   smoothing.check();
 }
@@ -258,6 +260,46 @@ void MotionSegmenter::update_scores() {
   }
 }
 
+// Along the edges of things depth goes missing too, in strips; what stands too near for the sensor is broad.
+void MotionSegmenter::clear_thin_holes(MoverMask& mask) const {
+  MoverMask broad = mask;
+  erode(broad, kHoleRadius);
+  dilate(broad, kHoleRadius);
+  for (size_t i = 0; i < mask.cells.size(); ++i)
+    if (!(current_->depth.data()[i] > 0) && broad.cells.data()[i] == 0) mask.cells.data()[i] = 0;
+}
+
+// Depth goes missing on screens and at edges as well. It speaks of a mover only where it hangs together with one that
+// was measured, or is large: somebody too near for the sensor.
+void MotionSegmenter::clear_lone_holes(Image<uint8_t>& marked) {
+  const int width = marked.width(), height = marked.height();
+  const auto enough = static_cast<size_t>(options_.lone_hole * static_cast<double>(marked.size()));
+  const auto hole = [&](size_t i) { return !(current_->depth.data()[i] > 0); };
+  Image<uint8_t> seen(width, height);
+  std::vector<size_t> region;
+  for (size_t start = 0; start < marked.size(); ++start) {
+    if (marked.data()[start] == 0 || seen.data()[start] != 0 || !hole(start)) continue;
+    region.assign(1, start);
+    seen.data()[start] = 1;
+    bool measured = false;
+    for (size_t k = 0; k < region.size(); ++k) {
+      const int x = static_cast<int>(region[k]) % width, y = static_cast<int>(region[k]) / width;
+      for (const auto& [u, v] : {std::pair(x - 1, y), std::pair(x + 1, y), std::pair(x, y - 1), std::pair(x, y + 1)}) {
+        if (!marked.contains(u, v) || marked(u, v) == 0) continue;
+        const size_t i = static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
+        if (!hole(i)) {
+          measured = true;
+        } else if (seen.data()[i] == 0) {
+          seen.data()[i] = 1;
+          region.push_back(i);
+        }
+      }
+    }
+    if (!measured && region.size() < enough)
+      for (size_t i : region) marked.data()[i] = 0;
+  }
+}
+
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
 MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) {
   MoverMask result;
@@ -269,6 +311,8 @@ MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) {
     const int at = projection_.cell[i];
     if (at >= 0 && current_->score.data()[at] > threshold) result.cells.data()[i] = 255;
   }
+  clear_thin_holes(result);
+  clear_lone_holes(result.cells);
   dilate(result, options_.rim);
   return result;
 }

@@ -36,7 +36,8 @@ struct MotionOptions {
   double hole_prior = 0.02;     // the same where depth is missing
   double full_evidence = 0.05;  // mean weight around a cell at which one frame says all it can, > 0
   double threshold = 0.5;       // score from which a cell moves; one frame adds at most 1, (0, 2]
-  int rim = 1;                  // [cells] the mask is widened by, >= 0
+  double lone_hole = 0.05;      // share of the image from which missing depth moves though no measured mover touches it
+  int rim = 0;                  // [cells] the mask is widened by, >= 0
   MotionSmoothingOptions smoothing;
   void check() const;  // throws InvalidOption
 };
@@ -77,6 +78,8 @@ class MotionSegmenter {
   void find_openings();
   void weigh();
   void update_scores();
+  void clear_thin_holes(MoverMask& mask) const;
+  void clear_lone_holes(Image<uint8_t>& marked);
   MoverMask mask(const Rigid3& depth_from_colour);
   void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
   std::unique_ptr<MotionDepthGrid> take_spare();

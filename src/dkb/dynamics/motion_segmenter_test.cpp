@@ -220,6 +220,30 @@ TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
   }
 }
 
+// Missing depth beside a mover, as at the edges of screens: a strip that touches it, and a patch that does not.
+TEST(MotionSegmenter, MissingDepthAloneIsNoMover) {
+  const World world;
+  MotionSegmenter segmenter(world.camera);
+  for (int f = 0; f < 40; ++f) {
+    Picture p = world.render(f, {box_at(-1.2 + 0.03 * f)});
+    if (f > 25) {
+      int right = 0;
+      for (int x = 0; x < World::kWidth; ++x)
+        if (p.truth(x, 120) != 0) right = x;
+      for (int x = right + 1; x < std::min(World::kWidth, right + 60); ++x)
+        for (int y = 116; y < 126; ++y) p.image.depth(x, y) = 0;
+      for (int x = 20; x < 44; ++x)
+        for (int y = 20; y < 44; ++y) p.image.depth(x, y) = 0;
+    }
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    if (f > 28) {
+      EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
+      EXPECT_LT(judge(mask, p.truth).wrong, 0.002) << f;
+    }
+    segmenter.commit(world.cam_from_world(f));
+  }
+}
+
 TEST(MotionSegmenter, GivesNothingOnImagesWithoutDepth) {
   World world;
   world.holes = 1;

@@ -32,4 +32,13 @@ void dilate(MoverMask& mask, int radius) {
     }
 }
 
+void erode(MoverMask& mask, int radius) {
+  const auto invert = [&] {
+    for (size_t i = 0; i < mask.cells.size(); ++i) mask.cells.data()[i] = mask.cells.data()[i] != 0 ? 0 : 255;
+  };
+  invert();
+  dilate(mask, radius);
+  invert();
+}
+
 }  // namespace dkb

@@ -25,5 +25,7 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height);
 
 // Grows the marked area by `radius` cells in all eight directions.
 void dilate(MoverMask& mask, int radius);
+// Shrinks it likewise; what lies outside the image counts as marked.
+void erode(MoverMask& mask, int radius);
 
 }  // namespace dkb

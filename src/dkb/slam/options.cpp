@@ -81,6 +81,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.radius_last_frame", &t.radius_last_frame, "[px] search around the predicted position");
   s.bind("tracking.radius_wide", &t.radius_wide, "[px] second try");
   s.bind("tracking.radius_local_map", &t.radius_local_map, "[px] search for local map points");
+  s.bind("tracking.odometry_sigma_factor", &t.odometry_sigma_factor,
+         "on the noise of visual-odometry points; 0 = without them");
   s.bind("tracking.match_distance", &t.match_distance, "[bits] of a match with a map point");
   s.bind("tracking.match_ratio", &t.match_ratio, "best over second best distance of such a match");
   s.bind("tracking.established_frames", &t.established_frames,
@@ -180,6 +182,10 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
   s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
   s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
+  s.bind("dynamics.motion.threshold", &d.motion.threshold, "score from which a cell moves");
+  s.bind("dynamics.motion.rim", &d.motion.rim, "[cells] by which its mask is widened");
+  s.bind("dynamics.motion.lone_hole", &d.motion.lone_hole,
+         "share of the image from which missing depth may be a mover by itself");
   s.bind("dynamics.support_cell", &d.support_cell, "[px] the same when it only supports another detector");
   s.bind("dynamics.flow.window", &d.flow.window, "[px] of optical flow");
   s.bind("dynamics.points_per_box", &d.points_per_box, "features followed to carry a box");

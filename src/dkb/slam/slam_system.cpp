@@ -191,7 +191,7 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
 void SlamSystem::Impl::report_features(const TrackedFrame& frame) {
   for (size_t f = 0; f < frame.points.size(); ++f) {
     FeatureState& state = feature_reports_[source_feature(frame, f)].state;
-    if (frame.points[f] != kNoPoint) state = FeatureState::used;
+    if (frame.points[f] != kNoPoint || frame.odometry[f]) state = FeatureState::used;
     if (frame.outlier[f] && state != FeatureState::dynamic) state = FeatureState::outlier;
   }
   for (const FeatureReport& f : feature_reports_) statistics_.features_removed += f.state == FeatureState::dynamic;

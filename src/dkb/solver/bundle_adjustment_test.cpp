@@ -58,7 +58,7 @@ TEST(BundleAdjustment, WeightsCountAsCeresScalesTheLoss) {  // DKB eq. 48, witho
 }
 
 TEST(BundleAdjustment, ManyCamerasTakeTheSparseWayToTheSameMinimum) {
-  TestWorld world({.cameras = 70, .fixed = 1, .points = 900, .step = 0.2, .visibility = 0.5, .seed = 12});
+  TestWorld world({.cameras = 45, .fixed = 1, .points = 600, .step = 0.2, .visibility = 0.5, .seed = 12});
   BaProblem ours = world.problem, theirs = world.problem;
   const BaResult result = bundle_adjust(ours, to_convergence());
   const CeresBa oracle = ceres_bundle_adjust(theirs, {.solver = ceres::SPARSE_SCHUR});

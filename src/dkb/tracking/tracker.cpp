@@ -12,6 +12,7 @@ namespace dkb {
 namespace {
 
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
+constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
 
 }  // namespace
 
@@ -25,6 +26,8 @@ void TrackingOptions::check() const {
   require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
   require_option(radius_wide > 0, "radius_wide", radius_wide, "greater than 0 px");
   require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
+  require_option(odometry_sigma_factor == 0 || odometry_sigma_factor >= 1, "odometry_sigma_factor",
+                 odometry_sigma_factor, "0 or at least 1");
   require_option(match_distance >= 0 && match_distance <= 256, "match_distance", match_distance, "0 ... 256 bits");
   require_option(match_ratio >= 0 && match_ratio <= 1, "match_ratio", match_ratio, "0 ... 1");
   require_option(established_frames >= 0, "established_frames", established_frames, "at least 0");
@@ -55,7 +58,8 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       levels_(levels),
       options_(options),
       seed_(seed),
-      view_(std::make_shared<const Map>()) {
+      view_(std::make_shared<const Map>()),
+      odometry_(camera, scale_factor, options.close_depth) {
   options_.check();
   noise_.check();
 }
@@ -112,21 +116,27 @@ int Tracker::reference_point_count(KeyframeId reference, int observers) const {
 void Tracker::reset_motion() {
   velocity_.reset();
   last_.reset();
+  odometry_.clear();
   state_ = view_->keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
 }
 
-PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<std::pair<int, Eigen::Vector3d>>& pairs,
+Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match) const {
+  return {feature, match.point_in_world, options_.odometry_sigma_factor * (match.guessed ? kGuessFactor : 1.0),
+          !match.guessed};
+}
+
+PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs,
                              const RgbdFeatures& features) const {
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
-  for (const auto& [feature, point] : pairs) {
-    const Keypoint& k = features.keypoints[static_cast<size_t>(feature)];
+  for (const Pair& pair : pairs) {
+    const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
     PoseObservation o;
-    o.point_in_world = point;
+    o.point_in_world = pair.point_in_world;
     o.pixel = k.pixel.cast<double>();
-    o.pixel_sigma = noise_.corner_sigma(k.octave, scale_factor_);
-    o.depth = k.depth;
-    if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
+    o.pixel_sigma = pair.sigma_factor * noise_.corner_sigma(k.octave, scale_factor_);
+    o.depth = pair.use_depth ? k.depth : 0.0;
+    if (o.depth > 0) o.depth_sigma = pair.sigma_factor * noise_.depth_sigma(k.depth);
     observations.push_back(o);
   }
   return optimise_pose(camera_, initial, observations);
@@ -153,8 +163,8 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   const auto matches =
       match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
-  std::vector<std::pair<int, Eigen::Vector3d>> pairs;
-  for (const auto& m : matches) pairs.emplace_back(m.feature, candidates[static_cast<size_t>(m.candidate)].position);
+  std::vector<Pair> pairs;
+  for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
   const PoseEstimate pose = refine(predicted, pairs, features);
   if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
   for (size_t i = 0; i < matches.size(); ++i)
@@ -224,7 +234,9 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   for (size_t k = 0; k < frame.source.size(); ++k) {
     frame.points[k] = frame.points[static_cast<size_t>(frame.source[k])];
     frame.outlier[k] = frame.outlier[static_cast<size_t>(frame.source[k])];
+    frame.odometry[k] = frame.odometry[static_cast<size_t>(frame.source[k])];
   }
+  frame.odometry.resize(frame.source.size());
   frame.points.resize(frame.source.size());
   frame.outlier.resize(frame.source.size());
 }
@@ -267,29 +279,44 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   for (const auto& m : matches)
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
-  std::vector<std::pair<int, Eigen::Vector3d>> pairs;
+  std::vector<Pair> pairs;
   for (size_t f = 0; f < points.size(); ++f)
-    if (points[f] != kNoPoint) pairs.emplace_back(static_cast<int>(f), *position(points[f]));
+    if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
+  const size_t in_map = pairs.size();
+  if (options_.odometry_sigma_factor > 0 && last_) {
+    for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
+    const std::vector<Candidate> others = odometry_.candidates(*last_);
+    for (const auto& m :
+         match_by_projection(others, features, camera_, initial, scale_factor_, levels_, match, &taken, nullptr)) {
+      const auto c = static_cast<size_t>(m.candidate);
+      pairs.push_back(odometry_pair(m.feature, {others[c].position, odometry_.guessed(c)}));
+    }
+  }
   const PoseEstimate pose = refine(initial, pairs, features);
-  if (!pose.ok || pose.inliers < least_inliers) return false;
+  if (!pose.ok) return false;
+  const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
+  if (inliers < least_inliers) return false;
 
   for (size_t i = 0; i < candidates.size(); ++i)
     if (visible[i]) ++sightings_[candidates[i].id].visible;
   for (PointId id : matched) ++sightings_[id].visible;
   frame.points.assign(points.size(), kNoPoint);
   frame.outlier.assign(points.size(), 0);
+  frame.odometry.assign(points.size(), std::nullopt);
   for (size_t i = 0; i < pairs.size(); ++i) {
-    const auto f = static_cast<size_t>(pairs[i].first);
-    if (pose.inlier[i]) {
+    const auto f = static_cast<size_t>(pairs[i].feature);
+    if (!pose.inlier[i]) {
+      frame.outlier[f] = 1;
+    } else if (i < in_map) {
       frame.points[f] = points[f];
       ++sightings_[points[f]].found;
     } else {
-      frame.outlier[f] = 1;
+      frame.odometry[f] = OdometryMatch{pairs[i].point_in_world, !pairs[i].use_depth};
     }
   }
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
-  frame.inliers = pose.inliers;
+  frame.inliers = static_cast<int>(inliers);
   return true;
 }
 
@@ -321,20 +348,25 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
 
 void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const {
   frame.features = features_at(velocity);
-  std::vector<std::pair<int, Eigen::Vector3d>> pairs;
-  for (size_t f = 0; f < frame.points.size(); ++f)
-    if (frame.points[f] != kNoPoint) pairs.emplace_back(static_cast<int>(f), *position(frame.points[f]));
+  std::vector<Pair> pairs;
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    if (frame.points[f] != kNoPoint)
+      pairs.push_back({static_cast<int>(f), *position(frame.points[f])});
+    else if (frame.odometry[f])
+      pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
+  }
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *frame.features);
   if (!pose.ok) return;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
-    const auto f = static_cast<size_t>(pairs[i].first);
+    const auto f = static_cast<size_t>(pairs[i].feature);
+    frame.inliers -= frame.points[f] != kNoPoint;
     frame.points[f] = kNoPoint;
+    frame.odometry[f].reset();
     frame.outlier[f] = 1;
   }
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
-  frame.inliers = pose.inliers;
 }
 
 TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at) {
@@ -346,6 +378,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   const size_t n = frame.features->size();
   frame.points.assign(n, kNoPoint);
   frame.outlier.assign(n, 0);
+  frame.odometry.assign(n, std::nullopt);
 
   if (state_ == TrackingState::initialising) {
     int with_depth = 0;
@@ -389,6 +422,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   if (!tracked) {
     outcome.state = state_ = TrackingState::lost;
     velocity_.reset();
+    odometry_.clear();
     return outcome;
   }
   if (found_again || !last_ || timestamp <= last_->timestamp) {
@@ -406,6 +440,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   outcome.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
   state_ = TrackingState::tracking;
   last_ = frame;
+  odometry_.remember(frame);
   return outcome;
 }
 
@@ -489,6 +524,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
   if (last_ && last_->index == frame.index) {
     for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
+    odometry_.drop_mapped(*last_);
     last_->reference = id;                         // from here on the frame hangs on its own keyframe
     last_->cam_from_world = frame.cam_from_world;  // the first one's is the caller's choice
     last_->cam_from_reference = {};

@@ -15,6 +15,7 @@
 #include "dkb/tracking/candidates.h"
 #include "dkb/tracking/frame.h"
 #include "dkb/tracking/local_map.h"
+#include "dkb/tracking/odometry_points.h"
 
 namespace dkb {
 
@@ -28,6 +29,7 @@ struct TrackingOptions {
   double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
   double radius_wide = 30.0;           // [px] second try, > 0
   double radius_local_map = 4.0;       // [px] search for local map points under the first pose, > 0
+  double odometry_sigma_factor = 2.0;  // on the noise of what shows visual-odometry points, >= 1; 0 = without them
   int match_distance = 90;             // [bits] largest Hamming distance of a match with a map point, 0 ... 256
   double match_ratio = 0.8;            // best over second best distance of such a match, 0 ... 1
   int established_frames =
@@ -91,8 +93,14 @@ class Tracker {
   void reset_motion();
 
  private:
-  PoseEstimate refine(const Rigid3& initial, const std::vector<std::pair<int, Eigen::Vector3d>>& pairs,
-                      const RgbdFeatures& features) const;
+  struct Pair {
+    int feature = -1;
+    Eigen::Vector3d point_in_world;
+    double sigma_factor = 1;
+    bool use_depth = true;
+  };
+  Pair odometry_pair(int feature, const OdometryMatch& match) const;
+  PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
                                          std::vector<PointId>& points) const;
   std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
@@ -128,6 +136,7 @@ class Tracker {
 
   TrackingState state_ = TrackingState::initialising;
   std::optional<TrackedFrame> last_;   // last frame with a pose
+  OdometryPoints odometry_;            // from the last frame
   std::optional<Vector6d> velocity_;   // [m/s, rad/s] tangent of now_cam_from_before_cam
   std::vector<Candidate> candidates_;  // from the view
   FrameIndex candidates_made_ = -1;    // frame of the last refresh; -1 = the view is newer

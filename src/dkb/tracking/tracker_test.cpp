@@ -153,6 +153,40 @@ TEST_F(TrackerTest, TheFirstKeyframeMayStandAnywhere) {
   EXPECT_LT(moved.translation.norm(), 1e-9) << "nothing moved the world";
 }
 
+TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
+  // A map of half the scene: the other half has no depth at the only keyframe.
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  int shown = 0, guessed = 0;
+  for (int f = 1; f <= 4; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+    shown = guessed = 0;
+    for (size_t i = 0; i < o.frame.points.size(); ++i) {
+      if (!o.frame.odometry[i]) continue;
+      EXPECT_EQ(o.frame.points[i], kNoPoint);
+      ++shown;
+      guessed += o.frame.odometry[i]->guessed;
+      const Eigen::Vector3d& truth = scene.points[static_cast<size_t>(view.shows[i])];
+      EXPECT_LT((o.frame.odometry[i]->point_in_world - truth).norm(), 0.01);
+    }
+  }
+  EXPECT_GT(shown, 50);
+  EXPECT_EQ(guessed, 0);
+}
+
+TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  track(on_path(1));
+  const TrackOutcome second = track(on_path(2));
+  const KeyframePacket packet = insert(second.frame);
+  EXPECT_GT(packet.new_points.size(), 50u);
+  const TrackOutcome third = track(on_path(3));
+  for (size_t i = 0; i < third.frame.points.size(); ++i)
+    EXPECT_FALSE(third.frame.points[i] != kNoPoint && third.frame.odometry[i]);
+  EXPECT_GT(third.frame.inliers, second.frame.inliers + 50);
+}
+
 TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
   publish(start(on_path(0)));
   TrackOutcome o = track(on_path(1));
