@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
 #include "dkb/place/copy_epoch.h"
+#include "dkb/place/place_index.h"
 
 namespace dkb {
 
@@ -83,6 +85,12 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
+  // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
+  KeyframeId root(KeyframeId id) const;  // must exist
+  // The live keyframes that look most like `descriptors`, best first; see PlaceIndex.
+  std::vector<PlaceMatch> similar_keyframes(std::span<const Descriptor> descriptors, size_t max_results) const {
+    return places_.query(descriptors, max_results);
+  }
   size_t point_count() const { return point_count_; }
   int live_keyframe_count() const { return live_keyframe_count_; }
 
@@ -130,6 +138,7 @@ class Map {
   CopyEpoch epoch_;
   std::vector<Shared<Keyframe>> keyframes_;
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
+  PlaceIndex places_;                       // of the live keyframes
   size_t point_count_ = 0;
   int live_keyframe_count_ = 0;
 };
