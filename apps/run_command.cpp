@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -19,6 +20,7 @@
 #include "dkb/dataset/paced_source.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/map/map_file.h"
 #include "dkb/slam/slam_system.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -40,6 +42,8 @@ struct RunArguments {
   int threads = 0;
   DetectorArguments detection;
   std::string filter, disable;
+  std::string load_map;
+  bool localise = false;
   bool realtime = false, dump_features = false, quiet = false;
 };
 
@@ -106,6 +110,34 @@ DisabledParts parse_disabled(const std::string& list) {
   return parts;
 }
 
+// What --load-map says of the camera and the pyramid has to fit what the run says of them.
+CameraChoice camera_of_map(const MapFileContext& context, const RunArguments& args, const SlamOptions& options) {
+  const CameraModel& c = context.camera;
+  CameraChoice choice{c, "of " + args.load_map};
+  try {
+    choice = choose_camera(args.camera, args.dataset);
+  } catch (const InputError&) {
+    // A folder that does not tell its camera takes the map's.
+    if (!args.camera.empty() || fs::exists(fs::path(args.dataset) / "camera.yaml")) throw;
+  }
+  const CameraModel& d = choice.camera;
+  const auto numbers = [](const CameraModel& m) {
+    return std::array{m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.p1, m.p2, m.k3};
+  };
+  if (c.width != d.width || c.height != d.height || numbers(c) != numbers(d))
+    throw InputError(fmt::format(
+        "{}: was made with another camera ({}x{} fx {} fy {} cx {} cy {}) than {} ({}x{} fx {} fy {} cx {} cy {}); "
+        "give a map of this camera, or --camera",
+        args.load_map, c.width, c.height, c.fx, c.fy, c.cx, c.cy, choice.origin, d.width, d.height, d.fx, d.fy, d.cx,
+        d.cy));
+  if (context.levels != options.features.levels || context.scale_factor != options.features.scale)
+    throw InputError(
+        fmt::format("{}: was made with {} pyramid levels of {}; add --set features.levels={} --set "
+                    "features.scale={}",
+                    args.load_map, context.levels, context.scale_factor, context.levels, context.scale_factor));
+  return choice;
+}
+
 int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
   SlamOptions options = preset(args.preset);
@@ -126,7 +158,11 @@ int run(const RunArguments& args) {
 
   TumDataset dataset = open_tum_dataset(args.dataset);
   select_pairs(args.selection, &dataset);
-  const CameraChoice camera = choose_camera(args.camera, args.dataset);
+  if (args.localise && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  std::optional<MapFile> map;
+  if (!args.load_map.empty()) map = load_map(args.load_map);
+  const CameraChoice camera =
+      map ? camera_of_map(map->context, args, options) : choose_camera(args.camera, args.dataset);
   RgbdReaderOptions reading;
   reading.threaded = options.pipeline.threaded || args.realtime;
   RgbdReader reader(dataset.pairs, camera.camera, reading, &warnings);
@@ -145,7 +181,10 @@ int run(const RunArguments& args) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   SlamSystem slam(camera.camera, options, std::move(detectors));
+  if (map) slam.load(std::move(map->map));
+  slam.set_localise_only(args.localise);
   RunFacts facts;
+  facts.writes_map = !args.localise;
   facts.offered = static_cast<int>(dataset.pairs.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
@@ -189,6 +228,10 @@ int run(const RunArguments& args) {
                facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (interrupted) return 130;
+  if (s.tracked == 0 && args.localise) {
+    fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
+    return 1;
+  }
   if (s.tracked == 0) {
     fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
                options.tracking.initial_points);
@@ -226,6 +269,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--end", args->selection.end, "[s] after the first pair");
   command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
+  command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
+  command->add_flag("--localize", args->localise, "Track in that map without changing it");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");

@@ -75,6 +75,13 @@ KeyframeId Map::root(KeyframeId id) const {
   return k->id;
 }
 
+std::vector<KeyframeId> Map::roots() const {
+  std::vector<KeyframeId> ids;
+  for (const auto& k : keyframes_)
+    if (k.value->parent == kNoKeyframe) ids.push_back(k.value->id);
+  return ids;
+}
+
 std::vector<KeyframeId> Map::live_keyframes() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)
@@ -252,6 +259,12 @@ void Map::update_covisibility(KeyframeId id, int least_shared_points) {
     drop_covisible(list, id);
     add_covisible(list, {id, c.shared_points});
   }
+}
+
+void Map::date_back() {
+  FrameIndex newest = -1;
+  for (const auto& k : keyframes_) newest = std::max(newest, k.value->frame);
+  for (KeyframeId id = 0; id < keyframe_count(); ++id) edit(id).frame -= newest + 1;
 }
 
 void Map::set_parent(KeyframeId id, KeyframeId parent) {

@@ -86,7 +86,8 @@ class Map {
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
   // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
-  KeyframeId root(KeyframeId id) const;  // must exist
+  KeyframeId root(KeyframeId id) const;   // must exist
+  std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
   // The live keyframes that look most like `descriptors`, best first; see PlaceIndex.
   std::vector<PlaceMatch> similar_keyframes(std::span<const Descriptor> descriptors, size_t max_results) const {
     return places_.query(descriptors, max_results);
@@ -107,6 +108,8 @@ class Map {
   void update_covisibility(KeyframeId id, int least_shared_points);
   // Removes a keyframe's observations; it and its children hang on its parent from now on.
   void cull_keyframe(KeyframeId id);
+  // Moves the frames of all keyframes to before 0, the newest to -1: a session that begins counts its own from 0.
+  void date_back();
   // Hangs `id` on `parent`, or on the nearest ancestor of it that is live. Throws std::logic_error when `parent` hangs
   // on `id` itself.
   void set_parent(KeyframeId id, KeyframeId parent);

@@ -75,7 +75,6 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.initial_points", &t.initial_points, "features with depth that the first frame needs");
   s.bind("tracking.least_matches", &t.least_matches, "matches with the last frame that make a pose worth trying");
   s.bind("tracking.least_inliers", &t.least_inliers, "inliers of a pose; fewer: lost");
-  s.bind("tracking.least_inliers_found_again", &t.least_inliers_found_again, "the same after a loss");
   s.bind("tracking.close_depth", &t.close_depth, "[m] depths below make map points at once");
   s.bind("tracking.least_new_points", &t.least_new_points, "nearest depths that make points whatever close_depth says");
   s.bind("tracking.radius_last_frame", &t.radius_last_frame, "[px] search around the predicted position");
@@ -86,7 +85,22 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.established_frames", &t.established_frames,
          "[frames] since its birth before a point may be found where a mover is");
   s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
-  s.bind("tracking.recovery_keyframes", &t.recovery_keyframes, "newest keyframes that a lost tracker tries");
+  s.bind("tracking.new_map_after", &t.new_map_after, "[frames] lost in a row until a new map is started; 0 = never");
+  RelocalisationOptions& r = t.relocalisation;
+  s.bind("tracking.relocalisation.candidates", &r.candidates, "look-alike keyframes that a lost tracker tries");
+  s.bind("tracking.relocalisation.neighbours", &r.neighbours, "covisible keyframes matched along with each");
+  s.bind("tracking.relocalisation.least_matches", &r.least_matches, "by descriptor alone that make one worth a try");
+  s.bind("tracking.relocalisation.least_agreeing", &r.least_agreeing, "of these, that must agree on a pose");
+  s.bind("tracking.relocalisation.radius", &r.radius, "[px] first search around that pose");
+  s.bind("tracking.relocalisation.radius_fine", &r.radius_fine, "[px] second search");
+  s.bind("tracking.relocalisation.least_inliers", &r.least_inliers, "points that the final pose rests on");
+  s.bind("tracking.relocalisation.least_share", &r.least_share, "of well-known points in view that must be found");
+  s.bind("tracking.relocalisation.most_see_through", &r.most_see_through,
+         "share of these that may stand before what is seen there");
+  s.bind("tracking.relocalisation.largest_position_sd", &r.largest_position_sd,
+         "[m] standard deviation of the camera's place");
+  s.bind("tracking.relocalisation.ambiguity", &r.ambiguity,
+         "a pose elsewhere with this share of the inliers makes both worthless");
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes,
          "keyframes that share most points with the frame");
   s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each,

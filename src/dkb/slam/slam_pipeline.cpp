@@ -7,7 +7,7 @@
 
 namespace dkb {
 
-void SlamSystem::Impl::start() {
+void SlamSystem::Impl::start(Map map) {
   mapping_.reset();
   const OrbOptions& orb = options_.features;
   tracker_ =
@@ -16,12 +16,22 @@ void SlamSystem::Impl::start() {
     policy_ = std::make_unique<AdaptiveKeyframePolicy>(options_.adaptive_keyframes, camera_.width, camera_.height);
   else
     policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
+  tracker_->set_start(options_.base_from_cam.inverse());
+  next_keyframe_ = map.keyframe_count();
+  last_keyframe_ = next_keyframe_ - 1;
+  if (next_keyframe_ > 0) {
+    map.date_back();
+    tracker_->take_view(map.snapshot());
+    tracker_->reset_motion();
+  }
   mapping_ = std::make_unique<MappingStage>(
-      LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping), options_.pipeline.threaded);
+      LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping, std::move(map)),
+      options_.pipeline.threaded);
   records_.clear();
   next_frame_ = 0;
-  next_keyframe_ = 0;
+  lost_frames_ = 0;
   world_from_odom_ = {};
+  odom_from_cam_ = options_.base_from_cam;
   last_keyframe_frame_ = 0;
   last_relocalisation_frame_ = -1000000;
   feature_reports_.clear();
@@ -156,7 +166,7 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
   q.frame = frame.index;
   q.last_keyframe_frame = last_keyframe_frame_;
   q.last_relocalisation_frame = last_relocalisation_frame_;
-  q.last_keyframe = next_keyframe_ - 1;
+  q.last_keyframe = last_keyframe_;
   q.mapper_idle = mapping_->outstanding() == 0;
   q.tracked_points = frame.inliers;
   for (size_t f = 0; f < frame.points.size(); ++f) {
@@ -176,7 +186,7 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
 }
 
 void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
-  const KeyframeId id = next_keyframe_++;
+  const KeyframeId id = last_keyframe_ = next_keyframe_++;
   KeyframePacket packet = tracker_->make_keyframe(id, frame);
   for (const ProvisionalPoint& p : packet.new_points)
     feature_reports_[source_feature(frame, static_cast<size_t>(p.feature))].state = FeatureState::used;
@@ -190,6 +200,12 @@ void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
   frame.reference = id;
   frame.cam_from_reference = {};
   ++statistics_.keyframes_inserted;
+}
+
+// Nobody knows how the camera moved while it was lost: odometry goes on from where it was, and the jump is the map's.
+void SlamSystem::Impl::keep_odometry_smooth(const TrackOutcome& outcome) {
+  if (lost_frames_ == 0 && (outcome.state != TrackingState::relocalised || next_frame_ > 1)) return;
+  world_from_odom_ = outcome.frame.cam_from_world.inverse() * odom_from_cam_.inverse();
 }
 
 // One frame, as in DKB section 3: features, pose, keyframe decision; mapping happens beside it.
@@ -221,9 +237,8 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
     for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
     return std::make_shared<const RgbdFeatures>(std::move(features));
   };
-  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at);
+  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, !localise_only_);
   TrackedFrame& frame = outcome.frame;
-  if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
   report_features(frame);
   const bool has_pose = outcome.state == TrackingState::tracking || outcome.state == TrackingState::relocalised;
   dynamics_.commit(has_pose ? std::optional(frame.cam_from_world) : std::nullopt);
@@ -235,8 +250,10 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   if (result.tracked()) {
     if (outcome.state == TrackingState::relocalised) {
       last_relocalisation_frame_ = frame.index;
+      last_keyframe_ = frame.reference;
       ++statistics_.relocalisations;
     }
+    keep_odometry_smooth(outcome);
     weigh_evidence();
     const Stopwatch deciding;
     const KeyframeDecision decision = decide(outcome);
@@ -248,7 +265,7 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
     result.keyframe = decision.insert;
     result.world_from_cam = frame.cam_from_world.inverse();
     result.world_from_odom = world_from_odom_;
-    result.odom_from_cam = world_from_odom_.inverse() * result.world_from_cam;
+    result.odom_from_cam = odom_from_cam_ = world_from_odom_.inverse() * result.world_from_cam;
     if (options_.dynamics.filter == FilterKind::standard)
       result.movers = movers_->update(image.timestamp, image.depth, scene_.mask, scene_.boxes, result.world_from_cam);
     result.covariance = frame.covariance;
@@ -257,9 +274,12 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
     records_.push_back(
         {frame.index, frame.timestamp, frame.reference, frame.cam_from_reference, result.world_from_cam});
     ++statistics_.tracked;
+    lost_frames_ = 0;
   } else if (outcome.state == TrackingState::lost) {
     ++statistics_.lost;
+    ++lost_frames_;
   }
+  if (localise_only_) tracker_->make_report();  // nobody is told: the map stays as it is
   result.tracking_ms = tracking.ms();
   times_.add("tracking", result.tracking_ms);
   return result;
@@ -267,7 +287,7 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
 
 void SlamSystem::Impl::finish() {
   KeyframePacket report = tracker_->make_report();
-  if (next_keyframe_ > 0) mapping_->push(std::move(report), next_frame_);
+  if (next_keyframe_ > 0 && !localise_only_) mapping_->push(std::move(report), next_frame_);
   const auto view = mapping_->drain();
   if (view) take_view(*view);
 }

@@ -8,6 +8,14 @@
 #include "dkb/util/errors.h"
 
 namespace dkb {
+namespace {
+
+// Maps are numbered by the age of their roots. A root that is not among them is newer than all.
+int rank_of(const std::vector<KeyframeId>& roots, KeyframeId root) {
+  return static_cast<int>(std::lower_bound(roots.begin(), roots.end(), root) - roots.begin());
+}
+
+}  // namespace
 
 const char* name_of(FeatureState state) {
   switch (state) {
@@ -57,30 +65,39 @@ void SlamSystem::finish() {
 void SlamSystem::reset() {
   impl_->start();
 }
+void SlamSystem::load(Map map) {
+  impl_->start(std::move(map));
+}
 void SlamSystem::set_localise_only(bool on) {
   impl_->localise_only_ = on;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::trajectory() const {
+  const std::vector<KeyframeId> roots = impl_->tracker_->view().roots();
   std::vector<TrajectoryFrame> result;
   for (const auto& r : impl_->records_)
-    result.push_back(
-        {r.frame, r.timestamp, (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse()});
+    result.push_back({r.frame, r.timestamp,
+                      (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse(),
+                      rank_of(roots, impl_->tracker_->root(r.reference))});
   return result;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::online_trajectory() const {
+  const std::vector<KeyframeId> roots = impl_->tracker_->view().roots();
   std::vector<TrajectoryFrame> result;
-  for (const auto& r : impl_->records_) result.push_back({r.frame, r.timestamp, r.world_from_cam_online});
+  for (const auto& r : impl_->records_)
+    result.push_back(
+        {r.frame, r.timestamp, r.world_from_cam_online, rank_of(roots, impl_->tracker_->root(r.reference))});
   return result;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::keyframes() const {
   std::vector<TrajectoryFrame> result;
   const Map& map = impl_->tracker_->view();
+  const std::vector<KeyframeId> roots = map.roots();
   for (KeyframeId id : map.live_keyframes()) {
     const Keyframe& k = *map.keyframe(id);
-    result.push_back({k.frame, k.timestamp, k.cam_from_world.inverse()});
+    result.push_back({k.frame, k.timestamp, k.cam_from_world.inverse(), rank_of(roots, map.root(id))});
   }
   return result;
 }
@@ -111,6 +128,7 @@ SlamStatistics SlamSystem::statistics() const {
   SlamStatistics s = impl_->statistics_;
   const Map& map = impl_->tracker_->view();
   s.keyframes = map.live_keyframe_count();
+  s.maps = static_cast<int>(map.roots().size());
   s.map_points = map.point_count();
   s.detector = impl_->dynamics_.detector_kind();
   s.detector_rate_hz = impl_->dynamics_.detector_rate_hz();

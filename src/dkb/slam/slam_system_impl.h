@@ -25,7 +25,7 @@ class SlamSystem::Impl {
 
   FrameResult process(std::shared_ptr<const RgbdImage> image);
   void finish();
-  void start();
+  void start(Map map = {});
 
   CameraModel camera_;
   SlamOptions options_;
@@ -51,10 +51,12 @@ class SlamSystem::Impl {
   };
   std::vector<Record> records_;
   FrameIndex next_frame_ = 0;
+  FrameIndex lost_frames_ = 0;  // in a row
   double last_timestamp_ = 0;
   KeyframeId next_keyframe_ = 0;
+  KeyframeId last_keyframe_ = kNoKeyframe;  // the newest one where the camera is
   FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
-  Rigid3 world_from_odom_;
+  Rigid3 world_from_odom_, odom_from_cam_;
   bool localise_only_ = false;
   std::vector<size_t> kept_;                    // features given to tracking, as indices of all
   std::vector<uint8_t> suspect_;                // of these, which may move
@@ -83,6 +85,7 @@ class SlamSystem::Impl {
   std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
   KeyframeDecision decide(const TrackOutcome& outcome) const;
   void insert_keyframe(TrackedFrame& frame);
+  void keep_odometry_smooth(const TrackOutcome& outcome);
 };
 
 }  // namespace dkb
