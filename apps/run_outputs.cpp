@@ -71,8 +71,8 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
   j["keyframes_inserted"] = s.keyframes_inserted;
   j["map_points"] = s.map_points;
   j["maps"] = s.maps;
-  j["merges"] = 0;
-  j["loops"] = 0;
+  j["merges"] = s.merges;
+  j["loops"] = s.loops;
   j["relocalisations"] = s.relocalisations;
   j["startup_s"] = facts.startup_s;
   j["wall_s"] = facts.wall_s;

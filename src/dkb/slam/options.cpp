@@ -18,6 +18,7 @@ void SlamOptions::check() const {
   baseline_keyframes.check();
   adaptive_keyframes.check();
   mapping.check();
+  loop_closing.check();
   dynamics.check();
   evidence.check();
   movers.check();
@@ -45,6 +46,7 @@ void disable_parts(SlamOptions& options, const DisabledParts& parts) {
   if (parts.dynamic_removal) options.dynamics.filter = FilterKind::none;
   if (parts.keyframes) options.keyframe_policy = KeyframePolicyKind::baseline;
   if (parts.weighted_ba) options.mapping.ba.weighted = false;
+  if (parts.loop) options.loop_closing.loop.enabled = false;
 }
 
 void bind_settings(Settings& s, SlamOptions& o) {
@@ -168,6 +170,51 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("mapping.ba.weighted", &m.ba.weighted, "geometric weights of points (DKB section 3.3)");
   s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points (DKB Table 1)");
   s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals instead");
+
+  s.bind("mapping.seam_tolerance", &m.seam_tolerance, "factor on fusion's limits where a loop was just closed");
+
+  LoopOptions& l = o.loop_closing.loop;
+  s.bind("loop.enabled", &l.enabled, "close loops and merge maps");
+  s.bind("loop.candidates", &l.candidates, "most alike keyframes that are verified");
+  s.bind("loop.least_likeness", &l.least_likeness, "of a candidate, as a share of the most alike neighbour's score");
+  s.bind("loop.neighbourhood", &l.neighbourhood, "steps along covisibility within which nothing is a loop");
+  s.bind("loop.least_keyframes_between", &l.least_keyframes_between, "[keyframes] younger ones are no candidates");
+  s.bind("loop.area_keyframes", &l.area_keyframes, "keyframes around a candidate whose points are matched");
+  s.bind("loop.rest_keyframes", &l.rest_keyframes, "[keyframes] without a search after a loop");
+  s.bind("loop.match_distance", &l.match_distance, "[bits] of a descriptor match");
+  s.bind("loop.match_ratio", &l.match_ratio, "best over second best distance of such a match");
+  s.bind("loop.least_ransac_inliers", &l.least_ransac_inliers, "pairs of points that one rigid motion explains");
+  s.bind("loop.radius_first", &l.radius_first, "[px] guided search under that motion");
+  s.bind("loop.radius", &l.radius, "[px] the same under the refined pose");
+  s.bind("loop.least_inliers", &l.least_inliers, "map points that the refined pose rests on");
+  s.bind("loop.least_share", &l.least_share, "of the well-known points that ought to be in view");
+  s.bind("loop.least_support", &l.least_support, "keyframes around the newest that must see the same");
+  s.bind("loop.support_keyframes", &l.support_keyframes, "of them asked at most");
+  s.bind("loop.support_inliers", &l.support_inliers, "points of the area that such a keyframe must show");
+  s.bind("loop.agree_translation", &l.agree_translation, "[m] by which they may differ");
+  s.bind("loop.agree_rotation", &l.agree_rotation, "[deg] likewise");
+  s.bind("loop.drift_translation_base", &l.drift_translation_base, "[m] largest plausible drift of no way ...");
+  s.bind("loop.drift_translation_share", &l.drift_translation_share, "... and its growth with the way's length");
+  s.bind("loop.drift_rotation_base", &l.drift_rotation_base, "[deg] the same of the direction");
+  s.bind("loop.drift_rotation_per_metre", &l.drift_rotation_per_metre, "[deg/m] and its growth");
+  s.bind("loop.merge_least_inliers", &l.merge_least_inliers, "least_inliers between maps that are not joined");
+  s.bind("loop.merge_least_share", &l.merge_least_share, "least_share between maps that are not joined");
+  s.bind("loop.essential_shared_points", &l.essential_shared_points,
+         "[points] shared by keyframes that make an edge of the pose graph");
+  s.bind("loop.edge_position_sd", &l.edge_position_sd, "[m] of such an edge ...");
+  s.bind("loop.edge_position_share", &l.edge_position_share, "... and its growth with the edge's length");
+  s.bind("loop.edge_rotation_sd", &l.edge_rotation_sd, "[rad] the same of the direction");
+  s.bind("loop.edge_rotation_growth", &l.edge_rotation_growth, "[rad/m] and its growth");
+  s.bind("loop.graph_iterations", &l.graph_iterations, "steps of the pose graph's optimisation");
+  s.bind("loop.latency", &o.loop_closing.loop_latency.base, "[frames] from a keyframe's view to its correction ...");
+  s.bind("loop.latency_per_keyframe", &o.loop_closing.loop_latency.per_keyframe, "... and its growth with the map");
+  GlobalBaOptions& g = o.loop_closing.global_ba;
+  s.bind("global_ba.iterations_first", &g.iterations_first, "[steps] before outliers are told apart");
+  s.bind("global_ba.iterations_second", &g.iterations_second, "[steps] after");
+  s.bind("global_ba.latency", &o.loop_closing.global_ba_latency.base, "[frames] until the result is used ...");
+  s.bind("global_ba.latency_per_keyframe", &o.loop_closing.global_ba_latency.per_keyframe,
+         "... and its growth with the map");
+  s.bind("global_ba.final", &o.final_ba, "adjust the whole map once more at the end");
 
   DynamicsOptions& d = o.dynamics;
   s.bind("dynamics.filter", &d.filter,

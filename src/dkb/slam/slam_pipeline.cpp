@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What happens to a frame, in order.
 #include <algorithm>
+#include <limits>
 
 #include "dkb/slam/slam_system_impl.h"
 #include "dkb/util/errors.h"
@@ -8,6 +9,7 @@
 namespace dkb {
 
 void SlamSystem::Impl::start(Map map) {
+  loop_.reset();
   mapping_.reset();
   const OrbOptions& orb = options_.features;
   tracker_ =
@@ -27,6 +29,9 @@ void SlamSystem::Impl::start(Map map) {
   mapping_ = std::make_unique<MappingStage>(
       LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping, std::move(map)),
       options_.pipeline.threaded);
+  loop_ = std::make_unique<LoopStage>(Optics{camera_, options_.noise, orb.scale, orb.levels}, options_.loop_closing,
+                                      options_.mapping.ba, options_.seed, options_.pipeline.threaded);
+  loop_->start_at(next_keyframe_);
   records_.clear();
   next_frame_ = 0;
   lost_frames_ = 0;
@@ -46,6 +51,10 @@ void SlamSystem::Impl::start(Map map) {
 void SlamSystem::Impl::take_map(bool wait) {
   const auto view = mapping_->take_due(next_frame_, wait);
   if (view) take_view(*view);
+  if (localise_only_) return;
+  if (view && mapping_->outstanding_corrections() == 0) loop_->offer(*view, next_frame_, !wait);
+  for (auto& correction : loop_->take_due(next_frame_, wait))
+    mapping_->push(std::move(correction), next_frame_ + options_.pipeline.mapper_latency);
 }
 
 void SlamSystem::Impl::take_view(const MapView& view) {
@@ -288,8 +297,19 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
 void SlamSystem::Impl::finish() {
   KeyframePacket report = tracker_->make_report();
   if (next_keyframe_ > 0 && !localise_only_) mapping_->push(std::move(report), next_frame_);
-  const auto view = mapping_->drain();
-  if (view) take_view(*view);
+  bool adjusted_last = !options_.final_ba;
+  while (true) {
+    if (const auto view = mapping_->drain()) take_view(*view);
+    if (localise_only_ || next_keyframe_ == 0) return;
+    loop_->offer(tracker_->shared_view(), next_frame_, false);
+    auto corrections = loop_->take_due(std::numeric_limits<FrameIndex>::max(), true);
+    if (corrections.empty() && loop_->idle()) {
+      if (adjusted_last) return;
+      adjusted_last = true;
+      loop_->want_adjustment();
+    }
+    for (auto& correction : corrections) mapping_->push(std::move(correction), next_frame_);
+  }
 }
 
 }  // namespace dkb

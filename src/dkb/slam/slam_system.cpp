@@ -133,7 +133,10 @@ SlamStatistics SlamSystem::statistics() const {
   s.detector = impl_->dynamics_.detector_kind();
   s.detector_rate_hz = impl_->dynamics_.detector_rate_hz();
   s.detector_latency_frames = impl_->dynamics_.detector_latency();
+  s.loops = impl_->loop_->loops();
+  s.merges = impl_->loop_->merges();
   StageTimes times = impl_->times_;
+  times.merge(impl_->loop_->times());
   times.merge(impl_->dynamics_.times());
   times.merge(impl_->dynamics_.detector_times());
   if (impl_->mapping_->outstanding() == 0) {  // the mapper is idle, nothing writes what we read

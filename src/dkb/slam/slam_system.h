@@ -57,6 +57,7 @@ struct SlamStatistics {
   int frames = 0, tracked = 0, lost = 0, relocalisations = 0;
   int keyframes = 0, keyframes_inserted = 0;
   int maps = 0;  // that are not joined
+  int loops = 0, merges = 0;
   size_t map_points = 0;
   MappingReport mapping;
   std::map<std::string, int> keyframe_rules;

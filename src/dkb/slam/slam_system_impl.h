@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 
+#include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
 #include "dkb/slam/slam_system.h"
 
@@ -36,6 +37,7 @@ class SlamSystem::Impl {
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<MappingStage> mapping_;
+  std::unique_ptr<LoopStage> loop_;
   DynamicStage dynamics_;
   DynamicScene scene_;  // of the last frame
   std::optional<PointEvidence> evidence_;
