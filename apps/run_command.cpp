@@ -15,6 +15,7 @@
 #include <optional>
 #include <sstream>
 
+#include "bench_cv_orb.h"
 #include "detector_choice.h"
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
@@ -44,7 +45,7 @@ struct RunArguments {
   std::string filter, disable;
   std::string load_map;
   bool localise = false;
-  bool realtime = false, dump_features = false, quiet = false;
+  bool realtime = false, dump_features = false, cv_orb = false, quiet = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -92,22 +93,6 @@ fs::path default_output(const fs::path& dataset) {
 void append_features(std::string& csv, const std::string& stamp, const SlamSystem& slam) {
   for (const FeatureReport& f : slam.features())
     csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
-}
-
-// --disable dr,kf,ba,loop
-DisabledParts parse_disabled(const std::string& list) {
-  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
-  DisabledParts parts;
-  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
-  std::istringstream names(list);
-  for (std::string name; std::getline(names, name, ',');) {
-    const auto at = std::find(known.begin(), known.end(), name);
-    if (at == known.end())
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
-                       "; parts: dr, kf, ba, loop");
-    *switches[at - known.begin()] = true;
-  }
-  return parts;
 }
 
 // What --load-map says of the camera and the pyramid has to fit what the run says of them.
@@ -220,6 +205,7 @@ int run(const RunArguments& args) {
   facts.config_yaml = settings.to_yaml();
   facts.times = reader.times();
   write_outputs(out, slam, facts);
+  if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(dataset.pairs, camera.camera));
   warnings.finish();
 
   const SlamStatistics s = slam.statistics();
@@ -241,6 +227,21 @@ int run(const RunArguments& args) {
 }
 
 }  // namespace
+
+DisabledParts parse_disabled(const std::string& list) {
+  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
+  DisabledParts parts;
+  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
+  std::istringstream names(list);
+  for (std::string name; std::getline(names, name, ',');) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end())
+      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
+                       "; parts: dr, kf, ba, loop");
+    *switches[at - known.begin()] = true;
+  }
+  return parts;
+}
 
 void register_run(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<RunArguments>();
@@ -265,6 +266,7 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
+  command->add_option("--skip-pairs", args->selection.skip_pairs, "Pairs left out at the beginning, before all else");
   command->add_option("--start", args->selection.start, "[s] after the first pair");
   command->add_option("--end", args->selection.end, "[s] after the first pair");
   command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");
@@ -273,6 +275,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_flag("--localize", args->localise, "Track in that map without changing it");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
+  command->add_flag("--cv-orb", args->cv_orb,
+                    "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = run(*args); });
 }
