@@ -110,6 +110,9 @@ class Map {
   void cull_keyframe(KeyframeId id);
   // Moves the frames of all keyframes to before 0, the newest to -1: a session that begins counts its own from 0.
   void date_back();
+  // Adds `other` as a map of its own, not joined to this one: its keyframes follow those that are there, and its points
+  // and frames are named after them. Throws InputError when that is more than one map can hold.
+  void append(const Map& other);
   // Hangs `id` on `parent`, or on the nearest ancestor of it that is live. Throws std::logic_error when `parent` hangs
   // on `id` itself.
   void set_parent(KeyframeId id, KeyframeId parent);
