@@ -13,13 +13,12 @@
 #include "dkb/util/settings.h"
 
 namespace dkb {
-namespace {
 
-std::vector<std::string> kinds_of(const DetectorArguments& arguments, const std::string& model) {
-  if (arguments.detector == "auto") return {model.empty() ? "motion" : "yolo"};
+std::vector<std::string> detector_kinds(const std::string& detector, const std::string& model) {
+  if (detector == "auto") return {model.empty() ? "motion" : "yolo"};
   const std::vector<std::string> known = {"auto", "none", "yolo", "motion", "file"};
   std::vector<std::string> kinds;
-  std::istringstream parts(arguments.detector);
+  std::istringstream parts(detector);
   for (std::string kind; std::getline(parts, kind, '+');) {
     if (std::find(known.begin() + 1, known.end(), kind) == known.end())
       throw InputError("--detector: there is no detector \"" + kind + "\"" + did_you_mean(kind, known) +
@@ -29,15 +28,13 @@ std::vector<std::string> kinds_of(const DetectorArguments& arguments, const std:
   return kinds;
 }
 
-}  // namespace
-
 DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel& camera,
                            const std::vector<double>& stamps, bool threaded, bool realtime) {
   DetectorSet set;
   std::string model = arguments.model;
   if (const char* from_environment = std::getenv("DKB_SLAM_MODEL"); model.empty() && from_environment != nullptr)
     model = from_environment;
-  const std::vector<std::string> kinds = kinds_of(arguments, model);
+  const std::vector<std::string> kinds = detector_kinds(arguments.detector, model);
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
   if (has("yolo")) {
     if (model.empty())

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bench_command.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "eval_command.h"
@@ -64,6 +65,7 @@ int main(int argc, char** argv) {
     dkb::register_eval(app, exit_code);
     dkb::register_simulate(app, exit_code);
     dkb::register_map(app, exit_code);
+    dkb::register_bench(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version

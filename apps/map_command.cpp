@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
 
 #include "dkb/map/map_file.h"
 #include "dkb/map/point_cloud.h"
+#include "dkb/slam/map_merge.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 
@@ -44,6 +46,7 @@ void print_info(const std::string& path) {
   fmt::print("checksums: right\n");
   fmt::print("bytes: {}\n", bytes.size());
   fmt::print("keyframes: {}\n", live.size());
+  fmt::print("maps: {}\n", map.roots().size());
   fmt::print("culled_keyframes: {}\n", map.keyframe_count() - map.live_keyframe_count());
   fmt::print("features: {}\n", features);
   fmt::print("points: {}\n", map.point_count());
@@ -70,10 +73,36 @@ void export_cloud(const ExportArguments& arguments) {
   fmt::print("{}: {} points\n", arguments.out, file.map.point_count());
 }
 
+struct MergeArguments {
+  std::string first, second, out;
+};
+
+void merge(const MergeArguments& arguments) {
+  const MapFile first = load_map(arguments.first), second = load_map(arguments.second);
+  const MapFileContext &a = first.context, &b = second.context;
+  const auto numbers = [](const CameraModel& m) {
+    return std::array{m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.p1, m.p2, m.k3};
+  };
+  if (a.camera.width != b.camera.width || a.camera.height != b.camera.height || numbers(a.camera) != numbers(b.camera))
+    throw InputError(arguments.second + ": was made with another camera than " + arguments.first +
+                     "; maps of one camera can be merged");
+  if (a.levels != b.levels || a.scale_factor != b.scale_factor)
+    throw InputError(arguments.second + ": was made with another image pyramid than " + arguments.first +
+                     "; maps of one pyramid can be merged");
+  const SlamOptions options;
+  const auto merged = merge_maps(first.map, second.map, {a.camera, options.noise, a.scale_factor, a.levels}, options);
+  if (!merged)
+    throw InputError(arguments.second + ": shows no place for certain that " + arguments.first +
+                     " shows; record the way from one to the other");
+  save_map(arguments.out, merged->map, a);
+  fmt::print("{}: {} keyframes, {} points; {} joints, {} loops closed\n", arguments.out,
+             merged->map.live_keyframe_count(), merged->map.point_count(), merged->merges, merged->loops);
+}
+
 }  // namespace
 
 void register_map(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("map", "Look into a saved map");
+  CLI::App* command = app.add_subcommand("map", "Look into saved maps and join them");
   command->require_subcommand(1);
 
   CLI::App* info = command->add_subcommand("info", "Verify every checksum and print what is in a map");
@@ -93,6 +122,17 @@ void register_map(CLI::App& app, int& exit_code) {
   cloud->add_option("--out", arguments->out, "file to write")->required();
   cloud->callback([arguments, &exit_code] {
     export_cloud(*arguments);
+    exit_code = 0;
+  });
+
+  CLI::App* join =
+      command->add_subcommand("merge", "Join two maps that show a place in common, in the world of the first");
+  auto parts = std::make_shared<MergeArguments>();
+  join->add_option("FIRST", parts->first, "map.dkb that stays where it is")->required();
+  join->add_option("SECOND", parts->second, "map.dkb that is moved onto it")->required();
+  join->add_option("--out", parts->out, "file to write")->required();
+  join->callback([parts, &exit_code] {
+    merge(*parts);
     exit_code = 0;
   });
 }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -14,11 +15,13 @@
 #include <optional>
 #include <sstream>
 
+#include "bench_cv_orb.h"
 #include "detector_choice.h"
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/map/map_file.h"
 #include "dkb/slam/slam_system.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -40,7 +43,9 @@ struct RunArguments {
   int threads = 0;
   DetectorArguments detection;
   std::string filter, disable;
-  bool realtime = false, dump_features = false, quiet = false;
+  std::string load_map;
+  bool localise = false;
+  bool realtime = false, dump_features = false, cv_orb = false, quiet = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -90,20 +95,32 @@ void append_features(std::string& csv, const std::string& stamp, const SlamSyste
     csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
 }
 
-// --disable dr,kf,ba,loop
-DisabledParts parse_disabled(const std::string& list) {
-  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
-  DisabledParts parts;
-  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
-  std::istringstream names(list);
-  for (std::string name; std::getline(names, name, ',');) {
-    const auto at = std::find(known.begin(), known.end(), name);
-    if (at == known.end())
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
-                       "; parts: dr, kf, ba, loop");
-    *switches[at - known.begin()] = true;
+// What --load-map says of the camera and the pyramid has to fit what the run says of them.
+CameraChoice camera_of_map(const MapFileContext& context, const RunArguments& args, const SlamOptions& options) {
+  const CameraModel& c = context.camera;
+  CameraChoice choice{c, "of " + args.load_map};
+  try {
+    choice = choose_camera(args.camera, args.dataset);
+  } catch (const InputError&) {
+    // A folder that does not tell its camera takes the map's.
+    if (!args.camera.empty() || fs::exists(fs::path(args.dataset) / "camera.yaml")) throw;
   }
-  return parts;
+  const CameraModel& d = choice.camera;
+  const auto numbers = [](const CameraModel& m) {
+    return std::array{m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.p1, m.p2, m.k3};
+  };
+  if (c.width != d.width || c.height != d.height || numbers(c) != numbers(d))
+    throw InputError(fmt::format(
+        "{}: was made with another camera ({}x{} fx {} fy {} cx {} cy {}) than {} ({}x{} fx {} fy {} cx {} cy {}); "
+        "give a map of this camera, or --camera",
+        args.load_map, c.width, c.height, c.fx, c.fy, c.cx, c.cy, choice.origin, d.width, d.height, d.fx, d.fy, d.cx,
+        d.cy));
+  if (context.levels != options.features.levels || context.scale_factor != options.features.scale)
+    throw InputError(
+        fmt::format("{}: was made with {} pyramid levels of {}; add --set features.levels={} --set "
+                    "features.scale={}",
+                    args.load_map, context.levels, context.scale_factor, context.levels, context.scale_factor));
+  return choice;
 }
 
 int run(const RunArguments& args) {
@@ -126,7 +143,11 @@ int run(const RunArguments& args) {
 
   TumDataset dataset = open_tum_dataset(args.dataset);
   select_pairs(args.selection, &dataset);
-  const CameraChoice camera = choose_camera(args.camera, args.dataset);
+  if (args.localise && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  std::optional<MapFile> map;
+  if (!args.load_map.empty()) map = load_map(args.load_map);
+  const CameraChoice camera =
+      map ? camera_of_map(map->context, args, options) : choose_camera(args.camera, args.dataset);
   RgbdReaderOptions reading;
   reading.threaded = options.pipeline.threaded || args.realtime;
   RgbdReader reader(dataset.pairs, camera.camera, reading, &warnings);
@@ -145,7 +166,10 @@ int run(const RunArguments& args) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   SlamSystem slam(camera.camera, options, std::move(detectors));
+  if (map) slam.load(std::move(map->map));
+  slam.set_localise_only(args.localise);
   RunFacts facts;
+  facts.writes_map = !args.localise;
   facts.offered = static_cast<int>(dataset.pairs.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
@@ -181,6 +205,7 @@ int run(const RunArguments& args) {
   facts.config_yaml = settings.to_yaml();
   facts.times = reader.times();
   write_outputs(out, slam, facts);
+  if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(dataset.pairs, camera.camera));
   warnings.finish();
 
   const SlamStatistics s = slam.statistics();
@@ -189,6 +214,10 @@ int run(const RunArguments& args) {
                facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (interrupted) return 130;
+  if (s.tracked == 0 && args.localise) {
+    fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
+    return 1;
+  }
   if (s.tracked == 0) {
     fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
                options.tracking.initial_points);
@@ -198,6 +227,21 @@ int run(const RunArguments& args) {
 }
 
 }  // namespace
+
+DisabledParts parse_disabled(const std::string& list) {
+  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
+  DisabledParts parts;
+  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
+  std::istringstream names(list);
+  for (std::string name; std::getline(names, name, ',');) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end())
+      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
+                       "; parts: dr, kf, ba, loop");
+    *switches[at - known.begin()] = true;
+  }
+  return parts;
+}
 
 void register_run(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<RunArguments>();
@@ -222,12 +266,17 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
+  command->add_option("--skip-pairs", args->selection.skip_pairs, "Pairs left out at the beginning, before all else");
   command->add_option("--start", args->selection.start, "[s] after the first pair");
   command->add_option("--end", args->selection.end, "[s] after the first pair");
   command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
+  command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
+  command->add_flag("--localize", args->localise, "Track in that map without changing it");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
+  command->add_flag("--cv-orb", args->cv_orb,
+                    "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = run(*args); });
 }

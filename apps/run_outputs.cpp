@@ -5,6 +5,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -33,11 +34,31 @@ double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-Trajectory with_stamps(const std::vector<TrajectoryFrame>& frames, const std::vector<std::string>& stamps) {
-  Trajectory result;
-  for (const TrajectoryFrame& f : frames)
-    result.push_back({f.timestamp, stamps.at(static_cast<size_t>(f.frame)), f.world_from_cam});
-  return result;
+// One trajectory a map; the first is there in any case.
+std::vector<Trajectory> with_stamps(const std::vector<TrajectoryFrame>& frames,
+                                    const std::vector<std::string>& stamps) {
+  std::vector<Trajectory> by_map(1);
+  for (const TrajectoryFrame& f : frames) {
+    const auto map = static_cast<size_t>(f.map);
+    if (by_map.size() <= map) by_map.resize(map + 1);
+    // Keyframes of a loaded map are of no frame of this run.
+    by_map[map].push_back({f.timestamp, f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "", f.world_from_cam});
+  }
+  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; };
+  for (Trajectory& t : by_map) std::stable_sort(t.begin(), t.end(), earlier);
+  return by_map;
+}
+
+// NAME.txt has the frames of the first map; maps that were never joined to it have worlds and files of their own,
+// NAME_map2.txt and so on. Files of maps that are no more would mislead: they go, once all others are written.
+void write_by_map(const std::filesystem::path& folder, const std::string& name, const std::vector<Trajectory>& by_map) {
+  const auto file = [&](size_t map) {
+    return folder / (map == 0 ? name + ".txt" : name + "_map" + std::to_string(map + 1) + ".txt");
+  };
+  for (size_t map = 0; map < by_map.size(); ++map)
+    if (map == 0 || !by_map[map].empty()) write_trajectory(file(map), by_map[map]);
+  for (size_t map = 1; map < by_map.size() || std::filesystem::exists(file(map)); ++map)
+    if (map >= by_map.size() || by_map[map].empty()) std::filesystem::remove(file(map));
 }
 
 std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
@@ -49,9 +70,9 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
   j["keyframes"] = s.keyframes;
   j["keyframes_inserted"] = s.keyframes_inserted;
   j["map_points"] = s.map_points;
-  j["maps"] = s.keyframes > 0 ? 1 : 0;
-  j["merges"] = 0;
-  j["loops"] = 0;
+  j["maps"] = s.maps;
+  j["merges"] = s.merges;
+  j["loops"] = s.loops;
   j["relocalisations"] = s.relocalisations;
   j["startup_s"] = facts.startup_s;
   j["wall_s"] = facts.wall_s;
@@ -97,13 +118,15 @@ double seconds_since_process_start() {
 }
 
 void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, const RunFacts& facts) {
-  write_trajectory(folder / "trajectory.txt", with_stamps(slam.trajectory(), facts.stamps));
-  write_trajectory(folder / "trajectory_online.txt", with_stamps(slam.online_trajectory(), facts.stamps));
-  write_trajectory(folder / "keyframes.txt", with_stamps(slam.keyframes(), facts.stamps));
+  write_by_map(folder, "trajectory", with_stamps(slam.trajectory(), facts.stamps));
+  write_by_map(folder, "trajectory_online", with_stamps(slam.online_trajectory(), facts.stamps));
+  write_by_map(folder, "keyframes", with_stamps(slam.keyframes(), facts.stamps));
   const MapView map = slam.map();
   const auto& orb = slam.options().features;
-  save_map(folder / "map.dkb", *map, {slam.camera(), orb.scale, orb.levels});
-  write_file_atomically(folder / "map.ply", point_cloud_ply(*map));
+  if (facts.writes_map) {
+    save_map(folder / "map.dkb", *map, {slam.camera(), orb.scale, orb.levels});
+    write_file_atomically(folder / "map.ply", point_cloud_ply(*map));
+  }
   write_file_atomically(folder / "config.yaml", facts.config_yaml);
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);

@@ -20,6 +20,7 @@ struct RunFacts {
   std::string features_csv;  // empty = not asked for
   MoverRows movers;
   StageTimes times;  // decoding
+  bool writes_map = true;
 };
 
 // Seconds since this process was started, by the kernel's account.

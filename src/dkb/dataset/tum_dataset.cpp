@@ -48,6 +48,7 @@ void AssociationOptions::check() const {
 }
 
 void DatasetSelection::check() const {
+  require_option(skip_pairs >= 0, "skip-pairs", skip_pairs, "at least 0");
   require_option(std::isfinite(start) && start >= 0, "start", start, "at least 0 s");
   require_option(end >= start, "end", end, "at least start");
   if (max_frames) require_option(*max_frames >= 1, "max-frames", *max_frames, "at least 1");
@@ -148,6 +149,10 @@ void select_pairs(const DatasetSelection& selection, TumDataset* dataset) {
   selection.check();
   auto& pairs = dataset->pairs;
   if (pairs.empty()) return;
+  if (static_cast<uint64_t>(selection.skip_pairs) >= pairs.size())
+    throw InputError(dataset->folder.string() + ": --skip-pairs " + std::to_string(selection.skip_pairs) +
+                     " leaves nothing; the sequence has " + std::to_string(pairs.size()) + " pairs");
+  pairs.erase(pairs.begin(), pairs.begin() + static_cast<std::ptrdiff_t>(selection.skip_pairs));
   const double origin = pairs.front().timestamp, length = pairs.back().timestamp - origin;
   std::erase_if(pairs, [&](const DatasetPair& pair) {
     const double t = pair.timestamp - origin;

@@ -52,8 +52,9 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
 std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
                                                  const AssociationOptions& options);
 
-// What --start, --end and --max-frames choose.
+// What --skip-pairs, --start, --end and --max-frames choose.
 struct DatasetSelection {
+  int64_t skip_pairs = 0;                                // left out at the beginning before all else, >= 0
   double start = 0;                                      // [s] after the first pair's colour stamp, inclusive, >= 0
   double end = std::numeric_limits<double>::infinity();  // [s] likewise, inclusive, >= start
   std::optional<int64_t> max_frames;                     // pairs counted from start, >= 1

@@ -68,6 +68,20 @@ Rigid3 Map::cam_from_world(KeyframeId id) const {
   return cam_from_ancestor * k->cam_from_world;
 }
 
+KeyframeId Map::root(KeyframeId id) const {
+  const Keyframe* k = keyframe(id);
+  if (k == nullptr) throw std::logic_error("map: no keyframe " + std::to_string(id));
+  while (k->parent != kNoKeyframe) k = keyframe(k->parent);
+  return k->id;
+}
+
+std::vector<KeyframeId> Map::roots() const {
+  std::vector<KeyframeId> ids;
+  for (const auto& k : keyframes_)
+    if (k.value->parent == kNoKeyframe) ids.push_back(k.value->id);
+  return ids;
+}
+
 std::vector<KeyframeId> Map::live_keyframes() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)
@@ -131,6 +145,7 @@ void Map::add_keyframe(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   const std::vector<PointId> points = std::move(keyframe.points);
   keyframe.points.assign(keyframe.features->size(), kNoPoint);
+  places_.add(id, keyframe.features->descriptors);
   keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_.value()});
   ++live_keyframe_count_;
   for (size_t i = 0; i < points.size(); ++i) {
@@ -246,6 +261,12 @@ void Map::update_covisibility(KeyframeId id, int least_shared_points) {
   }
 }
 
+void Map::date_back() {
+  FrameIndex newest = -1;
+  for (const auto& k : keyframes_) newest = std::max(newest, k.value->frame);
+  for (KeyframeId id = 0; id < keyframe_count(); ++id) edit(id).frame -= newest + 1;
+}
+
 void Map::set_parent(KeyframeId id, KeyframeId parent) {
   while (keyframe(parent) != nullptr && keyframe(parent)->culled) parent = keyframe(parent)->parent;
   for (const Keyframe* k = keyframe(parent); k != nullptr; k = keyframe(k->parent))
@@ -272,6 +293,7 @@ void Map::cull_keyframe(KeyframeId id) {
   me.points = std::vector<PointId>();  // {} would keep the memory
   me.covisible = std::vector<Covisible>();
   --live_keyframe_count_;
+  places_.remove(id);
 }
 
 }  // namespace dkb

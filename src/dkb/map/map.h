@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
 #include "dkb/place/copy_epoch.h"
+#include "dkb/place/place_index.h"
 
 namespace dkb {
 
@@ -83,6 +85,13 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
+  // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
+  KeyframeId root(KeyframeId id) const;   // must exist
+  std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
+  // The live keyframes that look most like `descriptors`, best first; see PlaceIndex.
+  std::vector<PlaceMatch> similar_keyframes(std::span<const Descriptor> descriptors, size_t max_results) const {
+    return places_.query(descriptors, max_results);
+  }
   size_t point_count() const { return point_count_; }
   int live_keyframe_count() const { return live_keyframe_count_; }
 
@@ -99,6 +108,11 @@ class Map {
   void update_covisibility(KeyframeId id, int least_shared_points);
   // Removes a keyframe's observations; it and its children hang on its parent from now on.
   void cull_keyframe(KeyframeId id);
+  // Moves the frames of all keyframes to before 0, the newest to -1: a session that begins counts its own from 0.
+  void date_back();
+  // Adds `other` as a map of its own, not joined to this one: its keyframes follow those that are there, and its points
+  // and frames are named after them. Throws InputError when that is more than one map can hold.
+  void append(const Map& other);
   // Hangs `id` on `parent`, or on the nearest ancestor of it that is live. Throws std::logic_error when `parent` hangs
   // on `id` itself.
   void set_parent(KeyframeId id, KeyframeId parent);
@@ -130,6 +144,7 @@ class Map {
   CopyEpoch epoch_;
   std::vector<Shared<Keyframe>> keyframes_;
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
+  PlaceIndex places_;                       // of the live keyframes
   size_t point_count_ = 0;
   int live_keyframe_count_ = 0;
 };

@@ -457,5 +457,28 @@ TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
   EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 3; }), "replacements of points run in a circle");
 }
 
+TEST(Map, FindsAKeyframeByItsLooksUntilItIsCulled) {
+  Map map = test::random_map(7, 12, 60, 0);
+  const KeyframeId sought = map.live_keyframes()[5];
+  const std::vector<Descriptor> looks = map.keyframe(sought)->features->descriptors;
+  const MapView before = map.snapshot();
+  ASSERT_FALSE(map.similar_keyframes(looks, 3).empty());
+  EXPECT_EQ(map.similar_keyframes(looks, 3).front().id, sought);
+  map.cull_keyframe(sought);
+  for (const PlaceMatch& m : map.similar_keyframes(looks, 12)) EXPECT_NE(m.id, sought);
+  EXPECT_EQ(before->similar_keyframes(looks, 3).front().id, sought) << "the snapshot is of before";
+}
+
+TEST(Map, TheRootIsTheEndOfTheWayUp) {
+  const Map map = test::random_map(8, 10, 30, 5);
+  for (KeyframeId k = 0; k < map.keyframe_count(); ++k) {
+    const Keyframe& root = *map.keyframe(map.root(k));
+    EXPECT_EQ(root.parent, kNoKeyframe);
+    const KeyframeId parent = map.keyframe(k)->parent;
+    EXPECT_EQ(root.id, parent == kNoKeyframe ? k : map.root(parent));
+  }
+  EXPECT_THROW(map.root(10), std::logic_error);
+}
+
 }  // namespace
 }  // namespace dkb

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/mapping/ba_window.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -45,42 +46,16 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
       around.resize(static_cast<size_t>(options.fixed_keyframes));
   }
 
-  BaProblem problem;
-  problem.camera = camera;
-  std::vector<int> camera_of(static_cast<size_t>(map.keyframe_count()), -1);
-  std::vector<KeyframeId> keyframe_of;
-  const auto add_camera = [&](KeyframeId k, bool fixed) {
-    camera_of[static_cast<size_t>(k)] = static_cast<int>(keyframe_of.size());
-    keyframe_of.push_back(k);
-    problem.cam_from_world.push_back(map.keyframe(k)->cam_from_world);
-    problem.fixed.push_back(fixed);
-  };
-  for (KeyframeId k : keyframes) add_camera(k, map.keyframe(k)->parent == kNoKeyframe);
-  for (const Covisible& c : around) add_camera(c.keyframe, true);
-  if (std::none_of(problem.fixed.begin(), problem.fixed.end(), [](uint8_t f) { return f != 0; })) problem.fixed[0] = 1;
-
-  std::vector<double> inv_sigma(32);
-  for (int l = 0; l < 32; ++l) inv_sigma[static_cast<size_t>(l)] = 1.0 / noise.corner_sigma(l, scale_factor);
-  std::vector<Observation> sources;
-  for (size_t p = 0; p < points.size(); ++p) {
-    const MapPoint& point = *map.point(points[p]);
-    problem.points.push_back(point.position);
-    for (const Observation& o : point.observations) {
-      const int c = camera_of[static_cast<size_t>(o.keyframe)];
-      if (c < 0) continue;
-      const Keypoint& k = map.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)];
-      BaObservation observation;
-      observation.camera = c;
-      observation.point = static_cast<int>(p);
-      observation.u = k.pixel.x();
-      observation.v = k.pixel.y();
-      observation.inv_sigma = inv_sigma[k.octave];
-      observation.depth = k.depth;
-      if (k.depth > 0) observation.inv_depth_sigma = 1.0 / noise.depth_sigma(k.depth);
-      problem.observations.push_back(observation);
-      sources.push_back({o.keyframe, static_cast<int32_t>(p)});
-    }
+  std::vector<uint8_t> fixed;
+  for (KeyframeId k : keyframes) fixed.push_back(map.keyframe(k)->parent == kNoKeyframe);
+  for (const Covisible& c : around) {
+    keyframes.push_back(c.keyframe);
+    fixed.push_back(1);
   }
+  if (std::none_of(fixed.begin(), fixed.end(), [](uint8_t f) { return f != 0; })) fixed[0] = 1;
+  BaWindow window =
+      make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), camera, noise, scale_factor);
+  BaProblem& problem = window.problem;
   if (options.weighted) set_geometric_weights(problem, options.weights);
 
   BaOptions ba;
@@ -88,21 +63,22 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   ba.prefilter = options.weighted;  // DKB section 3.3 leaves gross errors out beforehand
   const BaResult result = bundle_adjust(problem, ba);
 
-  for (size_t c = 0; c < keyframe_of.size(); ++c)
-    if (!problem.fixed[c]) map.set_pose(keyframe_of[c], problem.cam_from_world[c]);
-  for (size_t p = 0; p < points.size(); ++p) map.edit_point(points[p]).position = problem.points[p];
-  for (size_t o = 0; o < sources.size(); ++o)
-    if (result.outlier[o]) map.forget(points[static_cast<size_t>(sources[o].feature)], sources[o].keyframe);
+  for (size_t c = 0; c < window.keyframes.size(); ++c)
+    if (!problem.fixed[c]) map.set_pose(window.keyframes[c], problem.cam_from_world[c]);
+  for (size_t p = 0; p < window.points.size(); ++p) map.edit_point(window.points[p]).position = problem.points[p];
+  for (size_t o = 0; o < window.sources.size(); ++o)
+    if (result.outlier[o])
+      map.forget(window.points[static_cast<size_t>(window.sources[o].point)], window.sources[o].keyframe);
 
   report.cameras = static_cast<int>(std::count(problem.fixed.begin(), problem.fixed.end(), uint8_t{0}));
-  report.fixed = static_cast<int>(keyframe_of.size()) - report.cameras;
-  report.points = static_cast<int>(points.size());
-  report.observations = static_cast<int>(sources.size());
+  report.fixed = static_cast<int>(window.keyframes.size()) - report.cameras;
+  report.points = static_cast<int>(window.points.size());
+  report.observations = static_cast<int>(window.sources.size());
   report.outliers = result.outliers;
   report.iterations = result.iterations;
   report.initial_cost = result.initial_cost;
   report.final_cost = result.final_cost;
-  report.moved_points = std::move(points);
+  report.moved_points = std::move(window.points);
   return report;
 }
 

@@ -19,14 +19,22 @@ void MappingOptions::check() const {
   require_option(redundant_observers >= 1, "redundant_observers", redundant_observers, "at least 1");
   require_option(fusion_keyframes >= 0, "fusion_keyframes", fusion_keyframes, "at least 0");
   require_option(fusion_radius > 0, "fusion_radius", fusion_radius, "greater than 0 px");
+  require_option(seam_tolerance >= 1, "seam_tolerance", seam_tolerance, "at least 1");
   creation.check();
   ba.check();
 }
 
 LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-                         const MappingOptions& options)
-    : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), options_(options) {
+                         const MappingOptions& options, Map map)
+    : camera_(camera),
+      noise_(noise),
+      scale_factor_(scale_factor),
+      levels_(levels),
+      options_(options),
+      map_(std::move(map)) {
   options_.check();
+  for (PointId id : map_.live_points())
+    if (map_.keyframe_count() - 1 - map_.point(id)->born_at < options_.probation_keyframes) young_.push_back(id);
 }
 
 MapView LocalMapper::process(const KeyframePacket& packet) {
@@ -50,6 +58,29 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
     cull_keyframes(packet.id);
   }
   times_.add("mapping", whole.ms());
+  return map_.snapshot();
+}
+
+MapView LocalMapper::apply(const MapCorrection& correction) {
+  const Stopwatch whole;
+  move_map(map_, correction);
+  for (const auto& [a, b] : correction.same) {
+    const PointId one = map_.resolve(a), other = map_.resolve(b);
+    if (one == kNoPoint || other == kNoPoint || one == other) continue;
+    fuse_pair(one, other);
+    ++report_.points_fused;
+  }
+  std::vector<KeyframeId> near, far;
+  for (KeyframeId k : correction.near_side)
+    if (map_.live_keyframe(k) != nullptr) near.push_back(k);
+  for (KeyframeId k : correction.far_side)
+    if (map_.live_keyframe(k) != nullptr) far.push_back(k);
+  for (KeyframeId k : near) report_.points_fused += fuse_into(k, points_of(far), options_.seam_tolerance);
+  for (KeyframeId k : far) report_.points_fused += fuse_into(k, points_of(near), options_.seam_tolerance);
+  near.insert(near.end(), far.begin(), far.end());
+  refresh(points_of(near));
+  for (KeyframeId k : near) map_.update_covisibility(k, options_.least_shared_points);
+  times_.add("map_correction", whole.ms());
   return map_.snapshot();
 }
 
@@ -125,7 +156,26 @@ void LocalMapper::cull_points(KeyframeId newest) {
   young_ = std::move(still_young);
 }
 
-int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& points) {
+std::vector<PointId> LocalMapper::points_of(const std::vector<KeyframeId>& keyframes) const {
+  std::vector<PointId> points;
+  for (KeyframeId k : keyframes)
+    for (PointId p : map_.keyframe(k)->points)
+      if (p != kNoPoint) points.push_back(p);
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  return points;
+}
+
+// The better observed point survives; the older one in a tie.
+void LocalMapper::fuse_pair(PointId a, PointId b) {
+  const size_t seen_a = map_.point(a)->observations.size(), seen_b = map_.point(b)->observations.size();
+  if (seen_a > seen_b || (seen_a == seen_b && a < b))
+    map_.fuse(b, a);
+  else
+    map_.fuse(a, b);
+}
+
+int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& points, double tolerance) {
   std::vector<Candidate> candidates;
   for (PointId id : points) {
     const MapPoint* p = map_.point(id);
@@ -136,7 +186,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
   }
   const Keyframe& k = *map_.keyframe(keyframe);
   ProjectionMatchOptions match;
-  match.radius = static_cast<float>(options_.fusion_radius);
+  match.radius = static_cast<float>(tolerance * options_.fusion_radius);
   match.max_distance = 50;
   match.ratio = 1.0f;
   const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_,
@@ -151,19 +201,15 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
     const Eigen::Vector3d in_cam = cam_from_world * p->position;
     const double sigma = noise_.corner_sigma(kp.octave, scale_factor_);
-    if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() > 5.991 * sigma * sigma) continue;
-    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > 3 * noise_.depth_sigma(kp.depth)) continue;
+    if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
+        5.991 * tolerance * tolerance * sigma * sigma)
+      continue;
+    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > 3 * tolerance * noise_.depth_sigma(kp.depth)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];
     if (there == kNoPoint) {
       map_.observe(id, keyframe, m.feature);
     } else if (there != id) {
-      // The better observed point survives; the older one in a tie.
-      const MapPoint& other = *map_.point(there);
-      if (other.observations.size() > p->observations.size() ||
-          (other.observations.size() == p->observations.size() && there < id))
-        map_.fuse(id, there);
-      else
-        map_.fuse(there, id);
+      fuse_pair(there, id);
       ++fused;
     }
   }
@@ -174,22 +220,10 @@ void LocalMapper::fuse_neighbours(KeyframeId id) {
   std::vector<KeyframeId> neighbours;
   for (const Covisible& c : map_.keyframe(id)->covisible)
     if (static_cast<int>(neighbours.size()) < options_.fusion_keyframes) neighbours.push_back(c.keyframe);
-  const auto points_of = [&](KeyframeId k) {
-    std::vector<PointId> points;
-    for (PointId p : map_.keyframe(k)->points)
-      if (p != kNoPoint) points.push_back(p);
-    return points;
-  };
-  std::vector<PointId> all;
-  for (KeyframeId n : neighbours) {
-    report_.points_fused += fuse_into(n, points_of(id));
-    const auto theirs = points_of(n);
-    all.insert(all.end(), theirs.begin(), theirs.end());
-  }
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
+  for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, points_of({id}));
+  const std::vector<PointId> all = points_of(neighbours);
   report_.points_fused += fuse_into(id, all);
-  refresh(points_of(id));
+  refresh(points_of({id}));
 }
 
 void LocalMapper::cull_keyframes(KeyframeId newest) {

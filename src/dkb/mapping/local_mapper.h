@@ -7,6 +7,7 @@
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
+#include "dkb/mapping/map_correction.h"
 #include "dkb/mapping/point_creation.h"
 #include "dkb/tracking/frame.h"
 #include "dkb/util/timing.h"
@@ -22,6 +23,7 @@ struct MappingOptions {
   int redundant_observers = 3;      // ... is seen by so many others at the same scale or finer, >= 1
   int fusion_keyframes = 10;        // covisible keyframes whose points are fused with a new keyframe's, >= 0
   double fusion_radius = 3.0;       // [px] at the finest level, > 0
+  double seam_tolerance = 2.0;      // factor on radius and error limit of fusion where a loop was just closed, >= 1
   PointCreationOptions creation;
   LocalBaOptions ba;
   void check() const;
@@ -36,10 +38,12 @@ struct MappingReport {
 class LocalMapper {
  public:
   LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-              const MappingOptions& options);
+              const MappingOptions& options, Map map = {});
 
   // Works a keyframe in and returns the map as it is then.
   MapView process(const KeyframePacket& packet);
+  // Works in what loop closing or global bundle adjustment found, and returns the map as it is then.
+  MapView apply(const MapCorrection& correction);
 
   const Map& map() const { return map_; }
   const MappingReport& report() const { return report_; }
@@ -50,7 +54,9 @@ class LocalMapper {
   void apply_reports(const KeyframePacket& packet);
   void cull_points(KeyframeId newest);
   void fuse_neighbours(KeyframeId id);
-  int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points);
+  std::vector<PointId> points_of(const std::vector<KeyframeId>& keyframes) const;
+  void fuse_pair(PointId a, PointId b);
+  int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points, double tolerance = 1);
   void cull_keyframes(KeyframeId newest);
   void refresh(const std::vector<PointId>& points);
 

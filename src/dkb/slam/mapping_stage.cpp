@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/mapping_stage.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace dkb {
@@ -10,10 +11,10 @@ constexpr size_t kSlots = 1024;
 }  // namespace
 
 MappingStage::MappingStage(LocalMapper mapper, bool threaded)
-    : mapper_(std::move(mapper)), packets_(kSlots), views_(kSlots) {
+    : mapper_(std::move(mapper)), tasks_(kSlots), views_(kSlots) {
   if (threaded)
     thread_ = std::thread([this] {
-      while (auto packet = packets_.pop()) views_.push(mapper_.process(*packet));
+      while (auto task = tasks_.pop()) views_.push(work(*task));
     });
 }
 
@@ -21,17 +22,29 @@ MappingStage::~MappingStage() {
   stop();
 }
 
-void MappingStage::push(KeyframePacket packet, FrameIndex due) {
+MapView MappingStage::work(const Task& task) {
+  return task.correction ? mapper_.apply(*task.correction) : mapper_.process(task.packet);
+}
+
+void MappingStage::push(Task task, Due due) {
   due_.push_back(due);
   if (thread_.joinable())
-    packets_.push(std::move(packet));
+    tasks_.push(std::move(task));
   else
-    views_.push(mapper_.process(packet));
+    views_.push(work(task));
+}
+
+void MappingStage::push(KeyframePacket packet, FrameIndex due) {
+  push(Task{std::move(packet), nullptr}, Due{due, false});
+}
+
+void MappingStage::push(std::shared_ptr<const MapCorrection> correction, FrameIndex due) {
+  push(Task{{}, std::move(correction)}, Due{due, true});
 }
 
 std::optional<MapView> MappingStage::take_due(FrameIndex now, bool wait) {
   std::optional<MapView> newest;
-  while (!due_.empty() && due_.front() <= now) {
+  while (!due_.empty() && due_.front().frame <= now) {
     std::optional<MapView> view = wait ? views_.pop() : views_.try_pop();
     if (!view) break;
     newest = std::move(view);
@@ -40,12 +53,16 @@ std::optional<MapView> MappingStage::take_due(FrameIndex now, bool wait) {
   return newest;
 }
 
+size_t MappingStage::outstanding_corrections() const {
+  return static_cast<size_t>(std::count_if(due_.begin(), due_.end(), [](const Due& d) { return d.correction; }));
+}
+
 std::optional<MapView> MappingStage::drain() {
   return take_due(std::numeric_limits<FrameIndex>::max(), true);
 }
 
 void MappingStage::stop() {
-  packets_.close();
+  tasks_.close();
   if (thread_.joinable()) thread_.join();
 }
 

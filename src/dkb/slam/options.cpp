@@ -18,6 +18,7 @@ void SlamOptions::check() const {
   baseline_keyframes.check();
   adaptive_keyframes.check();
   mapping.check();
+  loop_closing.check();
   dynamics.check();
   evidence.check();
   movers.check();
@@ -45,6 +46,7 @@ void disable_parts(SlamOptions& options, const DisabledParts& parts) {
   if (parts.dynamic_removal) options.dynamics.filter = FilterKind::none;
   if (parts.keyframes) options.keyframe_policy = KeyframePolicyKind::baseline;
   if (parts.weighted_ba) options.mapping.ba.weighted = false;
+  if (parts.loop) options.loop_closing.loop.enabled = false;
 }
 
 void bind_settings(Settings& s, SlamOptions& o) {
@@ -75,7 +77,6 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.initial_points", &t.initial_points, "features with depth that the first frame needs");
   s.bind("tracking.least_matches", &t.least_matches, "matches with the last frame that make a pose worth trying");
   s.bind("tracking.least_inliers", &t.least_inliers, "inliers of a pose; fewer: lost");
-  s.bind("tracking.least_inliers_found_again", &t.least_inliers_found_again, "the same after a loss");
   s.bind("tracking.close_depth", &t.close_depth, "[m] depths below make map points at once");
   s.bind("tracking.least_new_points", &t.least_new_points, "nearest depths that make points whatever close_depth says");
   s.bind("tracking.radius_last_frame", &t.radius_last_frame, "[px] search around the predicted position");
@@ -88,7 +89,22 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.established_frames", &t.established_frames,
          "[frames] since its birth before a point may be found where a mover is");
   s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
-  s.bind("tracking.recovery_keyframes", &t.recovery_keyframes, "newest keyframes that a lost tracker tries");
+  s.bind("tracking.new_map_after", &t.new_map_after, "[frames] lost in a row until a new map is started; 0 = never");
+  RelocalisationOptions& r = t.relocalisation;
+  s.bind("tracking.relocalisation.candidates", &r.candidates, "look-alike keyframes that a lost tracker tries");
+  s.bind("tracking.relocalisation.neighbours", &r.neighbours, "covisible keyframes matched along with each");
+  s.bind("tracking.relocalisation.least_matches", &r.least_matches, "by descriptor alone that make one worth a try");
+  s.bind("tracking.relocalisation.least_agreeing", &r.least_agreeing, "of these, that must agree on a pose");
+  s.bind("tracking.relocalisation.radius", &r.radius, "[px] first search around that pose");
+  s.bind("tracking.relocalisation.radius_fine", &r.radius_fine, "[px] second search");
+  s.bind("tracking.relocalisation.least_inliers", &r.least_inliers, "points that the final pose rests on");
+  s.bind("tracking.relocalisation.least_share", &r.least_share, "of well-known points in view that must be found");
+  s.bind("tracking.relocalisation.most_see_through", &r.most_see_through,
+         "share of these that may stand before what is seen there");
+  s.bind("tracking.relocalisation.largest_position_sd", &r.largest_position_sd,
+         "[m] standard deviation of the camera's place");
+  s.bind("tracking.relocalisation.ambiguity", &r.ambiguity,
+         "a pose elsewhere with this share of the inliers makes both worthless");
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes,
          "keyframes that share most points with the frame");
   s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each,
@@ -156,6 +172,51 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("mapping.ba.weighted", &m.ba.weighted, "geometric weights of points (DKB section 3.3)");
   s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points (DKB Table 1)");
   s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals instead");
+
+  s.bind("mapping.seam_tolerance", &m.seam_tolerance, "factor on fusion's limits where a loop was just closed");
+
+  LoopOptions& l = o.loop_closing.loop;
+  s.bind("loop.enabled", &l.enabled, "close loops and merge maps");
+  s.bind("loop.candidates", &l.candidates, "most alike keyframes that are verified");
+  s.bind("loop.least_likeness", &l.least_likeness, "of a candidate, as a share of the most alike neighbour's score");
+  s.bind("loop.neighbourhood", &l.neighbourhood, "steps along covisibility within which nothing is a loop");
+  s.bind("loop.least_keyframes_between", &l.least_keyframes_between, "[keyframes] younger ones are no candidates");
+  s.bind("loop.area_keyframes", &l.area_keyframes, "keyframes around a candidate whose points are matched");
+  s.bind("loop.rest_keyframes", &l.rest_keyframes, "[keyframes] without a search after a loop");
+  s.bind("loop.match_distance", &l.match_distance, "[bits] of a descriptor match");
+  s.bind("loop.match_ratio", &l.match_ratio, "best over second best distance of such a match");
+  s.bind("loop.least_ransac_inliers", &l.least_ransac_inliers, "pairs of points that one rigid motion explains");
+  s.bind("loop.radius_first", &l.radius_first, "[px] guided search under that motion");
+  s.bind("loop.radius", &l.radius, "[px] the same under the refined pose");
+  s.bind("loop.least_inliers", &l.least_inliers, "map points that the refined pose rests on");
+  s.bind("loop.least_share", &l.least_share, "of the well-known points that ought to be in view");
+  s.bind("loop.least_support", &l.least_support, "keyframes around the newest that must see the same");
+  s.bind("loop.support_keyframes", &l.support_keyframes, "of them asked at most");
+  s.bind("loop.support_inliers", &l.support_inliers, "points of the area that such a keyframe must show");
+  s.bind("loop.agree_translation", &l.agree_translation, "[m] by which they may differ");
+  s.bind("loop.agree_rotation", &l.agree_rotation, "[deg] likewise");
+  s.bind("loop.drift_translation_base", &l.drift_translation_base, "[m] largest plausible drift of no way ...");
+  s.bind("loop.drift_translation_share", &l.drift_translation_share, "... and its growth with the way's length");
+  s.bind("loop.drift_rotation_base", &l.drift_rotation_base, "[deg] the same of the direction");
+  s.bind("loop.drift_rotation_per_metre", &l.drift_rotation_per_metre, "[deg/m] and its growth");
+  s.bind("loop.merge_least_inliers", &l.merge_least_inliers, "least_inliers between maps that are not joined");
+  s.bind("loop.merge_least_share", &l.merge_least_share, "least_share between maps that are not joined");
+  s.bind("loop.essential_shared_points", &l.essential_shared_points,
+         "[points] shared by keyframes that make an edge of the pose graph");
+  s.bind("loop.edge_position_sd", &l.edge_position_sd, "[m] of such an edge ...");
+  s.bind("loop.edge_position_share", &l.edge_position_share, "... and its growth with the edge's length");
+  s.bind("loop.edge_rotation_sd", &l.edge_rotation_sd, "[rad] the same of the direction");
+  s.bind("loop.edge_rotation_growth", &l.edge_rotation_growth, "[rad/m] and its growth");
+  s.bind("loop.graph_iterations", &l.graph_iterations, "steps of the pose graph's optimisation");
+  s.bind("loop.latency", &o.loop_closing.loop_latency.base, "[frames] from a keyframe's view to its correction ...");
+  s.bind("loop.latency_per_keyframe", &o.loop_closing.loop_latency.per_keyframe, "... and its growth with the map");
+  GlobalBaOptions& g = o.loop_closing.global_ba;
+  s.bind("global_ba.iterations_first", &g.iterations_first, "[steps] before outliers are told apart");
+  s.bind("global_ba.iterations_second", &g.iterations_second, "[steps] after");
+  s.bind("global_ba.latency", &o.loop_closing.global_ba_latency.base, "[frames] until the result is used ...");
+  s.bind("global_ba.latency_per_keyframe", &o.loop_closing.global_ba_latency.per_keyframe,
+         "... and its growth with the map");
+  s.bind("global_ba.final", &o.final_ba, "adjust the whole map once more at the end");
 
   DynamicsOptions& d = o.dynamics;
   s.bind("dynamics.filter", &d.filter,

@@ -14,6 +14,7 @@
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/slam/dynamic_stage.h"
+#include "dkb/slam/loop_stage.h"
 #include "dkb/tracking/tracker.h"
 #include "dkb/util/settings.h"
 
@@ -39,6 +40,8 @@ struct SlamOptions {
   AdaptiveKeyframeOptions adaptive_keyframes;
   BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
+  LoopStageOptions loop_closing;
+  bool final_ba = false;  // adjust the whole map once more at the end
   DynamicsOptions dynamics;
   PointEvidenceOptions evidence;
   MoverTrackerOptions movers;

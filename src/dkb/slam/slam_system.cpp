@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
+// The library's front door; what happens to a frame stands in slam_pipeline.cpp.
 #include "dkb/slam/slam_system.h"
 
 #include <algorithm>
-#include <deque>
-#include <optional>
 
-#include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/slam_system_impl.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
+namespace {
+
+// Maps are numbered by the age of their roots. A root that is not among them is newer than all.
+int rank_of(const std::vector<KeyframeId>& roots, KeyframeId root) {
+  return static_cast<int>(std::lower_bound(roots.begin(), roots.end(), root) - roots.begin());
+}
+
+}  // namespace
 
 const char* name_of(FeatureState state) {
   switch (state) {
@@ -22,346 +29,6 @@ const char* name_of(FeatureState state) {
       break;
   }
   return "unused";
-}
-
-class SlamSystem::Impl {
- public:
-  Impl(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
-      : camera_(camera),
-        options_(options),
-        undistort_(camera),
-        extractor_(options.features),
-        dynamics_(camera, options.dynamics, std::move(detectors)) {
-    camera_.check();
-    options_.check();
-    start();
-  }
-
-  FrameResult process(std::shared_ptr<const RgbdImage> image);
-  void finish();
-  void start();
-
-  CameraModel camera_;
-  SlamOptions options_;
-  UndistortionTable undistort_;
-  OrbExtractor extractor_;
-  OrbFeatures orb_;                         // of the frame at hand
-  std::shared_ptr<const RgbdImage> image_;  // likewise
-  std::unique_ptr<Tracker> tracker_;
-  std::unique_ptr<KeyframePolicy> policy_;
-  std::unique_ptr<MappingStage> mapping_;
-  DynamicStage dynamics_;
-  DynamicScene scene_;  // of the last frame
-  std::optional<PointEvidence> evidence_;
-  std::optional<MoverTracker> movers_;
-
-  // A frame of the trajectory hangs on a keyframe, since the world may still move.
-  struct Record {
-    FrameIndex frame;
-    double timestamp;
-    KeyframeId reference;
-    Rigid3 cam_from_reference;
-    Rigid3 world_from_cam_online;
-  };
-  std::vector<Record> records_;
-  FrameIndex next_frame_ = 0;
-  double last_timestamp_ = 0;
-  KeyframeId next_keyframe_ = 0;
-  FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
-  Rigid3 world_from_odom_;
-  bool localise_only_ = false;
-  std::vector<size_t> kept_;                    // features given to tracking, as indices of all
-  std::vector<uint8_t> suspect_;                // of these, which may move
-  std::vector<FeatureReport> feature_reports_;  // all features of the last frame
-  struct RecentKeyframe {
-    FrameIndex frame;
-    KeyframeId id;
-    std::shared_ptr<const RgbdFeatures> features;
-  };
-  std::deque<RecentKeyframe> recent_keyframes_;  // whose detections may still be out
-  SlamStatistics statistics_;
-  StageTimes times_;
-
- private:
-  void take_map(bool wait);
-  void take_view(const MapView& view);
-  void extract(const RgbdImage& image);
-  void filter_dynamic(std::shared_ptr<const RgbdImage> image);
-  // Index among all extracted features.
-  size_t source_feature(const TrackedFrame& frame, size_t feature) const {
-    return kept_[frame.source.empty() ? feature : static_cast<size_t>(frame.source[feature])];
-  }
-  void report_features(const TrackedFrame& frame);
-  void weigh_evidence();
-  void retract_late();
-  std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
-  KeyframeDecision decide(const TrackOutcome& outcome) const;
-  void insert_keyframe(TrackedFrame& frame);
-};
-
-void SlamSystem::Impl::start() {
-  mapping_.reset();
-  const OrbOptions& orb = options_.features;
-  tracker_ =
-      std::make_unique<Tracker>(camera_, options_.noise, orb.scale, orb.levels, options_.tracking, options_.seed);
-  if (options_.keyframe_policy == KeyframePolicyKind::adaptive)
-    policy_ = std::make_unique<AdaptiveKeyframePolicy>(options_.adaptive_keyframes, camera_.width, camera_.height);
-  else
-    policy_ = std::make_unique<BaselineKeyframePolicy>(options_.baseline_keyframes);
-  mapping_ = std::make_unique<MappingStage>(
-      LocalMapper(camera_, options_.noise, orb.scale, orb.levels, options_.mapping), options_.pipeline.threaded);
-  records_.clear();
-  next_frame_ = 0;
-  next_keyframe_ = 0;
-  world_from_odom_ = {};
-  last_keyframe_frame_ = 0;
-  last_relocalisation_frame_ = -1000000;
-  feature_reports_.clear();
-  scene_ = {};
-  evidence_.emplace(options_.evidence);
-  movers_.emplace(camera_, options_.movers);
-  recent_keyframes_.clear();
-  statistics_ = {};
-  times_ = {};
-}
-
-void SlamSystem::Impl::take_map(bool wait) {
-  const auto view = mapping_->take_due(next_frame_, wait);
-  if (view) take_view(*view);
-}
-
-void SlamSystem::Impl::take_view(const MapView& view) {
-  const Rigid3 new_world_from_old = tracker_->take_view(view);
-  world_from_odom_ = new_world_from_old * world_from_odom_;
-  dynamics_.move_world(new_world_from_old);
-  movers_->rebase(new_world_from_old);
-}
-
-void SlamSystem::Impl::extract(const RgbdImage& image) {
-  const Stopwatch watch;
-  orb_ = extractor_.extract(image.grey);
-  times_.add("features", watch.ms());
-}
-
-std::vector<Eigen::Vector3d> SlamSystem::Impl::keyframe_points_in_camera(const Rigid3& cam_from_world) const {
-  std::vector<Eigen::Vector3d> points;
-  const Map& map = tracker_->view();
-  const auto keyframes = map.live_keyframes();
-  const size_t count = std::min(keyframes.size(), static_cast<size_t>(options_.dynamics.multiview.keyframes));
-  for (size_t n = keyframes.size() - count; n < keyframes.size(); ++n) {
-    const Keyframe& k = *map.keyframe(keyframes[n]);
-    const Rigid3 cam_from_keyframe = cam_from_world * k.cam_from_world.inverse();
-    for (const Keypoint& p : k.features->keypoints)
-      if (p.depth > 0) points.push_back(cam_from_keyframe * camera_.unproject(p.pixel.cast<double>(), p.depth));
-  }
-  return points;
-}
-
-// Corners on movers go no further (DKB section 3.1): neither tracking nor the map ever sees them.
-void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
-  DynamicStage::Context context;
-  context.frame = next_frame_;
-  context.orb = &orb_;
-  context.undistort = &undistort_;
-  const auto& last = tracker_->last_frame();
-  context.current_from_previous = last ? tracker_->expected_motion(image->timestamp - last->timestamp) : Rigid3();
-  if (last) context.cam_from_world = context.current_from_previous * last->cam_from_world;
-  if (last && dynamics_.wants_keyframe_points())
-    context.keyframe_points_in_camera = keyframe_points_in_camera(context.cam_from_world);
-  context.image = std::move(image);
-  scene_ = dynamics_.process(context);
-  // The default filter only suspects: what well-known map points explain stays. The others judge for good.
-  const bool suspects = options_.dynamics.filter == FilterKind::standard;
-  kept_.clear();
-  feature_reports_.resize(orb_.corners.size());
-  OrbFeatures kept;
-  suspect_.clear();
-  for (size_t i = 0; i < orb_.corners.size(); ++i) {
-    feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y,
-                           scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
-    if (scene_.dynamic[i] && !suspects) continue;
-    kept_.push_back(i);
-    suspect_.push_back(scene_.dynamic[i]);
-    kept.corners.push_back(orb_.corners[i]);
-    kept.descriptors.push_back(orb_.descriptors[i]);
-  }
-  orb_ = std::move(kept);
-}
-
-void SlamSystem::Impl::report_features(const TrackedFrame& frame) {
-  for (size_t f = 0; f < frame.points.size(); ++f) {
-    FeatureState& state = feature_reports_[source_feature(frame, f)].state;
-    if (frame.points[f] != kNoPoint || frame.odometry[f]) state = FeatureState::used;
-    if (frame.outlier[f] && state != FeatureState::dynamic) state = FeatureState::outlier;
-  }
-  for (const FeatureReport& f : feature_reports_) statistics_.features_removed += f.state == FeatureState::dynamic;
-}
-
-// Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
-void SlamSystem::Impl::weigh_evidence() {
-  if (scene_.mask.empty()) return;
-  const auto& last = *tracker_->last_frame();
-  std::vector<PointId> matched;
-  for (PointId p : last.points)
-    if (p != kNoPoint) {
-      evidence_->fits_still_world(p);
-      matched.push_back(p);
-    }
-  std::sort(matched.begin(), matched.end());
-  const DepthImage& depth = image_->depth;
-  tracker_->visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double z) {
-    // The table undoes the distortion at image pixels; its negative at the ideal pixel is near enough for cells.
-    const Eigen::Vector2f ideal = pixel.cast<float>();
-    const Eigen::Vector2f at = 2 * ideal - undistort_(ideal.x(), ideal.y());
-    if (!scene_.mask.at(at.x(), at.y())) return;
-    const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
-    if (!depth.contains(x, y) || !(depth(x, y) > 0)) return;
-    const double surface = depth(x, y);
-    if (std::abs(surface - z) < 0.05 * surface + 0.05 && !std::binary_search(matched.begin(), matched.end(), id))
-      evidence_->on_mover(id);
-  });
-  tracker_->retract(evidence_->take_convicted());
-}
-
-// Detections that came after their keyframe: what it made on movers goes.
-void SlamSystem::Impl::retract_late() {
-  for (const LateMask& late : dynamics_.take_late_masks())
-    for (const RecentKeyframe& k : recent_keyframes_) {
-      if (k.frame != late.frame) continue;
-      std::vector<PointId> points;
-      for (size_t f = 0; f < k.features->size(); ++f) {
-        const Keypoint& p = k.features->keypoints[f];
-        if (late.mask.at(p.image_pixel.x(), p.image_pixel.y()))
-          points.push_back(make_point_id(k.id, static_cast<int>(f)));
-      }
-      tracker_->retract(points);
-    }
-}
-
-KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
-  const TrackedFrame& frame = outcome.frame;
-  if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, ""};
-  if (localise_only_) return {};
-  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue)
-    return {};
-  KeyframeQuery q;
-  q.frame = frame.index;
-  q.last_keyframe_frame = last_keyframe_frame_;
-  q.last_relocalisation_frame = last_relocalisation_frame_;
-  q.last_keyframe = next_keyframe_ - 1;
-  q.mapper_idle = mapping_->outstanding() == 0;
-  q.tracked_points = frame.inliers;
-  for (size_t f = 0; f < frame.points.size(); ++f) {
-    const float z = frame.features->keypoints[f].depth;
-    if (!(z > 0) || z > options_.tracking.close_depth) continue;
-    if (frame.points[f] != kNoPoint)
-      ++q.tracked_close_points;
-    else
-      ++q.creatable_close_points;
-  }
-  q.reference_points = tracker_->reference_point_count(frame.reference, next_keyframe_ > 2 ? 2 : 1);
-  q.cam_from_world = frame.cam_from_world;
-  q.last_keyframe_cam_from_world = tracker_->keyframe_pose(q.last_keyframe);
-  q.points = &frame.points;
-  q.features = frame.features.get();
-  return policy_->decide(q, tracker_->view());
-}
-
-void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
-  const KeyframeId id = next_keyframe_++;
-  KeyframePacket packet = tracker_->make_keyframe(id, frame);
-  for (const ProvisionalPoint& p : packet.new_points)
-    feature_reports_[source_feature(frame, static_cast<size_t>(p.feature))].state = FeatureState::used;
-  dynamics_.note_keyframe();
-  recent_keyframes_.push_back({frame.index, id, frame.features});
-  const DetectionSchedule& schedule = dynamics_.schedule();
-  while (recent_keyframes_.front().frame < frame.index - 2 * (schedule.latency + schedule.every))
-    recent_keyframes_.pop_front();
-  mapping_->push(std::move(packet), frame.index + options_.pipeline.mapper_latency);
-  last_keyframe_frame_ = frame.index;
-  frame.reference = id;
-  frame.cam_from_reference = {};
-  ++statistics_.keyframes_inserted;
-}
-
-// One frame, as in DKB section 3: features, pose, keyframe decision; mapping happens beside it.
-FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_pointer) {
-  image_ = std::move(image_pointer);
-  const RgbdImage& image = *image_;
-  if (image.grey.width() != camera_.width || image.grey.height() != camera_.height ||
-      image.depth.width() != camera_.width || image.depth.height() != camera_.height)
-    throw InputError("frame " + std::to_string(next_frame_) + ": its images are not of the camera's size, " +
-                     std::to_string(camera_.width) + " x " + std::to_string(camera_.height));
-  if (next_frame_ > 0 && !(image.timestamp > last_timestamp_))
-    throw InputError("frame " + std::to_string(next_frame_) + ": its stamp is not after the one before it");
-  last_timestamp_ = image.timestamp;
-
-  FrameResult result;
-  const Stopwatch waiting;
-  take_map(!options_.pipeline.realtime);
-  result.wait_ms = waiting.ms();
-  times_.add("wait_mapper", result.wait_ms);
-  dynamics_.begin_frame(next_frame_, image_);
-  result.wait_ms = waiting.ms();
-
-  const Stopwatch tracking;
-  extract(image);
-  filter_dynamic(image_);
-  retract_late();
-  const auto features_at = [&](const Vector6d& velocity) {
-    RgbdFeatures features = make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth);
-    for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
-    return std::make_shared<const RgbdFeatures>(std::move(features));
-  };
-  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at);
-  TrackedFrame& frame = outcome.frame;
-  if (outcome.wants_first_keyframe) frame.cam_from_world = options_.base_from_cam.inverse();
-  report_features(frame);
-  const bool has_pose = outcome.state == TrackingState::tracking || outcome.state == TrackingState::relocalised;
-  dynamics_.commit(has_pose ? std::optional(frame.cam_from_world) : std::nullopt);
-
-  result.frame = next_frame_++;
-  result.timestamp = image.timestamp;
-  result.state = outcome.state;
-  ++statistics_.frames;
-  if (result.tracked()) {
-    if (outcome.state == TrackingState::relocalised) {
-      last_relocalisation_frame_ = frame.index;
-      ++statistics_.relocalisations;
-    }
-    weigh_evidence();
-    const Stopwatch deciding;
-    const KeyframeDecision decision = decide(outcome);
-    times_.add("keyframe_decision", deciding.ms());
-    if (decision.insert) {
-      ++statistics_.keyframe_rules[name_of(decision.rule)];
-      insert_keyframe(frame);
-    }
-    result.keyframe = decision.insert;
-    result.world_from_cam = frame.cam_from_world.inverse();
-    result.world_from_odom = world_from_odom_;
-    result.odom_from_cam = world_from_odom_.inverse() * result.world_from_cam;
-    if (options_.dynamics.filter == FilterKind::standard)
-      result.movers = movers_->update(image.timestamp, image.depth, scene_.mask, scene_.boxes, result.world_from_cam);
-    result.covariance = frame.covariance;
-    result.inliers = frame.inliers;
-    result.reference = frame.reference;
-    records_.push_back(
-        {frame.index, frame.timestamp, frame.reference, frame.cam_from_reference, result.world_from_cam});
-    ++statistics_.tracked;
-  } else if (outcome.state == TrackingState::lost) {
-    ++statistics_.lost;
-  }
-  result.tracking_ms = tracking.ms();
-  times_.add("tracking", result.tracking_ms);
-  return result;
-}
-
-void SlamSystem::Impl::finish() {
-  KeyframePacket report = tracker_->make_report();
-  if (next_keyframe_ > 0) mapping_->push(std::move(report), next_frame_);
-  const auto view = mapping_->drain();
-  if (view) take_view(*view);
 }
 
 SlamSystem::SlamSystem(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
@@ -398,30 +65,39 @@ void SlamSystem::finish() {
 void SlamSystem::reset() {
   impl_->start();
 }
+void SlamSystem::load(Map map) {
+  impl_->start(std::move(map));
+}
 void SlamSystem::set_localise_only(bool on) {
   impl_->localise_only_ = on;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::trajectory() const {
+  const std::vector<KeyframeId> roots = impl_->tracker_->view().roots();
   std::vector<TrajectoryFrame> result;
   for (const auto& r : impl_->records_)
-    result.push_back(
-        {r.frame, r.timestamp, (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse()});
+    result.push_back({r.frame, r.timestamp,
+                      (r.cam_from_reference * impl_->tracker_->keyframe_pose(r.reference)).inverse(),
+                      rank_of(roots, impl_->tracker_->root(r.reference))});
   return result;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::online_trajectory() const {
+  const std::vector<KeyframeId> roots = impl_->tracker_->view().roots();
   std::vector<TrajectoryFrame> result;
-  for (const auto& r : impl_->records_) result.push_back({r.frame, r.timestamp, r.world_from_cam_online});
+  for (const auto& r : impl_->records_)
+    result.push_back(
+        {r.frame, r.timestamp, r.world_from_cam_online, rank_of(roots, impl_->tracker_->root(r.reference))});
   return result;
 }
 
 std::vector<TrajectoryFrame> SlamSystem::keyframes() const {
   std::vector<TrajectoryFrame> result;
   const Map& map = impl_->tracker_->view();
+  const std::vector<KeyframeId> roots = map.roots();
   for (KeyframeId id : map.live_keyframes()) {
     const Keyframe& k = *map.keyframe(id);
-    result.push_back({k.frame, k.timestamp, k.cam_from_world.inverse()});
+    result.push_back({k.frame, k.timestamp, k.cam_from_world.inverse(), rank_of(roots, map.root(id))});
   }
   return result;
 }
@@ -452,11 +128,15 @@ SlamStatistics SlamSystem::statistics() const {
   SlamStatistics s = impl_->statistics_;
   const Map& map = impl_->tracker_->view();
   s.keyframes = map.live_keyframe_count();
+  s.maps = static_cast<int>(map.roots().size());
   s.map_points = map.point_count();
   s.detector = impl_->dynamics_.detector_kind();
   s.detector_rate_hz = impl_->dynamics_.detector_rate_hz();
   s.detector_latency_frames = impl_->dynamics_.detector_latency();
+  s.loops = impl_->loop_->loops();
+  s.merges = impl_->loop_->merges();
   StageTimes times = impl_->times_;
+  times.merge(impl_->loop_->times());
   times.merge(impl_->dynamics_.times());
   times.merge(impl_->dynamics_.detector_times());
   if (impl_->mapping_->outstanding() == 0) {  // the mapper is idle, nothing writes what we read

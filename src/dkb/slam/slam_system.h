@@ -47,14 +47,17 @@ struct FeatureReport {
 
 // A frame of the finished trajectory.
 struct TrajectoryFrame {
-  FrameIndex frame = 0;
+  FrameIndex frame = 0;  // below 0: a keyframe of the map that was loaded
   double timestamp = 0;
   Rigid3 world_from_cam;
+  int map = 0;  // 0 = the first map; maps that were never joined have worlds of their own
 };
 
 struct SlamStatistics {
   int frames = 0, tracked = 0, lost = 0, relocalisations = 0;
   int keyframes = 0, keyframes_inserted = 0;
+  int maps = 0;  // that are not joined
+  int loops = 0, merges = 0;
   size_t map_points = 0;
   MappingReport mapping;
   std::map<std::string, int> keyframe_rules;
@@ -89,10 +92,16 @@ class SlamSystem {
   void finish();
   // Forgets everything but what the detector has in hand; the next frame starts a new world.
   void reset();
-  // While localise-only, the map is not changed: no keyframes are made.
+  // Forgets everything likewise and goes on in `map`, taken by the same camera and pyramid, wherever in it the camera
+  // may be: frames are lost until one is found in it. Poses are in the map's world. Keyframes of `map` get frames
+  // before 0.
+  void load(Map map);
+  // While localise-only, the map is not changed: no keyframes are made, no new map is started, and what tracking learns
+  // of points (sightings, retractions) stays with it.
   void set_localise_only(bool on);
 
-  // Poses of all tracked frames by the map as it is now; complete after finish().
+  // Poses of all tracked frames by the map as it is now; complete after finish(). Frames of a map that was not joined
+  // with the first (yet) are in a world of their own.
   std::vector<TrajectoryFrame> trajectory() const;
   // The same frames as they were published.
   std::vector<TrajectoryFrame> online_trajectory() const;

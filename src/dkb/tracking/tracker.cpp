@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
-#include "dkb/features/matching.h"
+#include "dkb/tracking/pose_observation.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -20,7 +21,6 @@ void TrackingOptions::check() const {
   require_option(initial_points >= 10, "initial_points", initial_points, "at least 10");
   require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
   require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
-  require_option(least_inliers_found_again >= 6, "least_inliers_found_again", least_inliers_found_again, "at least 6");
   require_option(close_depth > 0, "close_depth", close_depth, "greater than 0 m");
   require_option(least_new_points >= 0, "least_new_points", least_new_points, "at least 0");
   require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
@@ -32,8 +32,9 @@ void TrackingOptions::check() const {
   require_option(match_ratio >= 0 && match_ratio <= 1, "match_ratio", match_ratio, "0 ... 1");
   require_option(established_frames >= 0, "established_frames", established_frames, "at least 0");
   require_option(refresh_frames >= 1, "refresh_frames", refresh_frames, "at least 1");
-  require_option(recovery_keyframes >= 1, "recovery_keyframes", recovery_keyframes, "at least 1");
+  require_option(new_map_after >= 0, "new_map_after", new_map_after, "at least 0 frames");
   local_map.check();
+  relocalisation.check();
 }
 
 const char* name_of(TrackingState state) {
@@ -57,7 +58,7 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       scale_factor_(scale_factor),
       levels_(levels),
       options_(options),
-      seed_(seed),
+      relocaliser_(camera, noise, scale_factor, levels, options.relocalisation, options.local_map, seed),
       view_(std::make_shared<const Map>()),
       odometry_(camera, scale_factor, options.close_depth) {
   options_.check();
@@ -72,6 +73,15 @@ Rigid3 Tracker::keyframe_pose(KeyframeId id) const {
   return {};
 }
 
+KeyframeId Tracker::root(KeyframeId id) const {
+  while (view_->keyframe(id) == nullptr) {
+    const auto pending = std::find_if(pending_.begin(), pending_.end(), [id](const auto& p) { return p.id == id; });
+    if (pending == pending_.end() || pending->reference == kNoKeyframe) return id;
+    id = pending->reference;
+  }
+  return view_->root(id);
+}
+
 Rigid3 Tracker::take_view(MapView view) {
   view_ = std::move(view);
   candidates_made_ = -1;
@@ -84,8 +94,11 @@ Rigid3 Tracker::take_view(MapView view) {
   const Rigid3 moved = last_->cam_from_reference * keyframe_pose(last_->reference);
   const Rigid3 new_world_from_old = moved.inverse() * last_->cam_from_world;
   last_->cam_from_world = moved;
-  for (PointId& p : last_->points)
+  std::set<PointId> seen;  // two features may show points that have been fused since: the first keeps it
+  for (PointId& p : last_->points) {
     if (p != kNoPoint && !provisional_.contains(p)) p = view_->resolve(p);
+    if (p != kNoPoint && !seen.insert(p).second) p = kNoPoint;
+  }
   return new_world_from_old;
 }
 
@@ -130,13 +143,11 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
-    const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
-    PoseObservation o;
-    o.point_in_world = pair.point_in_world;
-    o.pixel = k.pixel.cast<double>();
-    o.pixel_sigma = pair.sigma_factor * noise_.corner_sigma(k.octave, scale_factor_);
-    o.depth = pair.use_depth ? k.depth : 0.0;
-    if (o.depth > 0) o.depth_sigma = pair.sigma_factor * noise_.depth_sigma(k.depth);
+    PoseObservation o = pose_observation(features.keypoints[static_cast<size_t>(pair.feature)], pair.point_in_world,
+                                         noise_, scale_factor_);
+    o.pixel_sigma *= pair.sigma_factor;
+    o.depth_sigma *= pair.sigma_factor;
+    if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
   return optimise_pose(camera_, initial, observations);
@@ -171,41 +182,6 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (pose.inlier[i])
       points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
   return pose.cam_from_world;
-}
-
-std::optional<Rigid3> Tracker::match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
-                                              std::vector<PointId>& points) const {
-  std::vector<Descriptor> descriptors;
-  std::vector<PointId> ids;
-  std::vector<Eigen::Vector3d> positions;
-  for (size_t f = 0; f < keyframe.points.size(); ++f)
-    if (const MapPoint* p = view_->point(keyframe.points[f]); p != nullptr && !is_retracted(p->id)) {
-      descriptors.push_back(keyframe.features->descriptors[f]);
-      ids.push_back(p->id);
-      positions.push_back(p->position);
-    }
-  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors, MatchOptions{});
-  std::erase_if(matches,
-                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
-  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
-  std::vector<PoseObservation> observations;
-  for (const DescriptorMatch& m : matches) {
-    const Keypoint& k = features.keypoints[static_cast<size_t>(m.b)];
-    PoseObservation o;
-    o.point_in_world = positions[static_cast<size_t>(m.a)];
-    o.pixel = k.pixel.cast<double>();
-    o.pixel_sigma = noise_.corner_sigma(k.octave, scale_factor_);
-    o.depth = k.depth;
-    if (k.depth > 0) o.depth_sigma = noise_.depth_sigma(k.depth);
-    observations.push_back(o);
-  }
-  RansacOptions ransac;
-  ransac.seed = seed_ + static_cast<uint64_t>(keyframe.id);
-  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
-  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
-  for (size_t i = 0; i < matches.size(); ++i)
-    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = ids[static_cast<size_t>(matches[i].a)];
-  return pose.pose;
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
@@ -346,17 +322,23 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
   return tangent / (frame.timestamp - last_->timestamp);
 }
 
+// Features and pose as they are when the camera's motion within the image is known. The frame keeps what it has when
+// that does not explain it.
 void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const {
-  frame.features = features_at(velocity);
+  auto features = features_at(velocity);
   std::vector<Pair> pairs;
-  for (size_t f = 0; f < frame.points.size(); ++f) {
-    if (frame.points[f] != kNoPoint)
+  int in_map = 0;
+  for (size_t f = 0; f < frame.points.size(); ++f)
+    if (frame.points[f] != kNoPoint) {
       pairs.push_back({static_cast<int>(f), *position(frame.points[f])});
-    else if (frame.odometry[f])
-      pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
-  }
-  const PoseEstimate pose = refine(frame.cam_from_world, pairs, *frame.features);
+      ++in_map;
+    }
+  for (size_t f = 0; f < frame.points.size(); ++f)
+    if (frame.odometry[f]) pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
+  const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features);
   if (!pose.ok) return;
+  const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
+  if (inliers < options_.least_inliers) return;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -365,11 +347,54 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
     frame.odometry[f].reset();
     frame.outlier[f] = 1;
   }
+  frame.features = std::move(features);
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
 }
 
-TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at) {
+bool Tracker::track_from_last(TrackedFrame& frame) {
+  if (state_ == TrackingState::lost || !last_) return false;
+  const RgbdFeatures& features = *frame.features;
+  std::vector<PointId> points(features.size(), kNoPoint);
+  const double dt = frame.timestamp - last_->timestamp;
+  std::optional<Rigid3> pose =
+      track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, features, points);
+  if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
+  if (!pose && view_->live_keyframe(last_->reference) != nullptr) {
+    // Without the motion: the camera cannot be far from what it saw last.
+    auto near =
+        relocaliser_.propose_from(*view_, last_->reference, features, [this](PointId id) { return is_retracted(id); });
+    if (!near) return false;
+    pose = near->cam_from_world;
+    points = std::move(near->points);
+  }
+  return pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
+}
+
+bool Tracker::relocalise(TrackedFrame& frame) {
+  auto found = relocaliser_.find(*view_, *frame.features, [this](PointId id) { return is_retracted(id); });
+  if (!found) return false;
+  candidates_made_ = -1;
+  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.least_inliers,
+                         found->points, frame);
+}
+
+// A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight.
+bool Tracker::start_map(TrackedFrame& frame) {
+  int with_depth = 0;
+  for (const Keypoint& k : frame.features->keypoints) with_depth += k.depth > 0 && !k.suspect;
+  if (with_depth < options_.initial_points) return false;
+  if (state_ == TrackingState::lost && (options_.new_map_after == 0 || ++lost_frames_ < options_.new_map_after))
+    return false;
+  frame.inliers = with_depth;
+  frame.cam_from_world = last_ ? last_->cam_from_world : start_;
+  drop_unmatched_suspects(frame);
+  candidates_made_ = -1;
+  velocity_.reset();
+  return true;
+}
+
+TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map) {
   TrackOutcome outcome;
   TrackedFrame& frame = outcome.frame;
   frame.index = index;
@@ -380,51 +405,23 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   frame.outlier.assign(n, 0);
   frame.odometry.assign(n, std::nullopt);
 
-  if (state_ == TrackingState::initialising) {
-    int with_depth = 0;
-    for (size_t f = 0; f < n; ++f)
-      with_depth += frame.features->keypoints[f].depth > 0 && !frame.features->keypoints[f].suspect;
-    if (with_depth < options_.initial_points) return outcome;
-    outcome.wants_first_keyframe = true;
-    outcome.state = state_ = TrackingState::tracking;
-    frame.inliers = with_depth;
-    drop_unmatched_suspects(frame);
-    last_ = frame;
-    return outcome;
-  }
-
-  std::vector<PointId> points(n, kNoPoint);
-  bool tracked = false;
-  if (state_ != TrackingState::lost && last_) {
-    const double dt = timestamp - last_->timestamp;
-    std::optional<Rigid3> pose = track_last_frame(expected_motion(dt) * last_->cam_from_world,
-                                                  options_.radius_last_frame, *frame.features, points);
-    if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, *frame.features, points);
-    if (!pose)
-      if (const Keyframe* k = view_->live_keyframe(last_->reference))
-        pose = match_keyframe(*k, *frame.features, points);
-    tracked = pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
-  }
-  bool found_again = false;
-  if (!tracked) {
-    const auto keyframes = view_->live_keyframes();
-    const size_t tries = std::min(keyframes.size(), static_cast<size_t>(options_.recovery_keyframes));
-    for (size_t i = 0; i < tries && !tracked; ++i) {
-      std::fill(points.begin(), points.end(), kNoPoint);
-      const auto pose = match_keyframe(*view_->keyframe(keyframes[keyframes.size() - 1 - i]), *frame.features, points);
-      if (!pose) continue;
-      candidates_made_ = -1;
-      tracked =
-          track_local_map(*pose, 2 * options_.radius_local_map, options_.least_inliers_found_again, points, frame);
-      found_again = tracked;
-    }
-  }
-  if (!tracked) {
-    outcome.state = state_ = TrackingState::lost;
+  const bool has_map = state_ != TrackingState::initialising;
+  const bool followed = has_map && track_from_last(frame);
+  const bool found_again = has_map && !followed && relocalise(frame);
+  if (!followed && !found_again) {
+    if (has_map) state_ = TrackingState::lost;
     velocity_.reset();
     odometry_.clear();
+    outcome.wants_first_keyframe = may_start_map && start_map(frame);
+    if (outcome.wants_first_keyframe) {
+      state_ = TrackingState::tracking;
+      lost_frames_ = 0;
+      last_ = frame;
+    }
+    outcome.state = state_;
     return outcome;
   }
+  lost_frames_ = 0;
   if (found_again || !last_ || timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {
@@ -525,8 +522,8 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   if (last_ && last_->index == frame.index) {
     for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
     odometry_.drop_mapped(*last_);
-    last_->reference = id;                         // from here on the frame hangs on its own keyframe
-    last_->cam_from_world = frame.cam_from_world;  // the first one's is the caller's choice
+    last_->reference = id;  // from here on the frame hangs on its own keyframe
+    last_->cam_from_world = frame.cam_from_world;
     last_->cam_from_reference = {};
   }
   return packet;

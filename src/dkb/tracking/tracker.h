@@ -10,33 +10,33 @@
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
-#include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
 #include "dkb/tracking/candidates.h"
 #include "dkb/tracking/frame.h"
 #include "dkb/tracking/local_map.h"
 #include "dkb/tracking/odometry_points.h"
+#include "dkb/tracking/relocaliser.h"
 
 namespace dkb {
 
 struct TrackingOptions {
-  int initial_points = 100;            // features with depth that the first frame of a map needs, >= 10
-  int least_matches = 20;              // matches with the last frame that make a pose worth trying, >= 6
-  int least_inliers = 20;              // inliers of the final pose; fewer: lost, >= 6
-  int least_inliers_found_again = 30;  // the same when coming back from a loss, >= 6
-  double close_depth = 4.0;            // [m] depths below make map points at once, > 0
-  int least_new_points = 100;          // nearest depths that make points at a keyframe whatever close_depth says, >= 0
-  double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
-  double radius_wide = 30.0;           // [px] second try, > 0
-  double radius_local_map = 4.0;       // [px] search for local map points under the first pose, > 0
+  int initial_points = 100;         // features with depth that the first frame of a map needs, >= 10
+  int least_matches = 20;           // matches with the last frame that make a pose worth trying, >= 6
+  int least_inliers = 20;           // inliers of the final pose; fewer: lost, >= 6
+  double close_depth = 4.0;         // [m] depths below make map points at once, > 0
+  int least_new_points = 100;       // nearest depths that make points at a keyframe whatever close_depth says, >= 0
+  double radius_last_frame = 10.0;  // [px] search around the motion model's prediction, > 0
+  double radius_wide = 30.0;        // [px] second try, > 0
+  double radius_local_map = 4.0;    // [px] search for local map points under the first pose, > 0
   double odometry_sigma_factor = 2.0;  // on the noise of what shows visual-odometry points, >= 1; 0 = without them
-  int match_distance = 90;             // [bits] largest Hamming distance of a match with a map point, 0 ... 256
-  double match_ratio = 0.8;            // best over second best distance of such a match, 0 ... 1
+  int match_distance = 90;          // [bits] largest Hamming distance of a match with a map point, 0 ... 256
+  double match_ratio = 0.8;         // best over second best distance of such a match, 0 ... 1
   int established_frames =
-      20;                      // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
-  int refresh_frames = 5;      // [frames] the choice of local map points is renewed at least so often, >= 1
-  int recovery_keyframes = 8;  // newest keyframes that a lost tracker tries, >= 1
+      20;                  // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
+  int refresh_frames = 5;  // [frames] the choice of local map points is renewed at least so often, >= 1
+  int new_map_after = 30;  // [frames] lost in a row, each good enough to start a map, until one is started; 0 = never
   LocalMapOptions local_map;
+  RelocalisationOptions relocalisation;
   void check() const;
 };
 
@@ -46,7 +46,7 @@ const char* name_of(TrackingState state);
 struct TrackOutcome {
   TrackingState state = TrackingState::initialising;
   TrackedFrame frame;                 // pose valid when tracking or relocalised
-  bool wants_first_keyframe = false;  // the frame starts the map
+  bool wants_first_keyframe = false;  // the frame starts a map
 };
 
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.
@@ -70,7 +70,8 @@ class Tracker {
   // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once
   // for the expected velocity, and again for the one that the first pose shows.
   using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
-  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at);
+  // With `may_start_map` false a frame that finds no map stays without a pose.
+  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map = true);
 
   // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
   KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame);
@@ -85,12 +86,16 @@ class Tracker {
 
   // Pose of a keyframe, also of one that mapping has not published yet.
   Rigid3 keyframe_pose(KeyframeId id) const;
+  // The first keyframe of the map that a keyframe belongs to, likewise.
+  KeyframeId root(KeyframeId id) const;
   // Points of the reference keyframe that at least `observers` keyframes see.
   int reference_point_count(KeyframeId reference, int observers) const;
   // Position of a point that tracking may match, in the world; nothing when it is gone.
   std::optional<Eigen::Vector3d> position(PointId id) const;
   // Forgets velocity and the last frame, so that the next frame is found anew in the map.
   void reset_motion();
+  // Where the camera of the very first map stands; later ones start where the camera was seen last.
+  void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
  private:
   struct Pair {
@@ -103,8 +108,9 @@ class Tracker {
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
                                          std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_keyframe(const Keyframe& keyframe, const RgbdFeatures& features,
-                                       std::vector<PointId>& points) const;
+  bool track_from_last(TrackedFrame& frame);
+  bool relocalise(TrackedFrame& frame);
+  bool start_map(TrackedFrame& frame);
   bool track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
                        TrackedFrame& frame);
   bool is_retracted(PointId id) const;
@@ -121,7 +127,8 @@ class Tracker {
   double scale_factor_;
   int levels_;
   TrackingOptions options_;
-  uint64_t seed_;
+  Relocaliser relocaliser_;
+  Rigid3 start_;  // cam_from_world
 
   MapView view_;
   struct PendingKeyframe {
@@ -138,6 +145,7 @@ class Tracker {
   std::optional<TrackedFrame> last_;   // last frame with a pose
   OdometryPoints odometry_;            // from the last frame
   std::optional<Vector6d> velocity_;   // [m/s, rad/s] tangent of now_cam_from_before_cam
+  int lost_frames_ = 0;                // in a row that could have started a map
   std::vector<Candidate> candidates_;  // from the view
   FrameIndex candidates_made_ = -1;    // frame of the last refresh; -1 = the view is newer
 };

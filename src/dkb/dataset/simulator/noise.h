@@ -57,6 +57,36 @@ inline float lattice_noise(float x, float y, uint64_t seed) {
   return a * (1 - v) + b * v;
 }
 
+// Values of lattice_noise() along a row, y fixed and x rising: the corners of a lattice cell are looked up once for all
+// pixels in it. The same bits.
+class LatticeRow {
+ public:
+  LatticeRow(float y, uint64_t seed) : seed_(seed) {
+    const float fy = std::floor(y), v = y - fy;
+    iy_ = static_cast<uint32_t>(static_cast<int32_t>(fy));
+    v_ = v * v * (3 - 2 * v);
+    enter(0);
+  }
+  float at(float x) {
+    const float fx = std::floor(x);
+    const auto ix = static_cast<uint32_t>(static_cast<int32_t>(fx));
+    if (ix != ix_) enter(ix);
+    float u = x - fx;
+    u = u * u * (3 - 2 * u);
+    const float a = corner_[0] * (1 - u) + corner_[1] * u, b = corner_[2] * (1 - u) + corner_[3] * u;
+    return a * (1 - v_) + b * v_;
+  }
+
+ private:
+  void enter(uint32_t ix) {
+    ix_ = ix;
+    for (uint32_t i = 0; i < 4; ++i) corner_[i] = lattice_value(ix + (i & 1), iy_ + (i >> 1), seed_);
+  }
+  uint64_t seed_;
+  uint32_t ix_ = 0, iy_ = 0;
+  float v_ = 0, corner_[4] = {};
+};
+
 // Octaves of it along a row, each half as large and half as strong: (*row)[i] is the noise at (step * i, y), in about
 // [-1, 1]. Columns of the lattice are blended once for all the pixels between them.
 inline void fractal_noise_row(float step, float y, int octaves, uint64_t seed, std::vector<float>* row) {

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "dkb/dataset/simulator/raster_kernels.h"
+
 namespace dkb::sim {
 namespace {
 
@@ -72,11 +74,6 @@ bool sphere_visible(const Eigen::Vector3d& c, double radius, const CameraModel& 
     return along - tangent * c.z() > r * std::sqrt(1 + tangent * tangent);
   };
   return !outside(-c.x(), left) && !outside(c.x(), right) && !outside(-c.y(), top) && !outside(c.y(), bottom);
-}
-
-uint64_t scaled(uint64_t colour, float shade) {
-  const auto k = static_cast<uint64_t>(std::clamp(shade, 0.0F, 1.0F) * 256.0F);
-  return ((colour >> 8) & 0x00FF00FF00FF00FFULL) * k;
 }
 
 }  // namespace
@@ -171,8 +168,8 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
     const float a0 = at(0), b0 = at(1), c0 = at(2);
     const auto a1 = static_cast<float>(view.h[0]), b1 = static_cast<float>(view.h[3]),
                c1 = static_cast<float>(view.h[6]);
-    float* __restrict depth = out->inverse_depth.row(y) + x0;
-    int32_t* __restrict ids = out->id.row(y) + x0;
+    float* depth = out->inverse_depth.row(y) + x0;
+    int32_t* ids = out->id.row(y) + x0;
     if (patch.disc) {
       for (int i = 0; i < count; ++i) {
         const auto t = static_cast<float>(i);
@@ -182,14 +179,7 @@ void Rasteriser::draw_patch(const Patch& patch, int id, const Rigid3& cam_from_w
         ids[i] = in ? id : ids[i];
       }
     } else {
-      for (int i = 0; i < count; ++i) {
-        const auto t = static_cast<float>(i);
-        const float inverse = c0 + c1 * t, a = a0 + a1 * t, b = b0 + b1 * t;
-        const bool in = (a >= u_low * inverse) & (a <= u_high * inverse) & (b >= v_low * inverse) &
-                        (b <= v_high * inverse) & (inverse > depth[i]);
-        depth[i] = in ? inverse : depth[i];
-        ids[i] = in ? id : ids[i];
-      }
+      draw_patch_span({a0, a1, b0, b1, c0, c1, u_low, u_high, v_low, v_high, id}, count, depth, ids, simd_);
     }
   }
 }
@@ -199,6 +189,7 @@ void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_
   QuadricView& view = quadric_views_[static_cast<size_t>(id) - patch_views_.size()];
   view.m = quadric.to_local * world_from_cam;
   view.centre = cam_from_world * quadric.centre;
+  view.world_from_cam = quadric.to_local.inverse() * view.m;
   const Eigen::Matrix3d from_local = view.m.inverse();
   CameraModel shifted = camera_;
   shifted.cx -= offset_.x();
@@ -220,39 +211,28 @@ void Rasteriser::draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_
   // Along a ray, l(z) = m (ray z - centre). Measured from the plane z = pivot, near the surface, the numbers stay small
   // enough for floats.
   const double pivot = std::max(0.1, view.centre.z());
-  const float sign = quadric.tube ? -1.0F : 1.0F;
-  const float tau = quadric.tube ? 0.0F : 1.0F;
-  const auto taper = static_cast<float>(quadric.tube ? quadric.taper : 1.0);
-  const auto bias = static_cast<float>(quadric.tube ? quadric.radius : 0.0);
-  const float low = quadric.tube ? 0.0F : -2.0F, high = quadric.tube ? 1.0F : 2.0F;
-  const auto pivot_f = static_cast<float>(pivot);
+  QuadricSpan span{};
+  span.pivot = static_cast<float>(pivot);
+  span.sign = quadric.tube ? -1.0F : 1.0F;
+  span.tau = quadric.tube ? 0.0F : 1.0F;
+  span.taper = static_cast<float>(quadric.tube ? quadric.taper : 1.0);
+  span.bias = static_cast<float>(quadric.tube ? quadric.radius : 0.0);
+  span.low = quadric.tube ? 0.0F : -2.0F;
+  span.high = quadric.tube ? 1.0F : 2.0F;
+  span.id = id;
   const Eigen::Vector3f step = (view.m.col(0) / camera_.fx).cast<float>();
+  for (int i = 0; i < 3; ++i) {
+    span.d_step[i] = step(i);
+    span.m_step[i] = step(i) * span.pivot;
+  }
   for (int y = box.y0; y <= box.y1; ++y) {
     const Eigen::Vector3d first = view.m * ray(box.x0, y);
     const Eigen::Vector3f d0 = first.cast<float>(), m0 = (first * pivot - view.m * view.centre).cast<float>();
-    const float dx0 = d0.x(), dy0 = d0.y(), dz0 = d0.z(), mx0 = m0.x(), my0 = m0.y(), mz0 = m0.z();
-    const float sx = step.x(), sy = step.y(), sz = step.z();
-    const float tx = sx * pivot_f, ty = sy * pivot_f, tz = sz * pivot_f;
-    float* __restrict depth = out->inverse_depth.row(y) + box.x0;
-    int32_t* __restrict ids = out->id.row(y) + box.x0;
-    const int count = box.x1 - box.x0 + 1;
-    for (int i = 0; i < count; ++i) {
-      const auto t = static_cast<float>(i);
-      const float dx = dx0 + sx * t, dy = dy0 + sy * t, dz = dz0 + sz * t;
-      const float mx = mx0 + tx * t, my = my0 + ty * t, mz = mz0 + tz * t;
-      const float g = taper * dz, e = bias + taper * mz;
-      const float a = dx * dx + dy * dy + sign * g * g, b = dx * mx + dy * my + sign * g * e;
-      const float c = mx * mx + my * my + sign * e * e - tau;
-      const float root2 = b * b - a * c;
-      const float z = (-b - std::sqrt(root2 > 0 ? root2 : 0.0F)) / (a > 1e-12F ? a : 1e-12F);
-      const float height = mz + dz * z;
-      const float distance = pivot_f + z;
-      const float inverse = 1.0F / (distance > 0.01F ? distance : 0.01F);
-      const bool in =
-          (root2 > 0) & (a > 1e-12F) & (height >= low) & (height <= high) & (distance > 0.02F) & (inverse > depth[i]);
-      depth[i] = in ? inverse : depth[i];
-      ids[i] = in ? id : ids[i];
+    for (int i = 0; i < 3; ++i) {
+      span.d[i] = d0(i);
+      span.m[i] = m0(i);
     }
+    draw_quadric_span(span, box.x1 - box.x0 + 1, out->inverse_depth.row(y) + box.x0, out->id.row(y) + box.x0, simd_);
   }
 }
 
@@ -274,14 +254,15 @@ void Rasteriser::draw(const DrawList& list, const Rigid3& cam_from_world, const 
   for (const Quadric* q : list.quadrics) draw_quadric(*q, id++, cam_from_world, r_inverse, out);
 }
 
-bool Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth,
-                     Eigen::Vector3f* local, Eigen::Vector3f* normal) const {
-  *local = (view.m * (ray(x, y) / static_cast<double>(inverse_depth) - view.centre)).cast<float>();
-  Eigen::Vector3f n = *local;
+[[gnu::always_inline]] inline Rasteriser::Hit Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x,
+                                                              int y, float inverse_depth) const {
+  Hit h;
+  h.local = (view.m * (ray(x, y) / static_cast<double>(inverse_depth) - view.centre)).cast<float>();
+  Eigen::Vector3f n = h.local;
   if (quadric.tube)
-    n.z() = -static_cast<float>(quadric.taper * (quadric.radius + quadric.taper * static_cast<double>(local->z())));
-  *normal = (view.m.transpose() * n.cast<double>()).normalized().cast<float>();
-  return true;
+    n.z() = -static_cast<float>(quadric.taper * (quadric.radius + quadric.taper * static_cast<double>(h.local.z())));
+  h.normal = (view.m.transpose() * n.cast<double>()).normalized().cast<float>();
+  return h;
 }
 
 void Rasteriser::add_colour(const DrawList& list, const Materials& materials, const GeometryImage& geometry,
@@ -308,18 +289,9 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
         const auto texels =
             static_cast<float>(view.density * texture.width() * static_cast<double>(std::abs(patch.look.du)) *
                                texture.height() * static_cast<double>(std::abs(patch.look.dv)));
-        int level = 0;
-        for (int i = 0; i < end - x; ++i) {
-          const auto t = static_cast<float>(i);
-          const float scale = 1.0F / (c0 + c1 * t);
-          if ((i & 7) == 0) {
-            const float lod = 0.5F * std::log2(texels * scale * scale * scale + 1e-6F) + kMipBias + level_shift;
-            level = std::clamp(static_cast<int>(std::floor(lod)), 0, texture.levels() - 1);
-          }
-          const float u = patch.look.u0 + patch.look.du * (a0 + a1 * t) * scale;
-          const float v = patch.look.v0 + patch.look.dv * (b0 + b1 * t) * scale;
-          target[x + i] += (scaled(texture.sample(u, v, level), patch.shade) >> 3) & 0x1FFF1FFF1FFF1FFFULL;
-        }
+        add_texture_span({a0, a1, b0, b1, c0, c1, patch.look.u0, patch.look.du, patch.look.v0, patch.look.dv, texels,
+                          kMipBias, level_shift, patch.shade},
+                         texture, end - x, target + x, simd_);
       } else if (id >= n_patches) {
         const Quadric& quadric = *list.quadrics[static_cast<size_t>(id - n_patches)];
         const QuadricView& view = quadric_views_[static_cast<size_t>(id - n_patches)];
@@ -330,14 +302,12 @@ void Rasteriser::add_colour(const DrawList& list, const Materials& materials, co
                                      1e-6);
         const int level = std::clamp(static_cast<int>(std::floor(static_cast<float>(lod) + kMipBias + level_shift)), 0,
                                      texture.levels() - 1);
-        const Eigen::Matrix3d world_from_cam = quadric.to_local.inverse() * view.m;
         for (int i = x; i < end; ++i) {
-          Eigen::Vector3f local, normal;
-          hit(quadric, view, i, y, depth[i], &local, &normal);
-          const float shade = lambert_shade(world_from_cam * normal.cast<double>());
+          const auto [local, normal] = hit(quadric, view, i, y, depth[i]);
+          const float shade = lambert_shade(view.world_from_cam * normal.cast<double>());
           const float u = 0.5F + std::atan2(local.y(), local.x()) * 0.15915494F;
           const float v = quadric.tube ? 1.0F - local.z() : 0.5F - 0.5F * local.z();
-          target[i] += (scaled(texture.sample(quadric.look.u0 + quadric.look.du * u,
+          target[i] += (shaded(texture.sample(quadric.look.u0 + quadric.look.du * u,
                                               quadric.look.v0 + quadric.look.dv * v, level),
                                shade) >>
                         3) &
@@ -371,18 +341,19 @@ void Rasteriser::reflectance(const DrawList& list, const Materials& materials, c
           const auto a = static_cast<float>(view.h[0] * x + view.h[1] * y + view.h[2]) / inverse;
           const auto b = static_cast<float>(view.h[3] * x + view.h[4] * y + view.h[5]) / inverse;
           const Texture& texture = materials.texture(patch.look.texture);
-          colour = scaled(texture.sample(patch.look.u0 + patch.look.du * a, patch.look.v0 + patch.look.dv * b,
+          colour = shaded(texture.sample(patch.look.u0 + patch.look.du * a, patch.look.v0 + patch.look.dv * b,
                                          std::min(2, texture.levels() - 1)),
                           patch.shade);
           normal = view.normal;
         } else {
           const Quadric& quadric = *list.quadrics[static_cast<size_t>(id - n_patches)];
-          Eigen::Vector3f local;
-          hit(quadric, quadric_views_[static_cast<size_t>(id - n_patches)], x, y, inverse, &local, &normal);
+          const Hit h = hit(quadric, quadric_views_[static_cast<size_t>(id - n_patches)], x, y, inverse);
+          const Eigen::Vector3f& local = h.local;
+          normal = h.normal;
           const Texture& texture = materials.texture(quadric.look.texture);
           const float u = 0.5F + std::atan2(local.y(), local.x()) * 0.15915494F;
           const float v = quadric.tube ? 1.0F - local.z() : 0.5F - 0.5F * local.z();
-          colour = scaled(texture.sample(quadric.look.u0 + quadric.look.du * u, quadric.look.v0 + quadric.look.dv * v,
+          colour = shaded(texture.sample(quadric.look.u0 + quadric.look.du * u, quadric.look.v0 + quadric.look.dv * v,
                                          std::min(2, texture.levels() - 1)),
                           0.9F);
         }

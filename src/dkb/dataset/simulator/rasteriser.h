@@ -7,6 +7,7 @@
 
 #include "dkb/dataset/simulator/materials.h"
 #include "dkb/dataset/simulator/surfaces.h"
+#include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
@@ -33,7 +34,7 @@ struct GeometryImage {
 // z-buffered in inverse depth. Not thread-safe; one per thread.
 class Rasteriser {
  public:
-  explicit Rasteriser(const CameraModel& camera) : camera_(camera) {}
+  explicit Rasteriser(const CameraModel& camera, Simd simd = best_simd()) : camera_(camera), simd_(simd) {}
 
   // Draws rows.first ... rows.end - 1. Rays go through pixel centre + `offset` [px]. `out` is resized if need be, and
   // its other rows are kept. The functions below are for the rows of the last draw().
@@ -62,18 +63,22 @@ class Rasteriser {
   struct QuadricView {
     Eigen::Matrix3d m;       // to_local * world_from_cam rotation
     Eigen::Vector3d centre;  // in camera
+    Eigen::Matrix3d world_from_cam;
   };
   void draw_patch(const Patch& patch, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& cam_from_world_r,
                   GeometryImage* out);
   void draw_quadric(const Quadric& quadric, int id, const Rigid3& cam_from_world, const Eigen::Matrix3d& world_from_cam,
                     GeometryImage* out);
-  bool hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth, Eigen::Vector3f* local,
-           Eigen::Vector3f* normal) const;
+  struct Hit {
+    Eigen::Vector3f local, normal;  // point in the quadric's coordinates; unit normal in the camera
+  };
+  Hit hit(const Quadric& quadric, const QuadricView& view, int x, int y, float inverse_depth) const;
   Eigen::Vector3d ray(double x, double y) const {
     return {(x + offset_.x() - camera_.cx) / camera_.fx, (y + offset_.y() - camera_.cy) / camera_.fy, 1};
   }
 
   const CameraModel camera_;
+  const Simd simd_;
   Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();
   Rows rows_;
   std::vector<PatchView> patch_views_;

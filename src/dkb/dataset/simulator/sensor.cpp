@@ -21,6 +21,19 @@ float in_units(float z, const CameraModel& camera) {
   return units <= 0 || units > 65535 ? 0.0F : static_cast<float>(static_cast<double>(units) / camera.depth_factor);
 }
 
+// Whether a window of 2 reach + 1 pixels around (x, y) sees a depth step.
+bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int reach) {
+  const float inverse = inverse_depth(x, y), step = 0.06F * inverse;
+  const int left = std::max(x - reach, 0), right = std::min(x + reach, inverse_depth.width() - 1);
+  for (const int dy : {-reach, 0, reach}) {
+    const float* row = inverse_depth.row(std::clamp(y + dy, 0, inverse_depth.height() - 1));
+    if ((std::abs(row[left] - inverse) > step) | (std::abs(row[x] - inverse) > step) |
+        (std::abs(row[right] - inverse) > step))
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, double grey_noise, uint64_t seed) {
@@ -75,9 +88,11 @@ DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& gr
   std::vector<int> source(static_cast<size_t>(width));
   for (int y = 0; y < height; ++y) {
     const auto fy = static_cast<float>(y);
+    LatticeRow wander(fy * 0.35F, hash64(seed, 11)), patches(fy * 0.12F, hash64(seed, 12));
+    LatticeRow grain(fy * 0.4F, hash64(seed, 13)), shared_noise(fy * 0.31F + 3.3F, hash64(seed, 14));
     // The sensor correlates windows: outlines wander by about a pixel.
     for (int x = 0; x < width; ++x) {
-      const float n = lattice_noise(static_cast<float>(x) * 0.35F, fy * 0.35F, hash64(seed, 11));
+      const float n = wander.at(static_cast<float>(x) * 0.35F);
       source[static_cast<size_t>(x)] = std::clamp(x + static_cast<int>(std::floor(n * 1.6F + 0.5F)), 0, width - 1);
     }
     // A point is lit when no point further right hides it from the projector, which stands to the right: along the row
@@ -96,24 +111,17 @@ DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& gr
       if (z < z_min || z > z_max) continue;
       const uint64_t h = hash64(seed ^ (static_cast<uint64_t>(y) << 32 | static_cast<uint64_t>(x)));
       const auto fx = static_cast<float>(x);
-      const float patch = lattice_noise(fx * 0.12F, fy * 0.12F, hash64(seed, 12));
-      const float rough = 0.6F * patch + 0.4F * lattice_noise(fx * 0.4F, fy * 0.4F, hash64(seed, 13));
+      const float patch = patches.at(fx * 0.12F);
+      const float rough = 0.6F * patch + 0.4F * grain.at(fx * 0.4F);
       if (shadow[static_cast<size_t>(x)] > 1.0F + 0.6F * patch) continue;
       if (cosine(sx, y) < 0.19F + 0.06F * rough) continue;                                          // slanted
       if (grey(sx, y) * (0.4F + 0.6F * cosine(sx, y)) < 23.0F + 9.0F * rough + 1.5F * z) continue;  // dark
       if ((h & 1023) < 2) continue;                                                                 // single drop-outs
       // Windows that straddle an edge find no match.
-      bool edge = false;
-      const int reach = rough > 0.1F ? 2 : 1;
-      for (const int dy : {-reach, 0, reach})
-        for (const int dx : {-reach, 0, reach}) {
-          const int nx = std::clamp(sx + dx, 0, width - 1), ny = std::clamp(y + dy, 0, height - 1);
-          edge |= std::abs(inverse_depth(nx, ny) - inverse) > 0.06F * inverse;
-        }
-      if (edge && rough > -0.25F) continue;
+      if (rough > -0.25F && straddles_edge(inverse_depth, sx, y, rough > 0.1F ? 2 : 1)) continue;
       // Half of the noise's variance is shared by neighbours, as windows overlap. 1.96: lattice noise to unit spread.
       const float sigma = 0.0012F + 0.0019F * (z - 0.4F) * (z - 0.4F);
-      const float shared = 1.96F * lattice_noise(fx * 0.31F + 7.7F, fy * 0.31F + 3.3F, hash64(seed, 14));
+      const float shared = 1.96F * shared_noise.at(fx * 0.31F + 7.7F);
       const float noise = 0.70710678F * (normal_from_bits(hash64(h)) + shared) * sigma;
       const float disparity = fb * inverse - noise * fb * inverse * inverse;
       const float stepped = std::floor(disparity * 8.0F + 0.5F) / 8.0F;

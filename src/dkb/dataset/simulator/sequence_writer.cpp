@@ -28,7 +28,7 @@ struct FrameRecord {
 };
 
 FrameRecord write_frame(const Simulator& simulator, int index, const std::filesystem::path& folder, int jpeg_quality) {
-  const SimulatedFrame f = simulator.render(index);
+  const SimulatedFrame f = simulator.render_without_true_depth(index);
   write_image_file(folder / "rgb" / (f.stamp + ".jpg"), encode_jpeg(f.image.colour, jpeg_quality));
   Image<uint16_t> depth(f.image.depth.width(), f.image.depth.height());
   for (size_t i = 0; i < depth.size(); ++i)

@@ -230,6 +230,13 @@ double Simulator::nearest_mover(double seconds) const {
 }
 
 SimulatedFrame Simulator::render(int index) const {
+  return render(index, true);
+}
+SimulatedFrame Simulator::render_without_true_depth(int index) const {
+  return render(index, false);
+}
+
+SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   const Impl& m = *impl_;
   SimulatedFrame frame;
   frame.index = index;
@@ -265,12 +272,14 @@ SimulatedFrame Simulator::render(int index) const {
     for (const auto& rows : bands)
       rasteriser.draw(list, m.scene.path(t + m.row_delay(rows)).inverse(), Eigen::Vector2d::Zero(), rows, &geometry);
     m.observe_movers(geometry, Impl::owners(still, movers), middle, t, &frame);
-    if (m.options.readout > 0)  // the depth image has no rolling shutter
-      rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
-    frame.true_depth = DepthImage(m.camera.width, m.camera.height);
-    for (size_t i = 0; i < geometry.inverse_depth.size(); ++i) {
-      const float inverse = geometry.inverse_depth.data()[i];
-      frame.true_depth.data()[i] = inverse > 0 ? 1 / inverse : 0;
+    if (with_true_depth) {
+      if (m.options.readout > 0)  // the depth image has no rolling shutter
+        rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
+      frame.true_depth = DepthImage(m.camera.width, m.camera.height);
+      for (size_t i = 0; i < geometry.inverse_depth.size(); ++i) {
+        const float inverse = geometry.inverse_depth.data()[i];
+        frame.true_depth.data()[i] = inverse > 0 ? 1 / inverse : 0;
+      }
     }
   }
   std::vector<uint64_t> sum(static_cast<size_t>(m.camera.width) * static_cast<size_t>(m.camera.height), 0);

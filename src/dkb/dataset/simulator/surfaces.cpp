@@ -19,12 +19,6 @@ Patch make_patch(const Eigen::Vector3d& origin, const Eigen::Vector3d& u, const 
 
 }  // namespace
 
-float lambert_shade(const Eigen::Vector3d& n) {
-  // Unit vectors to a window and to a lamp.
-  const Eigen::Vector3d lamp(0.348, -0.497, 0.795), other(-0.835, 0.358, 0.418);
-  return static_cast<float>(0.66 + 0.26 * std::max(0.0, n.dot(lamp)) + 0.14 * std::max(0.0, n.dot(other)));
-}
-
 void Surfaces::append(const Surfaces& other) {
   patches.insert(patches.end(), other.patches.begin(), other.patches.end());
   quadrics.insert(quadrics.end(), other.quadrics.begin(), other.quadrics.end());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -56,6 +57,10 @@ struct Surfaces {
 };
 
 // Shade of a surface with outward normal `n` under the room's lamps, about 0.6 ... 1.
-float lambert_shade(const Eigen::Vector3d& n);
+inline float lambert_shade(const Eigen::Vector3d& n) {
+  // Unit vectors to a window and to a lamp.
+  const Eigen::Vector3d lamp(0.348, -0.497, 0.795), other(-0.835, 0.358, 0.418);
+  return static_cast<float>(0.66 + 0.26 * std::max(0.0, n.dot(lamp)) + 0.14 * std::max(0.0, n.dot(other)));
+}
 
 }  // namespace dkb::sim

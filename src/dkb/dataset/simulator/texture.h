@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -61,6 +62,15 @@ class Texture {
   int width() const { return width_; }
   int height() const { return height_; }
   int levels() const { return static_cast<int>(offsets_.size()); }
+  // Texels of one level, row by row: red in the lowest byte, then green, then blue.
+  struct Level {
+    const uint32_t* texels;
+    int width, height;
+  };
+  Level level(int number) const {
+    return {texels_.data() + offsets_[static_cast<size_t>(number)], std::max(1, width_ >> number),
+            std::max(1, height_ >> number)};
+  }
 
   // Bilinear value at (u, v) in [0, 1]^2 (clamped) of one level, as four 16-bit lanes r, b, g, 0 of 8.8 fixed point.
   uint64_t sample(float u, float v, int level) const {

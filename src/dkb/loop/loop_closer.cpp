@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/loop/loop_closer.h"
+
+namespace dkb {
+
+LoopCloser::LoopCloser(const Optics& optics, const LoopOptions& options, uint64_t seed)
+    : optics_(optics), options_(options), seed_(seed) {
+  options_.check();
+}
+
+std::optional<MapCorrection> LoopCloser::process(const Map& snapshot, KeyframeId id) {
+  if (id < rests_until_) return std::nullopt;
+  const auto finding = find_loop(snapshot, id, optics_, options_, seed_);
+  if (!finding) return std::nullopt;
+  MapCorrection correction = correct_loop(snapshot, *finding, edges_, options_);
+  if (!finding->merge) {
+    const auto added = loop_edges(snapshot, *finding);
+    edges_.insert(edges_.end(), added.begin(), added.end());
+  }
+  rests_until_ = id + 1 + options_.rest_keyframes;
+  return correction;
+}
+
+}  // namespace dkb

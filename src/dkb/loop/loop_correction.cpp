@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/loop/loop_correction.h"
+
+#include <algorithm>
+
+#include "dkb/solver/pose_graph.h"
+
+namespace dkb {
+namespace {
+
+PoseGraphEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points, const LoopOptions& options) {
+  PoseGraphEdge e;
+  e.a = a;
+  e.b = b;
+  e.b_from_a = b_from_a;
+  const double length = b_from_a.translation.norm();
+  const double position = options.edge_position_sd + options.edge_position_share * length;
+  const double rotation = options.edge_rotation_sd + options.edge_rotation_growth * length;
+  // Keyframes that share many points hang together firmly.
+  const double share = std::clamp(shared_points / static_cast<double>(options.essential_shared_points), 0.1, 4.0);
+  e.information.setZero();
+  e.information.diagonal().head<3>().setConstant(share / (position * position));
+  e.information.diagonal().tail<3>().setConstant(share / (rotation * rotation));
+  return e;
+}
+
+int shared_points(const Keyframe& k, KeyframeId other) {
+  for (const Covisible& c : k.covisible)
+    if (c.keyframe == other) return c.shared_points;
+  return 0;
+}
+
+void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root, const LoopOptions& options,
+                        MapCorrection& correction) {
+  PoseGraph graph;
+  std::vector<int> node(static_cast<size_t>(map.keyframe_count()), -1);
+  std::vector<KeyframeId> keyframes;
+  for (KeyframeId k : map.live_keyframes()) {
+    if (map.root(k) != root) continue;
+    node[static_cast<size_t>(k)] = static_cast<int>(keyframes.size());
+    keyframes.push_back(k);
+    graph.cam_from_world.push_back(map.keyframe(k)->cam_from_world);
+    graph.fixed.push_back(k == root);
+  }
+  const auto relative = [&](KeyframeId a, KeyframeId b) {
+    return map.keyframe(b)->cam_from_world * map.keyframe(a)->cam_from_world.inverse();
+  };
+  const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared) {
+    const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
+    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared, options));
+  };
+  for (KeyframeId id : keyframes) {
+    const Keyframe& k = *map.keyframe(id);
+    if (k.parent != kNoKeyframe) add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent));
+    for (const Covisible& c : k.covisible)
+      if (c.keyframe > id && c.shared_points >= options.essential_shared_points && c.keyframe != k.parent &&
+          map.keyframe(c.keyframe)->parent != id)
+        add(id, c.keyframe, relative(id, c.keyframe), c.shared_points);
+  }
+  for (const LoopEdge& e : edges) add(e.a, e.b, e.b_from_a, e.shared_points);
+  PoseGraphOptions solver;
+  solver.iterations = options.graph_iterations;
+  optimise_pose_graph(graph, solver);
+  for (size_t n = 0; n < keyframes.size(); ++n)
+    correction.poses.push_back({keyframes[n], map.keyframe(keyframes[n])->cam_from_world, graph.cam_from_world[n]});
+}
+
+}  // namespace
+
+std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
+  std::vector<LoopEdge> edges;
+  const KeyframeId far = finding.far_area.front();
+  const Rigid3 world_from_far = map.keyframe(far)->cam_from_world.inverse();
+  for (const LoopFinding::Sighting& s : finding.sightings)
+    edges.push_back({far, s.keyframe, s.fit.cam_from_world * world_from_far, static_cast<int>(s.fit.matches.size())});
+  return edges;
+}
+
+MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std::vector<LoopEdge>& edges,
+                           const LoopOptions& options) {
+  MapCorrection correction;
+  correction.kind = finding.merge ? MapCorrection::Kind::merge : MapCorrection::Kind::loop;
+  correction.far_side = finding.far_area;
+  for (const LoopFinding::Sighting& s : finding.sightings) {
+    correction.near_side.push_back(s.keyframe);
+    const Keyframe& k = *map.keyframe(s.keyframe);
+    for (const auto& [feature, point] : s.fit.matches) {
+      const PointId own = k.points[static_cast<size_t>(feature)];
+      if (own != kNoPoint && own != point) correction.same.emplace_back(own, point);
+    }
+  }
+  const KeyframeId near = finding.sightings.front().keyframe, far = finding.far_area.front();
+  if (!finding.merge) {
+    std::vector<LoopEdge> all = edges;
+    const auto added = loop_edges(map, finding);
+    all.insert(all.end(), added.begin(), added.end());
+    move_by_pose_graph(map, all, map.root(near), options, correction);
+    return correction;
+  }
+  Rigid3 moved_from_world = finding.sightings.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;
+  correction.near_joint = near;
+  correction.far_joint = far;
+  if (map.root(near) < map.root(far)) {  // the older map stays
+    std::swap(correction.near_joint, correction.far_joint);
+    moved_from_world = moved_from_world.inverse();
+  }
+  const KeyframeId moving = map.root(correction.near_joint);
+  for (KeyframeId id : map.live_keyframes()) {
+    if (map.root(id) != moving) continue;
+    const Rigid3& before = map.keyframe(id)->cam_from_world;
+    correction.poses.push_back({id, before, before * moved_from_world.inverse()});
+  }
+  return correction;
+}
+
+}  // namespace dkb

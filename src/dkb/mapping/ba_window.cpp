@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/mapping/ba_window.h"
+
+namespace dkb {
+
+BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
+                        std::vector<PointId> points, const CameraModel& camera, const SensorNoise& noise,
+                        double scale_factor) {
+  BaWindow window;
+  BaProblem& problem = window.problem;
+  problem.camera = camera;
+  std::vector<int> camera_of(static_cast<size_t>(map.keyframe_count()), -1);
+  window.keyframes = std::move(keyframes);
+  problem.fixed = std::move(fixed);
+  for (size_t c = 0; c < window.keyframes.size(); ++c) {
+    camera_of[static_cast<size_t>(window.keyframes[c])] = static_cast<int>(c);
+    problem.cam_from_world.push_back(map.keyframe(window.keyframes[c])->cam_from_world);
+  }
+
+  std::vector<double> inv_sigma(32);
+  for (int l = 0; l < 32; ++l) inv_sigma[static_cast<size_t>(l)] = 1.0 / noise.corner_sigma(l, scale_factor);
+  window.points = std::move(points);
+  for (size_t p = 0; p < window.points.size(); ++p) {
+    const MapPoint& point = *map.point(window.points[p]);
+    problem.points.push_back(point.position);
+    for (const Observation& o : point.observations) {
+      const int c = camera_of[static_cast<size_t>(o.keyframe)];
+      if (c < 0) continue;
+      const Keypoint& k = map.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)];
+      BaObservation observation;
+      observation.camera = c;
+      observation.point = static_cast<int>(p);
+      observation.u = k.pixel.x();
+      observation.v = k.pixel.y();
+      observation.inv_sigma = inv_sigma[k.octave];
+      observation.depth = k.depth;
+      if (k.depth > 0) observation.inv_depth_sigma = 1.0 / noise.depth_sigma(k.depth);
+      problem.observations.push_back(observation);
+      window.sources.push_back({o.keyframe, static_cast<int>(p)});
+    }
+  }
+  return window;
+}
+
+}  // namespace dkb

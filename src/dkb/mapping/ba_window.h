@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/map.h"
+#include "dkb/solver/bundle_adjustment.h"
+
+namespace dkb {
+
+// A part of a map as bundle adjustment wants it, and the names of what stands where in it.
+struct BaWindow {
+  struct Source {
+    KeyframeId keyframe = kNoKeyframe;
+    int point = 0;  // index into `points`
+  };
+  BaProblem problem;
+  std::vector<KeyframeId> keyframes;  // per camera of the problem
+  std::vector<PointId> points;        // per point
+  std::vector<Source> sources;        // per observation
+};
+
+// `keyframes` with their sightings of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.
+BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
+                        std::vector<PointId> points, const CameraModel& camera, const SensorNoise& noise,
+                        double scale_factor);
+
+}  // namespace dkb

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/mapping/map_correction.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace dkb {
+namespace {
+
+// Makes `joint` the root of its tree: the way up from it is turned round.
+void hang_tree(Map& map, KeyframeId joint, KeyframeId parent) {
+  std::vector<KeyframeId> way;
+  for (KeyframeId k = joint; k != kNoKeyframe; k = map.keyframe(k)->parent) way.push_back(k);
+  map.set_parent(joint, parent);
+  for (size_t i = 1; i < way.size(); ++i) map.set_parent(way[i], way[i - 1]);
+}
+
+KeyframeId live_ancestor(const Map& map, KeyframeId id) {
+  while (id != kNoKeyframe && map.keyframe(id) != nullptr && map.keyframe(id)->culled) id = map.keyframe(id)->parent;
+  return id;
+}
+
+}  // namespace
+
+void move_map(Map& map, const MapCorrection& correction) {
+  const auto count = static_cast<size_t>(map.keyframe_count());
+  // How the world moves at each keyframe: new_world_from_old_world.
+  std::vector<std::optional<Rigid3>> motion(count);
+  for (const MapCorrection::Pose& p : correction.poses) {
+    const Keyframe* k = map.live_keyframe(p.keyframe);
+    if (k == nullptr) continue;
+    const Rigid3 after = k->cam_from_world * p.before.inverse() * p.after;
+    motion[static_cast<size_t>(p.keyframe)] = after.inverse() * k->cam_from_world;
+  }
+  // The others move as the nearest ancestor does that has a correction; trees without one stay.
+  std::vector<uint8_t> done(count, 0);
+  for (size_t k = 0; k < count; ++k) {
+    std::vector<size_t> way;
+    KeyframeId at = static_cast<KeyframeId>(k);
+    while (at != kNoKeyframe && !motion[static_cast<size_t>(at)] && !done[static_cast<size_t>(at)]) {
+      way.push_back(static_cast<size_t>(at));
+      at = map.keyframe(at)->parent;
+    }
+    for (size_t w : way) {
+      done[w] = 1;
+      if (at != kNoKeyframe) motion[w] = motion[static_cast<size_t>(at)];
+    }
+  }
+
+  size_t next = 0;
+  for (PointId id : map.live_points()) {
+    while (next < correction.positions.size() && correction.positions[next].point < id) ++next;
+    const bool own = next < correction.positions.size() && correction.positions[next].point == id;
+    const MapPoint& p = *map.point(id);
+    KeyframeId guide = birth_keyframe(id);
+    if (map.live_keyframe(guide) == nullptr && !p.observations.empty()) guide = p.observations.front().keyframe;
+    if (!motion[static_cast<size_t>(guide)]) continue;
+    const Rigid3& moves = *motion[static_cast<size_t>(guide)];
+    MapPoint& moved = map.edit_point(id);
+    if (own) {
+      const MapCorrection::Position& c = correction.positions[next];
+      moved.position = c.after + moves.rotation * (moved.position - c.before);
+    } else {
+      moved.position = moves * moved.position;
+    }
+    moved.normal = (moves.rotation * moved.normal.cast<double>()).cast<float>();
+  }
+  for (KeyframeId id : map.live_keyframes())
+    if (motion[static_cast<size_t>(id)])
+      map.set_pose(id, map.keyframe(id)->cam_from_world * motion[static_cast<size_t>(id)]->inverse());
+  for (const MapCorrection::Sighting& s : correction.outliers) map.forget(map.resolve(s.point), s.keyframe);
+  if (correction.near_joint != kNoKeyframe) {
+    const KeyframeId near = live_ancestor(map, correction.near_joint), far = live_ancestor(map, correction.far_joint);
+    if (map.root(near) != map.root(far)) hang_tree(map, near, far);
+  }
+}
+
+}  // namespace dkb

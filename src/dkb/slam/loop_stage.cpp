@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/loop_stage.h"
+
+#include <cmath>
+
+#if defined(__linux__)
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr size_t kMostLate = 4;  // searches outstanding in a real-time run
+
+// Tracking and mapping go first where cores are few. Results do not depend on it.
+void step_back() {
+#if defined(__linux__)
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 10);
+#endif
+}
+
+}  // namespace
+
+FrameIndex BackgroundLatency::operator()(int keyframes) const {
+  return static_cast<FrameIndex>(std::ceil(base + per_keyframe * keyframes));
+}
+
+void LoopStageOptions::check() const {
+  loop.check();
+  global_ba.check();
+  for (const BackgroundLatency& l : {loop_latency, global_ba_latency}) {
+    require_option(l.base >= 1, "latency", l.base, "at least 1 frame");
+    require_option(l.per_keyframe >= 0, "latency_per_keyframe", l.per_keyframe, "at least 0 frames");
+  }
+}
+
+LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, const LocalBaOptions& local_ba,
+                     uint64_t seed, bool threaded)
+    : options_(options),
+      closer_(optics, options.loop, seed),
+      search_(
+          [this, threaded](const Task& task) {
+            if (threaded) step_back();
+            Result result;
+            result.generation = task.generation;
+            if (task.generation == closed_generation_) return result;  // the map is about to move
+            const Stopwatch watch;
+            if (auto correction = closer_.process(*task.view, task.keyframe)) {
+              result.correction = std::make_shared<const MapCorrection>(std::move(*correction));
+              closed_generation_ = task.generation;
+            }
+            result.ms = watch.ms();
+            return result;
+          },
+          threaded),
+      adjustment_(
+          [optics, local_ba, ba = options.global_ba, threaded](const Task& task) {
+            if (threaded) step_back();
+            const Stopwatch watch;
+            Result result;
+            result.generation = task.generation;
+            result.correction =
+                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, ba));
+            result.ms = watch.ms();
+            return result;
+          },
+          threaded) {
+  options_.check();
+}
+
+void LoopStage::offer(const MapView& view, FrameIndex now, bool may_skip) {
+  const int keyframes = view->live_keyframe_count();
+  for (; next_ < view->keyframe_count(); ++next_) {
+    if (!options_.loop.enabled || view->live_keyframe(next_) == nullptr) continue;
+    if (may_skip && search_.outstanding() >= kMostLate) continue;
+    search_.push({view, next_, generation_}, now + options_.loop_latency(keyframes));
+  }
+  if (adjustment_wanted_ && adjustment_.outstanding() == 0) {
+    adjustment_.push({view, kNoKeyframe, generation_}, now + options_.global_ba_latency(keyframes));
+    adjustment_wanted_ = false;
+  }
+}
+
+std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex now, bool wait) {
+  std::vector<std::shared_ptr<const MapCorrection>> corrections;
+  while (auto found = search_.take_due(now, wait)) {
+    times_.add("loop", found->ms);
+    if (!found->correction || found->generation != generation_) continue;
+    ++generation_;
+    ++(found->correction->kind == MapCorrection::Kind::merge ? merges_ : loops_);
+    adjustment_wanted_ = true;
+    corrections.push_back(std::move(found->correction));
+  }
+  while (auto adjusted = adjustment_.take_due(now, wait)) {
+    times_.add("global_ba", adjusted->ms);
+    if (adjusted->generation == generation_) corrections.push_back(std::move(adjusted->correction));
+  }
+  return corrections;
+}
+
+}  // namespace dkb

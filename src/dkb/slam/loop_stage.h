@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dkb/loop/global_adjustment.h"
+#include "dkb/loop/loop_closer.h"
+#include "dkb/slam/due_stage.h"
+
+namespace dkb {
+
+// When background results become visible: issue + ceil(base + per_keyframe * keyframes of the map).
+struct BackgroundLatency {
+  double base = 0;          // [frames] >= 1
+  double per_keyframe = 0;  // [frames] >= 0
+  FrameIndex operator()(int keyframes) const;
+};
+
+struct LoopStageOptions {
+  LoopOptions loop;
+  GlobalBaOptions global_ba;
+  BackgroundLatency loop_latency{10, 0.02};
+  BackgroundLatency global_ba_latency{15, 0.4};
+  void check() const;
+};
+
+// Loop closing and global bundle adjustment beside tracking and mapping, each on its own thread. Both work on views
+// that tracking has taken, so that what they see is a matter of logical time. Their corrections go to mapping, the only
+// writer. A correction is dropped when the map was moved by another one since its view was made: the loop is found
+// again, and the adjustment is made anew.
+class LoopStage {
+ public:
+  LoopStage(const Optics& optics, const LoopStageOptions& options, const LocalBaOptions& local_ba, uint64_t seed,
+            bool threaded);
+
+  // `view` as tracking took it at `now`; it must hold all corrections handed out so far. Keyframes that are new in it
+  // are searched for loops. `may_skip`: leave keyframes out while the search is late (real-time runs).
+  void offer(const MapView& view, FrameIndex now, bool may_skip);
+  // Keyframes below `first` are not searched: they were there before.
+  void start_at(KeyframeId first) { next_ = first; }
+  // Has the whole map adjusted with the next view that is offered.
+  void want_adjustment() { adjustment_wanted_ = true; }
+
+  // Corrections due at `now`, in the order in which mapping must take them.
+  std::vector<std::shared_ptr<const MapCorrection>> take_due(FrameIndex now, bool wait);
+  bool idle() const { return search_.outstanding() == 0 && adjustment_.outstanding() == 0 && !adjustment_wanted_; }
+  int loops() const { return loops_; }
+  int merges() const { return merges_; }
+  // Durations so far: loop, global_ba, of the results that were taken.
+  const StageTimes& times() const { return times_; }
+
+ private:
+  struct Task {
+    MapView view;
+    KeyframeId keyframe = kNoKeyframe;
+    int generation = 0;
+  };
+  struct Result {
+    std::shared_ptr<const MapCorrection> correction;  // none when nothing was found
+    int generation = 0;
+    double ms = 0;
+  };
+
+  LoopStageOptions options_;
+  LoopCloser closer_;           // of the search's thread
+  int closed_generation_ = -1;  // likewise: where it found the last loop
+  int generation_ = 0;          // corrections handed out that moved the map by a loop or a merge
+  KeyframeId next_ = 0;         // the first keyframe that was not offered yet
+  bool adjustment_wanted_ = false;
+  int loops_ = 0, merges_ = 0;
+  StageTimes times_;
+  DueStage<Task, Result> search_, adjustment_;  // last: their threads use the above
+};
+
+}  // namespace dkb

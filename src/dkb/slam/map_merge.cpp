@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/map_merge.h"
+
+#include "dkb/loop/global_adjustment.h"
+#include "dkb/loop/loop_closer.h"
+#include "dkb/mapping/local_mapper.h"
+
+namespace dkb {
+
+std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const Optics& optics,
+                                     const SlamOptions& options) {
+  MergedMaps result;
+  Map both = first;
+  both.append(second);
+  const auto is_joined = [&](const Map& map) {
+    const KeyframeId begin = first.keyframe_count();
+    for (KeyframeId id = begin; id < map.keyframe_count(); ++id)
+      if (map.root(id) < begin) return true;
+    return false;
+  };
+  LocalMapper mapper(optics.camera, optics.noise, optics.scale_factor, optics.levels, options.mapping, std::move(both));
+  LoopCloser closer(optics, options.loop_closing.loop, options.seed);
+  // The second map's keyframes one by one, as if its camera had just come by.
+  for (KeyframeId id = first.keyframe_count(); id < mapper.map().keyframe_count(); ++id) {
+    const auto correction = closer.process(mapper.map(), id);
+    if (!correction) continue;
+    ++(correction->kind == MapCorrection::Kind::merge ? result.merges : result.loops);
+    mapper.apply(*correction);
+  }
+  if (!is_joined(mapper.map())) return std::nullopt;
+  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba, options.loop_closing.global_ba));
+  result.map = mapper.map();
+  return result;
+}
+
+}  // namespace dkb

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "dkb/slam/loop_stage.h"
+#include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/slam_system.h"
+
+namespace dkb {
+
+// The stages of one system and what it knows between frames. Inside the room only.
+class SlamSystem::Impl {
+ public:
+  Impl(const CameraModel& camera, const SlamOptions& options, DetectorSet detectors)
+      : camera_(camera),
+        options_(options),
+        undistort_(camera),
+        extractor_(options.features),
+        dynamics_(camera, options.dynamics, std::move(detectors)) {
+    camera_.check();
+    options_.check();
+    start();
+  }
+
+  FrameResult process(std::shared_ptr<const RgbdImage> image);
+  void finish();
+  void start(Map map = {});
+
+  CameraModel camera_;
+  SlamOptions options_;
+  UndistortionTable undistort_;
+  OrbExtractor extractor_;
+  OrbFeatures orb_;                         // of the frame at hand
+  std::shared_ptr<const RgbdImage> image_;  // likewise
+  std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<KeyframePolicy> policy_;
+  std::unique_ptr<MappingStage> mapping_;
+  std::unique_ptr<LoopStage> loop_;
+  DynamicStage dynamics_;
+  DynamicScene scene_;  // of the last frame
+  std::optional<PointEvidence> evidence_;
+  std::optional<MoverTracker> movers_;
+
+  // A frame of the trajectory hangs on a keyframe, since the world may still move.
+  struct Record {
+    FrameIndex frame;
+    double timestamp;
+    KeyframeId reference;
+    Rigid3 cam_from_reference;
+    Rigid3 world_from_cam_online;
+  };
+  std::vector<Record> records_;
+  FrameIndex next_frame_ = 0;
+  FrameIndex lost_frames_ = 0;  // in a row
+  double last_timestamp_ = 0;
+  KeyframeId next_keyframe_ = 0;
+  KeyframeId last_keyframe_ = kNoKeyframe;  // the newest one where the camera is
+  FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
+  Rigid3 world_from_odom_, odom_from_cam_;
+  bool localise_only_ = false;
+  std::vector<size_t> kept_;                    // features given to tracking, as indices of all
+  std::vector<uint8_t> suspect_;                // of these, which may move
+  std::vector<FeatureReport> feature_reports_;  // all features of the last frame
+  struct RecentKeyframe {
+    FrameIndex frame;
+    KeyframeId id;
+    std::shared_ptr<const RgbdFeatures> features;
+  };
+  std::deque<RecentKeyframe> recent_keyframes_;  // whose detections may still be out
+  SlamStatistics statistics_;
+  StageTimes times_;
+
+ private:
+  void take_map(bool wait);
+  void take_view(const MapView& view);
+  void extract(const RgbdImage& image);
+  void filter_dynamic(std::shared_ptr<const RgbdImage> image);
+  // Index among all extracted features.
+  size_t source_feature(const TrackedFrame& frame, size_t feature) const {
+    return kept_[frame.source.empty() ? feature : static_cast<size_t>(frame.source[feature])];
+  }
+  void report_features(const TrackedFrame& frame);
+  void weigh_evidence();
+  void retract_late();
+  std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
+  KeyframeDecision decide(const TrackOutcome& outcome) const;
+  void insert_keyframe(TrackedFrame& frame);
+  void keep_odometry_smooth(const TrackOutcome& outcome);
+};
+
+}  // namespace dkb

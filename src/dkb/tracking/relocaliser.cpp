@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/relocaliser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/features/matching.h"
+#include "dkb/solver/absolute_pose.h"
+#include "dkb/tracking/pose_observation.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr size_t kWellKnownObservers = 3;  // keyframes that see a point which is to be expected in view
+constexpr float kDepthReach = 8.0f;        // [px] around a point where features tell the depth that is seen
+
+bool same_place(const Rigid3& a, const Rigid3& b) {
+  return (centre_in_world(a) - centre_in_world(b)).norm() < 0.1 &&
+         vector_from_rotation((a * b.inverse()).rotation).norm() < 0.1;
+}
+
+}  // namespace
+
+void RelocalisationOptions::check() const {
+  require_option(candidates >= 1, "candidates", candidates, "at least 1");
+  require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
+  require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
+  require_option(least_agreeing >= 6, "least_agreeing", least_agreeing, "at least 6");
+  require_option(radius > 0, "radius", radius, "greater than 0 px");
+  require_option(radius_fine > 0, "radius_fine", radius_fine, "greater than 0 px");
+  require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
+  require_option(least_share >= 0 && least_share <= 1, "least_share", least_share, "0 ... 1");
+  require_option(most_see_through >= 0 && most_see_through <= 1, "most_see_through", most_see_through, "0 ... 1");
+  require_option(largest_position_sd > 0, "largest_position_sd", largest_position_sd, "greater than 0 m");
+  require_option(ambiguity >= 0 && ambiguity <= 1, "ambiguity", ambiguity, "0 ... 1");
+}
+
+Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+                         const RelocalisationOptions& options, const LocalMapOptions& local_map, uint64_t seed)
+    : camera_(camera),
+      noise_(noise),
+      scale_factor_(scale_factor),
+      levels_(levels),
+      options_(options),
+      local_map_(local_map),
+      seed_(seed) {
+  options_.check();
+}
+
+std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures& features,
+                                              const IgnoresPoint& ignores) const {
+  std::vector<PoseProposal> proposals = propose(map, features, ignores);
+  const auto better = [](const PoseProposal& a, const PoseProposal& b) {
+    return a.verified != b.verified ? a.verified : a.inliers > b.inliers;
+  };
+  std::stable_sort(proposals.begin(), proposals.end(), better);
+  if (proposals.empty() || !proposals.front().verified) return std::nullopt;
+  PoseProposal& best = proposals.front();
+  for (const PoseProposal& other : proposals)
+    if (!same_place(other.cam_from_world, best.cam_from_world) && other.inliers >= options_.ambiguity * best.inliers)
+      return std::nullopt;
+  return std::move(best);
+}
+
+std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeatures& features,
+                                               const IgnoresPoint& ignores) const {
+  std::vector<Descriptor> still;
+  for (size_t f = 0; f < features.size(); ++f)
+    if (!features.keypoints[f].suspect) still.push_back(features.descriptors[f]);
+  std::vector<PoseProposal> proposals;
+  for (const PlaceMatch& like : map.similar_keyframes(still, static_cast<size_t>(options_.candidates))) {
+    // A keyframe that sees what an earlier one led to would lead there again.
+    const auto& points = map.keyframe(like.id)->points;
+    const bool explained = std::any_of(proposals.begin(), proposals.end(), [&](const PoseProposal& p) {
+      if (!p.verified) return false;
+      const auto shared = std::count_if(p.points.begin(), p.points.end(), [&](PointId id) {
+        return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
+      });
+      return shared >= options_.least_matches;
+    });
+    if (explained) continue;
+    if (auto proposal = propose_from(map, like.id, features, ignores)) proposals.push_back(std::move(*proposal));
+  }
+  return proposals;
+}
+
+std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
+                                                      const IgnoresPoint& ignores) const {
+  PoseProposal proposal;
+  proposal.keyframe = keyframe;
+  const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
+  if (!coarse) return std::nullopt;
+  proposal.cam_from_world = *coarse;
+  std::vector<Candidate> around = local_map_candidates(proposal.points, map, local_map_);
+  std::erase_if(around, [&](const Candidate& c) { return ignores(c.id); });
+  if (!search(around, options_.radius, features, proposal)) return std::nullopt;
+  if (!search(around, options_.radius_fine, features, proposal)) return std::nullopt;
+  verify(map, around, features, proposal);
+  return proposal;
+}
+
+// By descriptors alone.
+std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, const RgbdFeatures& features,
+                                               const IgnoresPoint& ignores, std::vector<PointId>& points) const {
+  struct Known {
+    PointId id;
+    Descriptor descriptor;
+  };
+  std::vector<Known> known;
+  const Keyframe& keyframe = *map.keyframe(id);
+  for (size_t f = 0; f < keyframe.points.size(); ++f)
+    if (keyframe.points[f] != kNoPoint) known.push_back({keyframe.points[f], keyframe.features->descriptors[f]});
+  const size_t neighbours = std::min(keyframe.covisible.size(), static_cast<size_t>(options_.neighbours));
+  for (size_t n = 0; n < neighbours; ++n)
+    for (PointId p : map.keyframe(keyframe.covisible[n].keyframe)->points)
+      if (const MapPoint* seen = map.point(p)) known.push_back({p, seen->descriptor});
+  // The keyframe's own descriptors come first and stay.
+  std::stable_sort(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.id < b.id; });
+  known.erase(std::unique(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.id == b.id; }),
+              known.end());
+  std::erase_if(known, [&](const Known& k) { return map.point(k.id) == nullptr || ignores(k.id); });
+
+  std::vector<Descriptor> descriptors;
+  for (const Known& k : known) descriptors.push_back(k.descriptor);
+  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
+  std::erase_if(matches,
+                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
+  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  std::vector<PoseObservation> observations;
+  for (const DescriptorMatch& m : matches)
+    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.b)],
+                                            map.point(known[static_cast<size_t>(m.a)].id)->position, noise_,
+                                            scale_factor_));
+  RansacOptions ransac;
+  ransac.seed = seed_ + static_cast<uint64_t>(id);
+  ransac.min_inliers = options_.least_agreeing;
+  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
+  if (!pose.ok) return std::nullopt;
+  points.assign(features.size(), kNoPoint);
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = known[static_cast<size_t>(matches[i].a)].id;
+  return pose.pose;
+}
+
+// Matches the map around anew under the proposal's pose and refines it.
+bool Relocaliser::search(const std::vector<Candidate>& around, double radius, const RgbdFeatures& features,
+                         PoseProposal& proposal) const {
+  ProjectionMatchOptions match;
+  match.radius = static_cast<float>(radius);
+  const auto matches = match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
+                                           match, nullptr, nullptr);
+  std::vector<PoseObservation> observations;
+  for (const ProjectionMatch& m : matches)
+    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
+                                            around[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
+  const PoseEstimate pose = optimise_pose(camera_, proposal.cam_from_world, observations);
+  if (!pose.ok || pose.inliers < options_.least_agreeing) return false;
+  proposal.cam_from_world = pose.cam_from_world;
+  proposal.inliers = pose.inliers;
+  proposal.position_sd = std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
+  proposal.points.assign(features.size(), kNoPoint);
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i])
+      proposal.points[static_cast<size_t>(matches[i].feature)] = around[static_cast<size_t>(matches[i].candidate)].id;
+  return true;
+}
+
+// What the map would have in view from there must mostly be found, and nothing may be seen through it.
+void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
+                         PoseProposal& proposal) const {
+  std::vector<PointId> matched;
+  for (PointId p : proposal.points)
+    if (p != kNoPoint) matched.push_back(p);
+  std::sort(matched.begin(), matched.end());
+  std::vector<uint8_t> visible(around.size(), 0);
+  match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
+                      &visible);
+  for (size_t i = 0; i < around.size(); ++i) {
+    if (!visible[i] || map.point(around[i].id)->observations.size() < kWellKnownObservers) continue;
+    ++proposal.well_known;
+    if (std::binary_search(matched.begin(), matched.end(), around[i].id)) {
+      ++proposal.found;
+      ++proposal.with_depth;
+      continue;
+    }
+    const Eigen::Vector3d in_cam = proposal.cam_from_world * around[i].position;
+    const Eigen::Vector2f at = camera_.project(in_cam).cast<float>();
+    int seen = 0, behind = 0;
+    features.grid.for_each_near(at.x(), at.y(), kDepthReach, [&](int f) {
+      const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
+      if (!(k.depth > 0) || k.suspect) return;
+      ++seen;
+      behind += k.depth > in_cam.z() + 3 * noise_.depth_sigma(k.depth);
+    });
+    proposal.with_depth += seen > 0;
+    proposal.see_through += seen > 0 && behind == seen;
+  }
+  proposal.verified = proposal.inliers >= options_.least_inliers &&
+                      proposal.found >= options_.least_share * proposal.well_known &&
+                      proposal.see_through <= options_.most_see_through * proposal.with_depth &&
+                      proposal.position_sd <= options_.largest_position_sd;
+}
+
+}  // namespace dkb

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "dkb/features/rgbd_features.h"
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/map.h"
+#include "dkb/tracking/local_map.h"
+
+namespace dkb {
+
+struct RelocalisationOptions {
+  int candidates = 6;                 // look-alike keyframes that are tried, >= 1
+  int neighbours = 4;                 // covisible keyframes whose points are matched along with each one's, >= 0
+  int least_matches = 15;             // matches by descriptor alone that make a candidate worth a try, >= 6
+  int least_agreeing = 10;            // of these, that must agree on a pose, >= 6
+  double radius = 10.0;               // [px] first search around that pose; the second is within `radius_fine`, > 0
+  double radius_fine = 4.0;           // [px] > 0
+  int least_inliers = 40;             // points that the final pose rests on, >= 6
+  double least_share = 0.1;           // of the map's well-known points in view that must be found, 0 ... 1
+  double most_see_through = 0.2;      // share of these points that may stand before what is seen there, 0 ... 1
+  double largest_position_sd = 0.01;  // [m] standard deviation of the camera's place, > 0
+  double ambiguity = 0.8;  // a pose elsewhere with this share of the best one's inliers makes both worthless, 0 ... 1
+  void check() const;
+};
+
+// A pose that a look-alike keyframe led to, with what speaks for and against it.
+struct PoseProposal {
+  KeyframeId keyframe = kNoKeyframe;  // that led to it
+  Rigid3 cam_from_world;
+  std::vector<PointId> points;  // per feature: the map point that it shows, else kNoPoint
+  int inliers = 0;
+  int well_known = 0, found = 0;        // well-known map points that should be in view; of these, found
+  int with_depth = 0, see_through = 0;  // of these, with depth seen there; with something seen behind them only
+  double position_sd = 0;               // [m]
+  bool verified = false;                // it meets the options
+};
+
+// Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the
+// frame, seeks a pose by RANSAC and searches the map around it. Without any idea of where the camera was.
+// Deterministic for a seed. Features that may lie on movers take no part.
+class Relocaliser {
+ public:
+  Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
+              const RelocalisationOptions& options, const LocalMapOptions& local_map, uint64_t seed);
+
+  // True for points that must not be matched.
+  using IgnoresPoint = std::function<bool(PointId)>;
+
+  // The verified pose; nothing when there is none, or when poses at different places explain the frame nearly as well.
+  std::optional<PoseProposal> find(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores) const;
+  // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
+  std::vector<PoseProposal> propose(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores) const;
+  // The pose that this one keyframe leads to, verified or not.
+  std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
+                                           const IgnoresPoint& ignores) const;
+
+ private:
+  std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
+                                    const IgnoresPoint& ignores, std::vector<PointId>& points) const;
+  bool search(const std::vector<Candidate>& around, double radius, const RgbdFeatures& features,
+              PoseProposal& proposal) const;
+  void verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
+              PoseProposal& proposal) const;
+
+  CameraModel camera_;
+  SensorNoise noise_;
+  double scale_factor_;
+  int levels_;
+  RelocalisationOptions options_;
+  LocalMapOptions local_map_;
+  uint64_t seed_;
+};
+
+}  // namespace dkb
