@@ -5,6 +5,7 @@
 #
 #   scripts/deps.sh          what `make demo`, `make test` and `make bench` need
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
+#   scripts/deps.sh slurm    the same and Slurm, for bench/slurm/one_node_cluster.sh
 #
 # DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
 set -euo pipefail
@@ -20,7 +21,8 @@ packages=(
 case "${1:-}" in
   "") ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [lint]" >&2; exit 2 ;;
+  slurm) packages+=(slurm-wlm munge) ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [lint|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dkb/dense/dense_options.h"
+#include "dkb/dense/depth_view.h"
+#include "dkb/dense/occupancy_grid.h"
+#include "dkb/dense/surface_mesh.h"
+#include "dkb/geometry/sensor_noise.h"
+
+namespace dkb {
+
+// A pose of the finished trajectory.
+struct TimedPose {
+  double timestamp = 0;  // [s]
+  Rigid3 world_from_cam;
+};
+
+struct DenseMap {
+  SurfaceMesh mesh;
+  std::optional<OccupancyGrid> grid;  // nothing when no floor was found
+  int views = 0;                      // that were fused
+};
+
+// The dense map of the still world. Keyframes are noted as they come, cheaply, and fused when the poses are final, so
+// that loop corrections count. Not thread-safe. Deterministic.
+class DenseMapper {
+ public:
+  DenseMapper(const CameraModel& camera, const SensorNoise& noise, const DenseOptions& options);
+
+  // `movers`: where movers are seen in `image`.
+  void add_keyframe(FrameIndex frame, const RgbdImage& image, const MoverMask& movers);
+  // Movers of an earlier frame that became known later. Frames that were not added are passed over.
+  void remove_movers(FrameIndex frame, const MoverMask& movers);
+  size_t keyframes() const { return views_.size(); }
+
+  // Poses by time, of colour images; a view takes its pose at its depth image's time from them and is left out when
+  // they do not reach within 0.2 s of it. `seed` is that of the floor's RANSAC.
+  DenseMap build(std::span<const TimedPose> trajectory, uint64_t seed) const;
+
+ private:
+  SensorNoise noise_;
+  DenseOptions options_;
+  DepthViewMaker maker_;
+  std::vector<DepthView> views_;  // by increasing frame
+};
+
+}  // namespace dkb

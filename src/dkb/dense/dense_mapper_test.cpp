@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dense/dense_mapper.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/dense/dense_test_scene.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using testing::DenseScene;
+
+double time_of(int i) {
+  return 100 + 0.1 * i;
+}
+
+std::vector<TimedPose> trajectory(int count) {
+  std::vector<TimedPose> poses;
+  for (int i = 0; i < count; ++i) poses.push_back({time_of(i), testing::scene_pose(i)});
+  return poses;
+}
+
+DenseMapper mapper_with_views(int count) {
+  DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
+  for (int i = 0; i < count; ++i)
+    mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), testing::scene_pose(i), time_of(i)), {});
+  return mapper;
+}
+
+TEST(DenseMapper, MapsTheSceneWithItsFloorAndObstacles) {
+  const DenseMap map = mapper_with_views(8).build(trajectory(8), 1);
+  EXPECT_EQ(map.views, 8);
+  EXPECT_GT(map.mesh.triangles.size(), 10000u);
+  ASSERT_TRUE(map.grid);
+  const Rigid3& floor_from_world = map.grid->floor_from_world;
+  EXPECT_NEAR((floor_from_world * Eigen::Vector3d(0.2, 1.2, 2.5)).z(), 0, 0.01);
+  EXPECT_NEAR((floor_from_world * Eigen::Vector3d(0, 0, 0)).z(), 1.2, 0.01);
+  const auto cell_of = [&](const Eigen::Vector3d& world) {
+    const Eigen::Vector3d p = floor_from_world * world;
+    return map.grid->cells(
+        static_cast<int>(std::floor((p.x() - map.grid->origin_x) / map.grid->cell)),
+        map.grid->cells.height() - 1 - static_cast<int>(std::floor((p.y() - map.grid->origin_y) / map.grid->cell)));
+  };
+  EXPECT_EQ(cell_of({0.3, 0.5, 1.62}), OccupancyGrid::kOccupied);  // the ball's front
+  EXPECT_EQ(cell_of({-0.3, 1.2, 2.3}), OccupancyGrid::kFree);
+}
+
+TEST(DenseMapper, SameInputGivesTheSameBytes) {
+  const DenseMap a = mapper_with_views(5).build(trajectory(5), 1), b = mapper_with_views(5).build(trajectory(5), 1);
+  EXPECT_EQ(mesh_ply(a.mesh), mesh_ply(b.mesh));
+  ASSERT_TRUE(a.grid && b.grid);
+  EXPECT_EQ(occupancy_pgm(*a.grid), occupancy_pgm(*b.grid));
+  EXPECT_EQ(occupancy_yaml(*a.grid, "x"), occupancy_yaml(*b.grid, "x"));
+}
+
+TEST(DenseMapper, FollowsTheFinishedTrajectory) {
+  // The whole map moves with the poses.
+  const Rigid3 moved(rotation_from_vector({0, 0.1, 0}), {1, 0, 0.5});
+  std::vector<TimedPose> poses = trajectory(6);
+  for (TimedPose& p : poses) p.world_from_cam = moved * p.world_from_cam;
+  const DenseMap map = mapper_with_views(6).build(poses, 1);
+  const DenseScene scene;
+  std::vector<double> errors;
+  for (const auto& v : map.mesh.vertices) errors.push_back(scene.distance(moved.inverse() * v.cast<double>()));
+  ASSERT_GT(errors.size(), 5000u);
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.004);
+}
+
+TEST(DenseMapper, DepthTakesItsPoseAtItsOwnTime) {
+  // Depth images half way between two poses.
+  DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
+  for (int i = 0; i < 6; ++i) {
+    const Rigid3 a = testing::scene_pose(i), b = testing::scene_pose(i + 1);
+    const Rigid3 middle(a.rotation.slerp(0.5, b.rotation), 0.5 * (a.translation + b.translation));
+    RgbdImage image = DenseScene().draw(testing::scene_camera(), middle, time_of(i));
+    image.depth_timestamp += 0.05;
+    mapper.add_keyframe(i, image, {});
+  }
+  const DenseMap map = mapper.build(trajectory(7), 1);
+  std::vector<double> errors;
+  for (const auto& v : map.mesh.vertices) errors.push_back(DenseScene().distance(v.cast<double>()));
+  ASSERT_GT(errors.size(), 5000u);
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.004);
+}
+
+TEST(DenseMapper, MaskedMoversLeaveNoTraceWhenKnownInTimeOrLate) {
+  const auto build = [](bool at_once, bool late) {
+    DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
+    for (int i = 0; i < 3; ++i) {
+      DenseScene scene;
+      scene.person.emplace(-0.4, 2.2);
+      const RgbdImage with = scene.draw(testing::scene_camera(), testing::scene_pose(i), time_of(i));
+      const RgbdImage without = DenseScene().draw(testing::scene_camera(), testing::scene_pose(i), time_of(i));
+      MoverMask mask;
+      mask.cells = Image<uint8_t>(40, 30);
+      for (int y = 0; y < 120; ++y)
+        for (int x = 0; x < 160; ++x)
+          if (with.depth(x, y) != without.depth(x, y)) mask.cells(x / 4, y / 4) = 255;
+      mapper.add_keyframe(i, with, at_once ? mask : MoverMask{});
+      if (late) mapper.remove_movers(i, mask);
+    }
+    size_t on_person = 0;
+    for (const auto& v : mapper.build(trajectory(3), 1).mesh.vertices)
+      on_person += std::abs(std::hypot(v.x() + 0.4F, v.z() - 2.2F) - 0.25F) < 0.05F && v.y() < 1.1F ? 1 : 0;
+    return on_person;
+  };
+  EXPECT_GT(build(false, false), 200u);
+  EXPECT_EQ(build(true, false), 0u);
+  EXPECT_EQ(build(false, true), 0u);
+}
+
+TEST(DenseMapper, NothingFromNothing) {
+  const DenseMapper mapper(testing::scene_camera(), {}, {});
+  const DenseMap map = mapper.build({}, 1);
+  EXPECT_TRUE(map.mesh.triangles.empty());
+  EXPECT_FALSE(map.grid);
+  EXPECT_EQ(mapper_with_views(2).build({}, 1).views, 0);
+}
+
+TEST(DenseMapper, ViewsFarFromAnyPoseAreLeftOut) {
+  EXPECT_EQ(mapper_with_views(8).build(trajectory(4), 1).views, 6);  // 0.1 s apart: two more within 0.2 s
+}
+
+TEST(DenseOptions, SayWhichValueIsWrong) {
+  DenseOptions options;
+  options.voxel = 1;
+  EXPECT_THROW(options.check(), InvalidOption);
+  options = {};
+  options.obstacle_high = 0.05;
+  EXPECT_THROW(DenseMapper(CameraModel(), {}, options), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dense/occupancy_grid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace dkb {
+namespace {
+
+constexpr int kRayStride = 4;  // view pixels between the rays that look for free cells
+
+struct Bounds {
+  double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
+  void add(const Eigen::Vector3d& p) {
+    x0 = std::min(x0, p.x());
+    y0 = std::min(y0, p.y());
+    x1 = std::max(x1, p.x());
+    y1 = std::max(y1, p.y());
+  }
+};
+
+// Cells that the rays of a view pass below obstacle_high, up to one cell before what they hit.
+class FreeSpace {
+ public:
+  FreeSpace(OccupancyGrid* grid, const DenseOptions& options) : grid_(grid), options_(options) {}
+
+  void add(const PlacedView& placed, const ViewCamera& camera) {
+    const Rigid3 floor_from_cam = grid_->floor_from_world * placed.cam_from_world.inverse();
+    const Eigen::Matrix3d rotation = floor_from_cam.matrix3();
+    for (int y = 0; y < camera.height; y += kRayStride)
+      for (int x = 0; x < camera.width; x += kRayStride) {
+        const double z = static_cast<double>(placed.view->metres(x, y));
+        if (z > 0) walk(floor_from_cam.translation, rotation * camera.ray(x, y) * std::min(z, options_.max_depth));
+      }
+  }
+
+ private:
+  void walk(const Eigen::Vector3d& eye, const Eigen::Vector3d& way) {
+    // The part of the way that is above the floor and below obstacle_high.
+    double from = 0, to = 1;
+    const double low = -options_.obstacle_low, high = options_.obstacle_high;
+    if (std::abs(way.z()) < 1e-9) {
+      if (eye.z() < low || eye.z() > high) return;
+    } else {
+      const double a = (low - eye.z()) / way.z(), b = (high - eye.z()) / way.z();
+      from = std::max(from, std::min(a, b));
+      to = std::min(to, std::max(a, b));
+    }
+    const double flat = std::hypot(way.x(), way.y());
+    if (way.z() >= 0 || eye.z() + way.z() > options_.obstacle_low) to -= flat > 0 ? grid_->cell / flat : 0;
+    if (from >= to) return;
+    const int steps = static_cast<int>(std::ceil((to - from) * flat / (0.7 * grid_->cell))) + 1;
+    for (int i = 0; i <= steps; ++i) {
+      const Eigen::Vector3d p = eye + (from + (to - from) * i / steps) * way;
+      const int x = static_cast<int>(std::floor((p.x() - grid_->origin_x) / grid_->cell));
+      const int y = grid_->cells.height() - 1 - static_cast<int>(std::floor((p.y() - grid_->origin_y) / grid_->cell));
+      if (grid_->cells.contains(x, y)) grid_->cells(x, y) = OccupancyGrid::kFree;
+    }
+  }
+
+  OccupancyGrid* grid_;
+  DenseOptions options_;
+};
+
+}  // namespace
+
+OccupancyGrid make_occupancy_grid(const SurfaceMesh& mesh, std::span<const PlacedView> views, const ViewCamera& camera,
+                                  const Rigid3& floor_from_world, const DenseOptions& options) {
+  OccupancyGrid grid;
+  grid.cell = options.grid_cell;
+  grid.floor_from_world = floor_from_world;
+  if (mesh.vertices.empty()) return grid;
+  Bounds bounds;
+  for (const Eigen::Vector3f& v : mesh.vertices) bounds.add(floor_from_world * v.cast<double>());
+  for (const PlacedView& view : views) bounds.add(floor_from_world * centre_in_world(view.cam_from_world));
+  // Whole cells, with one of margin.
+  grid.origin_x = (std::floor(bounds.x0 / grid.cell) - 1) * grid.cell;
+  grid.origin_y = (std::floor(bounds.y0 / grid.cell) - 1) * grid.cell;
+  const int width = static_cast<int>(std::floor((bounds.x1 - grid.origin_x) / grid.cell)) + 2;
+  const int height = static_cast<int>(std::floor((bounds.y1 - grid.origin_y) / grid.cell)) + 2;
+  grid.cells = Image<uint8_t>(width, height, OccupancyGrid::kUnknown);
+
+  FreeSpace free_space(&grid, options);
+  for (const PlacedView& view : views) free_space.add(view, camera);
+  Image<int> obstacles(width, height), floor(width, height);
+  for (const Eigen::Vector3f& v : mesh.vertices) {
+    const Eigen::Vector3d p = floor_from_world * v.cast<double>();
+    const int x = static_cast<int>(std::floor((p.x() - grid.origin_x) / grid.cell));
+    const int y = height - 1 - static_cast<int>(std::floor((p.y() - grid.origin_y) / grid.cell));
+    if (p.z() >= options.obstacle_low && p.z() <= options.obstacle_high) ++obstacles(x, y);
+    if (std::abs(p.z()) < options.obstacle_low) ++floor(x, y);
+  }
+  for (size_t i = 0; i < grid.cells.size(); ++i)
+    if (obstacles.data()[i] >= options.obstacle_voxels)
+      grid.cells.data()[i] = OccupancyGrid::kOccupied;
+    else if (floor.data()[i] > 0)
+      grid.cells.data()[i] = OccupancyGrid::kFree;
+  return grid;
+}
+
+std::string occupancy_pgm(const OccupancyGrid& grid) {
+  std::string bytes = fmt::format("P5\n{} {}\n255\n", grid.cells.width(), grid.cells.height());
+  bytes.append(reinterpret_cast<const char*>(grid.cells.data()), grid.cells.size());
+  return bytes;
+}
+
+std::string occupancy_yaml(const OccupancyGrid& grid, const std::string& image) {
+  const Eigen::Vector3d& t = grid.floor_from_world.translation;
+  const Eigen::Quaterniond& q = grid.floor_from_world.rotation;
+  return fmt::format(
+      "image: {}\n"
+      "mode: trinary\n"
+      "resolution: {:g}\n"
+      "origin: [{:.4f}, {:.4f}, 0.0]\n"
+      "negate: 0\n"
+      "occupied_thresh: 0.65\n"
+      "free_thresh: 0.196\n"
+      "# Map frame (z up, z = 0 on the floor) from the world of trajectory.txt: x y z qx qy qz qw\n"
+      "floor_from_world: [{:.6f}, {:.6f}, {:.6f}, {:.7f}, {:.7f}, {:.7f}, {:.7f}]\n",
+      image, grid.cell, grid.origin_x, grid.origin_y, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+}  // namespace dkb
