@@ -85,14 +85,15 @@ void draw_panel(const BarPanel& chart, size_t systems, const std::string& unit, 
 
 std::string bar_panels_svg(const std::string& title, const std::string& unit, const std::vector<std::string>& systems,
                            const std::vector<BarPanel>& panels) {
-  constexpr double kWidth = 960, kSide = 385, kTall = 190, kStep = 268;
+  constexpr double kWidth = 960, kWhole = 855, kSide = 385, kTall = 190, kStep = 268;
   std::vector<std::pair<const char*, std::string>> legend;
   for (size_t s = 0; s < systems.size(); ++s) legend.emplace_back(colour_of(s), systems[s]);
   std::string body = svg::label(70, 34, "start", 18, svg::kInk, title, " font-weight=\"bold\"");
-  const double top = 52 + draw_legend(legend, 70, 50, 855, &body) + 30;
+  const double top = 52 + draw_legend(legend, 70, 50, kWhole, &body) + 30;
+  const double side = panels.size() == 1 ? kWhole : kSide;
   for (size_t p = 0; p < panels.size(); ++p)
     draw_panel(panels[p], systems.size(), unit, 70 + 470 * static_cast<double>(p % 2),
-               top + kStep * static_cast<double>(p / 2), kSide, kTall, &body);
+               top + kStep * static_cast<double>(p / 2), side, kTall, &body);
   const double rows = static_cast<double>((panels.size() + 1) / 2);
   return svg::opening(kWidth, top + kStep * rows - 20) + body + "</svg>\n";
 }

@@ -24,7 +24,8 @@ struct BarPanel {
   std::string title;
   std::vector<BarGroup> groups;
 };
-// Panels side by side, each with a scale of its own from 0. Values that are not finite are drawn as not measured.
+// Panels two by two, each with a scale of its own from 0; a single one takes the whole width. Values that are not
+// finite are drawn as not measured.
 std::string bar_panels_svg(const std::string& title, const std::string& unit, const std::vector<std::string>& systems,
                            const std::vector<BarPanel>& panels);
 
