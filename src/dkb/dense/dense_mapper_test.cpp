@@ -121,7 +121,9 @@ TEST(DenseMapper, NothingFromNothing) {
 }
 
 TEST(DenseMapper, ViewsFarFromAnyPoseAreLeftOut) {
-  EXPECT_EQ(mapper_with_views(8).build(trajectory(4), 1).views, 6);  // 0.1 s apart: two more within 0.2 s
+  std::vector<TimedPose> poses = trajectory(4);
+  for (TimedPose& p : poses) p.timestamp += 0.05;  // the last is 0.05, 0.15, 0.25 s from views 4, 5, 6
+  EXPECT_EQ(mapper_with_views(8).build(poses, 1).views, 6);
 }
 
 TEST(DenseOptions, SayWhichValueIsWrong) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dense/depth_view.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +18,28 @@ bool on_one_surface(const DepthImage& depth, int x, int y, float fraction) {
 }
 
 }  // namespace
+
+Image<float> facing(const DepthView& view, const ViewCamera& camera) {
+  constexpr int kReach = 3;  // [px] of the view
+  Image<float> result(view.depth.width(), view.depth.height());
+  const auto point = [&](int x, int y) {
+    return (static_cast<double>(view.metres(x, y)) * camera.ray(x, y)).cast<float>().eval();
+  };
+  for (int y = 0; y < result.height(); ++y)
+    for (int x = 0; x < result.width(); ++x) {
+      if (view.depth(x, y) == 0) continue;
+      // From the left to the right and from above to below, or as much of it as there is.
+      const int left = x >= kReach && view.depth(x - kReach, y) > 0 ? x - kReach : x;
+      const int right = x + kReach < result.width() && view.depth(x + kReach, y) > 0 ? x + kReach : x;
+      const int above = y >= kReach && view.depth(x, y - kReach) > 0 ? y - kReach : y;
+      const int below = y + kReach < result.height() && view.depth(x, y + kReach) > 0 ? y + kReach : y;
+      if (left == right || above == below) continue;
+      const Eigen::Vector3f normal = (point(right, y) - point(left, y)).cross(point(x, below) - point(x, above));
+      const float length = normal.norm();
+      if (length > 0) result(x, y) = std::abs(normal.dot(camera.ray(x, y).cast<float>())) / length;
+    }
+  return result;
+}
 
 DepthViewMaker::DepthViewMaker(const CameraModel& camera, const DenseOptions& options)
     : camera_(camera), options_(options) {

@@ -34,6 +34,11 @@ struct ViewCamera {
   Eigen::Vector3d ray(int x, int y) const { return {(x - cx) / fx, (y - cy) / fy, 1}; }
 };
 
+// How directly a view looks at its surfaces: |normal . ray| per pixel, for rays with unit depth and unit normals from
+// the depths 3 pixels around. So (measured - z) times this is the distance of a point at depth z from the surface's
+// tangent plane. 0 where the normal is not known.
+Image<float> facing(const DepthView& view, const ViewCamera& camera);
+
 // Makes views from images. Deterministic.
 class DepthViewMaker {
  public:

@@ -51,7 +51,7 @@ TEST(OccupancyGrid, RaysMakeCellsFreeUpToWhatTheyHit) {
   const PlacedView placed{&view, pose.inverse()};
   const OccupancyGrid grid = make_occupancy_grid(mesh, {&placed, 1}, camera, {}, {});
   EXPECT_EQ(cell_at(grid, 2.01, 0.01), OccupancyGrid::kOccupied);
-  for (double x = 0.1; x < 1.9; x += 0.1) EXPECT_EQ(cell_at(grid, x, 0.01), OccupancyGrid::kFree) << x;
+  for (double x = 0.1; x < 1.9; x += 0.1) EXPECT_EQ(cell_at(grid, x, -0.01), OccupancyGrid::kFree) << x;
 }
 
 TEST(OccupancyGrid, FilesAreReadBackAsMapServerDoes) {

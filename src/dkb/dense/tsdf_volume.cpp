@@ -72,9 +72,9 @@ std::vector<VoxelIndex> blocks_to_fuse(std::span<const PlacedView> views, const 
 // What the views say of one block.
 class BlockFuser {
  public:
-  BlockFuser(std::span<const PlacedView> views, const ViewCamera& camera, const SensorNoise& noise,
-             const DenseOptions& options)
-      : views_(views), camera_(camera), options_(options) {
+  BlockFuser(std::span<const PlacedView> views, std::span<const Image<float>> facings, const ViewCamera& camera,
+             const SensorNoise& noise, const DenseOptions& options)
+      : views_(views), facings_(facings), camera_(camera), options_(options) {
     const double nearest = sigma(noise, 0.4);
     for (size_t i = 0; i < weight_of_depth_.size(); ++i) {
       const double s = nearest / sigma(noise, static_cast<double>(i) * kWeightStep);
@@ -91,7 +91,8 @@ class BlockFuser {
     const Eigen::Vector3d centre = first + Eigen::Vector3d::Constant(0.5 * (side - options_.voxel));
     for (size_t v = 0; v < views_.size(); ++v)
       if (visible(rotations_[v] * centre + views_[v].cam_from_world.translation))
-        add_view(*views_[v].view, rotations_[v], rotations_[v] * first + views_[v].cam_from_world.translation);
+        add_view(*views_[v].view, facings_[v], rotations_[v],
+                 rotations_[v] * first + views_[v].cam_from_world.translation);
     for (size_t i = 0; i < sums_.size(); ++i) block->voxels[i] = result(sums_[i]);
   }
 
@@ -100,7 +101,8 @@ class BlockFuser {
     float weight = 0, distance = 0, red = 0, green = 0, blue = 0;
     int hits = 0, seen_through = 0;
   };
-  static constexpr double kWeightStep = 0.05;  // [m]
+  static constexpr double kWeightStep = 0.05;   // [m]
+  static constexpr float kLeastFacing = 0.15F;  // depths of surfaces seen at a flatter angle are not worth much
 
   // Of one depth on a flat wall: what edges and registration add is left out here or averages out.
   static double sigma(const SensorNoise& noise, double z) {
@@ -119,7 +121,8 @@ class BlockFuser {
            !outside(centre.y(), camera_.fy, camera_.cy, camera_.height);
   }
 
-  void add_view(const DepthView& view, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& first) {
+  void add_view(const DepthView& view, const Image<float>& facing_of, const Eigen::Matrix3d& rotation,
+                const Eigen::Vector3d& first) {
     const Eigen::Vector3f step_x = (rotation.col(0) * options_.voxel).cast<float>();
     const auto fx = static_cast<float>(camera_.fx), fy = static_cast<float>(camera_.fy);
     const auto cx = static_cast<float>(camera_.cx + 0.5), cy = static_cast<float>(camera_.cy + 0.5);
@@ -141,8 +144,8 @@ class BlockFuser {
           const int x = static_cast<int>(u), y = static_cast<int>(v);
           const float measured = view.metres(x, y);
           if (measured == 0) continue;
-          const float distance = measured - z;
-          if (distance < -truncation) continue;
+          const float distance = (measured - z) * facing_of(x, y);
+          if (facing_of(x, y) < kLeastFacing || distance < -truncation) continue;
           if (distance > truncation) {
             sums->seen_through += distance > 1.5F * truncation ? 1 : 0;
             continue;
@@ -173,6 +176,7 @@ class BlockFuser {
   }
 
   std::span<const PlacedView> views_;
+  std::span<const Image<float>> facings_;
   ViewCamera camera_;
   DenseOptions options_;
   std::vector<Eigen::Matrix3d> rotations_;
@@ -197,9 +201,11 @@ TsdfVolume TsdfVolume::fuse(std::span<const PlacedView> views, const ViewCamera&
     while (volume.table_[slot] >= 0) slot = (slot + 1) & mask;
     volume.table_[slot] = static_cast<int32_t>(i);
   }
+  std::vector<Image<float>> facings;
+  for (const PlacedView& v : views) facings.push_back(facing(*v.view, camera));
   std::atomic<size_t> next{0};
   const auto work = [&] {
-    BlockFuser fuser(views, camera, noise, options);
+    BlockFuser fuser(views, facings, camera, noise, options);
     for (size_t i = next++; i < volume.blocks_.size(); i = next++) fuser.fuse(&volume.blocks_[i]);
   };
   std::vector<std::thread> helpers;

@@ -22,7 +22,7 @@ struct VoxelIndex {
 };
 
 struct Voxel {
-  float distance = 0;  // [m] to the nearest surface along the views' axes, positive on the side that was seen through
+  float distance = 0;  // [m] to the nearest surface, positive on the side that was seen through
   Rgb colour;
   bool known = false;  // enough views agree that a still surface is near
 };
