@@ -137,6 +137,13 @@ std::vector<std::string> sweep_sentences(const Results& results) {
   size_t exceed = 0;
   for (const SweepResult& r : results.sweep) {
     exceed += r.exceeds_noise;
+    if (r.p_value == 1 && r.spread == 0) {
+      sentences.push_back(
+          fmt::format("{}: every value gives the same medians over {} runs: there is nothing to choose "
+                      "by here.",
+                      r.sequence, r.runs));
+      continue;
+    }
     std::string text = fmt::format(
         "{}: the medians over {} runs lie {:.2f} mm apart ({:.1f}% of the smallest), while their own 95% intervals "
         "are ",
