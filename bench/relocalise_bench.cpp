@@ -52,7 +52,13 @@ class Reference {
     }
     if (!fs::exists(folder / "groundtruth.txt")) return;
     truth_ = read_trajectory(folder / "groundtruth.txt");
-    map_from_truth_ = evaluate(truth_, run).truth_from_estimate.motion.inverse();
+    const Evaluation evaluation = evaluate(truth_, run);
+    map_from_truth_ = evaluation.truth_from_estimate.motion.inverse();
+    // The tracked body need not be the camera: what turns it is the mean over the run.
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < evaluation.truth.size(); ++i)
+      turn += vector_from_rotation(evaluation.truth[i].rotation.conjugate() * evaluation.estimate[i].rotation);
+    body_from_cam_.rotation = rotation_from_vector(turn / static_cast<double>(evaluation.truth.size()));
   }
   bool mapped(double stamp) const { return run_.contains(stamp); }
   std::optional<Rigid3> at(double stamp) const {
@@ -61,13 +67,13 @@ class Reference {
       return p.timestamp < wanted - 0.005;
     });
     if (after == truth_.end() || after->timestamp > stamp + 0.005) return std::nullopt;
-    return map_from_truth_ * after->world_from_cam;
+    return map_from_truth_ * after->world_from_cam * body_from_cam_;
   }
 
  private:
   std::map<double, Rigid3> run_;
   Trajectory truth_;
-  Rigid3 map_from_truth_;
+  Rigid3 map_from_truth_, body_from_cam_;
 };
 
 struct Score {

@@ -480,5 +480,57 @@ TEST(Map, TheRootIsTheEndOfTheWayUp) {
   EXPECT_THROW(map.root(10), std::logic_error);
 }
 
+TEST(Map, KeyframesWithoutAParentAreTheRoots) {
+  ThreeKeyframes m;
+  EXPECT_EQ(m.map.roots(), std::vector<KeyframeId>{0});
+  Keyframe apart = keyframe_at(3, 0);
+  apart.parent = kNoKeyframe;
+  m.map.add_keyframe(apart);
+  m.map.add_keyframe(keyframe_at(4, 1));
+  EXPECT_EQ(m.map.roots(), (std::vector<KeyframeId>{0, 3}));
+  EXPECT_EQ(m.map.root(4), 3);
+  m.map.cull_keyframe(3);
+  EXPECT_NE(m.map.live_keyframe(3), nullptr) << "a root stays";
+  EXPECT_TRUE(Map().roots().empty());
+}
+
+TEST(Map, ASessionThatBeginsFindsItsKeyframesBeforeFrameZero) {
+  Map map;
+  for (KeyframeId id = 0; id < 3; ++id) {
+    Keyframe k = keyframe_at(id, id);
+    k.frame = 10 * id + 4;
+    map.add_keyframe(k);
+  }
+  map.date_back();
+  EXPECT_EQ(map.keyframe(0)->frame, -21);
+  EXPECT_EQ(map.keyframe(1)->frame, -11);
+  EXPECT_EQ(map.keyframe(2)->frame, -1);
+}
+
+TEST(Map, AnAppendedMapIsAMapOfItsOwnWithNamesOfItsOwn) {
+  ThreeKeyframes first, second;
+  second.map.fuse(second.b, second.a);
+  first.map.append(second.map);
+  const Map& both = first.map;
+  EXPECT_EQ(both.keyframe_count(), 6);
+  EXPECT_EQ(both.roots(), (std::vector<KeyframeId>{0, 3}));
+  EXPECT_EQ(both.keyframe(4)->parent, 3);
+  EXPECT_EQ(both.point_count(), 4U + 3U);
+  EXPECT_EQ(both.resolve(make_point_id(3, 1)), make_point_id(3, 0)) << "fusions are renamed as well";
+  EXPECT_EQ(both.point(make_point_id(3, 0))->observations.size(), 3U);
+  EXPECT_EQ(both.keyframe(3)->frame, both.keyframe(0)->frame + 1);
+  EXPECT_EQ(broken_invariant(both), "");
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    Map a = test::random_map(seed, 8, 40, 10);
+    const Map b = test::random_map(seed + 100, 6, 40, 10);
+    const size_t points = a.point_count() + b.point_count();
+    a.append(b);
+    ASSERT_EQ(broken_invariant(a), "") << seed;
+    EXPECT_EQ(a.point_count(), points);
+    EXPECT_EQ(a.live_keyframe_count() - b.live_keyframe_count(),
+              test::random_map(seed, 8, 40, 10).live_keyframe_count());
+  }
+}
+
 }  // namespace
 }  // namespace dkb

@@ -177,7 +177,7 @@ KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen,
   k.cam_from_world = random_pose(random);
   k.points.assign(k.features->size(), kNoPoint);
   if (k.id > 0) {
-    k.parent = any_live_keyframe(map, random);
+    if (random.below(8) != 0) k.parent = any_live_keyframe(map, random);  // else it starts a map that is not joined
     // Points of the newest keyframes, each at one feature; what was fused or removed by now comes along too.
     std::vector<PointId> near;
     for (KeyframeId n = std::max(0, k.id - 4); n < k.id; ++n)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/map_merge.h"
 
+#include <algorithm>
+
 #include "dkb/loop/global_adjustment.h"
 #include "dkb/loop/loop_closer.h"
 #include "dkb/mapping/local_mapper.h"
@@ -19,7 +21,9 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
     return false;
   };
   LocalMapper mapper(optics.camera, optics.noise, optics.scale_factor, optics.levels, options.mapping, std::move(both));
-  LoopCloser closer(optics, options.loop_closing.loop, options.seed);
+  LoopOptions loop = options.loop_closing.loop;
+  loop.least_support = std::min(loop.least_support, second.live_keyframe_count() - 1);  // short maps have few witnesses
+  LoopCloser closer(optics, loop, options.seed);
   // The second map's keyframes one by one, as if its camera had just come by.
   for (KeyframeId id = first.keyframe_count(); id < mapper.map().keyframe_count(); ++id) {
     const auto correction = closer.process(mapper.map(), id);

@@ -99,12 +99,16 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("tracking.relocalisation.radius_fine", &r.radius_fine, "[px] second search");
   s.bind("tracking.relocalisation.least_inliers", &r.least_inliers, "points that the final pose rests on");
   s.bind("tracking.relocalisation.least_share", &r.least_share, "of well-known points in view that must be found");
-  s.bind("tracking.relocalisation.most_see_through", &r.most_see_through,
-         "share of these that may stand before what is seen there");
+  s.bind("tracking.relocalisation.least_alike", &r.least_alike, "share of these that must look as they did");
+  s.bind("tracking.relocalisation.least_alike_far", &r.least_alike_far,
+         "the same where the camera cannot have come to");
+  s.bind("tracking.relocalisation.reach", &r.reach, "[m] from where it was lost to there ...");
+  s.bind("tracking.relocalisation.reach_per_second", &r.reach_per_second, "[m/s] ... and its growth with time");
   s.bind("tracking.relocalisation.largest_position_sd", &r.largest_position_sd,
          "[m] standard deviation of the camera's place");
   s.bind("tracking.relocalisation.ambiguity", &r.ambiguity,
-         "a pose elsewhere with this share of the inliers makes both worthless");
+         "share of the most inliers that makes a pose elsewhere a rival ...");
+  s.bind("tracking.relocalisation.clear_lead", &r.clear_lead, "... unless it looks less alike by this share");
   s.bind("tracking.local_map.voted_keyframes", &t.local_map.voted_keyframes,
          "keyframes that share most points with the frame");
   s.bind("tracking.local_map.neighbours_of_each", &t.local_map.neighbours_of_each,

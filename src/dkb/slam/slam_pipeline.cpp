@@ -137,9 +137,7 @@ void SlamSystem::Impl::weigh_evidence() {
   std::sort(matched.begin(), matched.end());
   const DepthImage& depth = image_->depth;
   tracker_->visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double z) {
-    // The table undoes the distortion at image pixels; its negative at the ideal pixel is near enough for cells.
-    const Eigen::Vector2f ideal = pixel.cast<float>();
-    const Eigen::Vector2f at = 2 * ideal - undistort_(ideal.x(), ideal.y());
+    const Eigen::Vector2f at = image_pixel(pixel);
     if (!scene_.mask.at(at.x(), at.y())) return;
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) return;
@@ -153,6 +151,25 @@ void SlamSystem::Impl::weigh_evidence() {
 // Detections that came after their keyframe: what it made on movers goes.
 void SlamSystem::Impl::retract_late() {
   for (const LateMask& late : dynamics_.take_late_masks())
+// By what a descriptor differs from the image where it should be found. Two random descriptors differ by 128 bits.
+std::optional<bool> SlamSystem::Impl::looks_the_same(const Eigen::Vector2d& pixel, double depth, int octave,
+                                                     const Descriptor& descriptor) {
+  constexpr int kSameBits = 80, kOtherBits = 100;
+  constexpr double kDepthGate = 0.07;  // [1] relative
+  const Eigen::Vector2f at = image_pixel(pixel);
+  const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+  if (!image_->depth.contains(x, y) || !(image_->depth(x, y) > 0)) return std::nullopt;
+  const double seen = image_->depth(x, y);
+  if (seen < (1 - kDepthGate) * depth) return std::nullopt;  // something stands before it
+  if (seen > (1 + kDepthGate) * depth) return false;         // it is not there
+  if (!describer_is_set_) describer_.set_image(image_->grey);
+  describer_is_set_ = true;
+  const auto bits = describer_.distance(at.x(), at.y(), octave, descriptor);
+  if (!bits) return std::nullopt;
+  if (*bits > kSameBits && *bits < kOtherBits) return std::nullopt;
+  return *bits <= kSameBits;
+}
+
     for (const RecentKeyframe& k : recent_keyframes_) {
       if (k.frame != late.frame) continue;
       std::vector<PointId> points;
@@ -241,12 +258,14 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   extract(image);
   filter_dynamic(image_);
   retract_late();
+  describer_is_set_ = false;
   const auto features_at = [&](const Vector6d& velocity) {
     RgbdFeatures features = make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth);
     for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
     return std::make_shared<const RgbdFeatures>(std::move(features));
   };
-  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, !localise_only_);
+  TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, !localise_only_,
+                                         [this](const auto&... point) { return looks_the_same(point...); });
   TrackedFrame& frame = outcome.frame;
   report_features(frame);
   const bool has_pose = outcome.state == TrackingState::tracking || outcome.state == TrackingState::relocalised;

@@ -13,7 +13,6 @@ namespace dkb {
 namespace {
 
 constexpr size_t kWellKnownObservers = 3;  // keyframes that see a point which is to be expected in view
-constexpr float kDepthReach = 8.0f;        // [px] around a point where features tell the depth that is seen
 
 bool same_place(const Rigid3& a, const Rigid3& b) {
   return (centre_in_world(a) - centre_in_world(b)).norm() < 0.1 &&
@@ -31,9 +30,13 @@ void RelocalisationOptions::check() const {
   require_option(radius_fine > 0, "radius_fine", radius_fine, "greater than 0 px");
   require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
   require_option(least_share >= 0 && least_share <= 1, "least_share", least_share, "0 ... 1");
-  require_option(most_see_through >= 0 && most_see_through <= 1, "most_see_through", most_see_through, "0 ... 1");
+  require_option(least_alike >= 0 && least_alike <= 1, "least_alike", least_alike, "0 ... 1");
   require_option(largest_position_sd > 0, "largest_position_sd", largest_position_sd, "greater than 0 m");
+  require_option(least_alike_far >= 0 && least_alike_far <= 1, "least_alike_far", least_alike_far, "0 ... 1");
   require_option(ambiguity >= 0 && ambiguity <= 1, "ambiguity", ambiguity, "0 ... 1");
+  require_option(clear_lead >= 0 && clear_lead <= 1, "clear_lead", clear_lead, "0 ... 1");
+  require_option(reach >= 0, "reach", reach, "at least 0 m");
+  require_option(reach_per_second >= 0, "reach_per_second", reach_per_second, "at least 0 m/s");
 }
 
 Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
@@ -48,23 +51,26 @@ Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, do
   options_.check();
 }
 
-std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures& features,
-                                              const IgnoresPoint& ignores) const {
-  std::vector<PoseProposal> proposals = propose(map, features, ignores);
-  const auto better = [](const PoseProposal& a, const PoseProposal& b) {
-    return a.verified != b.verified ? a.verified : a.inliers > b.inliers;
-  };
+std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores,
+                                              const LooksTheSame& looks_the_same) const {
+  std::vector<PoseProposal> proposals = propose(map, features, ignores, looks_the_same);
+  int most = 0;
+  for (const PoseProposal& p : proposals) most = std::max(most, p.inliers);
+  std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < options_.ambiguity * most; });
+  // Of look-alike places the true one differs least from what is seen.
+  const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.alike_share() > b.alike_share(); };
   std::stable_sort(proposals.begin(), proposals.end(), better);
   if (proposals.empty() || !proposals.front().verified) return std::nullopt;
   PoseProposal& best = proposals.front();
   for (const PoseProposal& other : proposals)
-    if (!same_place(other.cam_from_world, best.cam_from_world) && other.inliers >= options_.ambiguity * best.inliers)
+    if (!same_place(other.cam_from_world, best.cam_from_world) &&
+        other.alike_share() > best.alike_share() - options_.clear_lead)
       return std::nullopt;
   return std::move(best);
 }
 
 std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeatures& features,
-                                               const IgnoresPoint& ignores) const {
+                                               const IgnoresPoint& ignores, const LooksTheSame& looks_the_same) const {
   std::vector<Descriptor> still;
   for (size_t f = 0; f < features.size(); ++f)
     if (!features.keypoints[f].suspect) still.push_back(features.descriptors[f]);
@@ -80,13 +86,15 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeature
       return shared >= options_.least_matches;
     });
     if (explained) continue;
-    if (auto proposal = propose_from(map, like.id, features, ignores)) proposals.push_back(std::move(*proposal));
+    if (auto proposal = propose_from(map, like.id, features, ignores, looks_the_same))
+      proposals.push_back(std::move(*proposal));
   }
   return proposals;
 }
 
 std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
-                                                      const IgnoresPoint& ignores) const {
+                                                      const IgnoresPoint& ignores,
+                                                      const LooksTheSame& looks_the_same) const {
   PoseProposal proposal;
   proposal.keyframe = keyframe;
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
@@ -96,7 +104,7 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   std::erase_if(around, [&](const Candidate& c) { return ignores(c.id); });
   if (!search(around, options_.radius, features, proposal)) return std::nullopt;
   if (!search(around, options_.radius_fine, features, proposal)) return std::nullopt;
-  verify(map, around, features, proposal);
+  verify(map, around, features, looks_the_same, proposal);
   return proposal;
 }
 
@@ -166,9 +174,10 @@ bool Relocaliser::search(const std::vector<Candidate>& around, double radius, co
   return true;
 }
 
-// What the map would have in view from there must mostly be found, and nothing may be seen through it.
+// What the map would have in view from there must be found, or at least look as it did. In a room that only looks alike
+// most things do, but some are others, and those are told by the points that no feature was matched with.
 void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
-                         PoseProposal& proposal) const {
+                         const LooksTheSame& looks_the_same, PoseProposal& proposal) const {
   std::vector<PointId> matched;
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
@@ -176,30 +185,28 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, c
   std::vector<uint8_t> visible(around.size(), 0);
   match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
                       &visible);
+  const Eigen::Vector3d centre = centre_in_world(proposal.cam_from_world);
   for (size_t i = 0; i < around.size(); ++i) {
-    if (!visible[i] || map.point(around[i].id)->observations.size() < kWellKnownObservers) continue;
+    const Candidate& c = around[i];
+    if (!visible[i] || map.point(c.id)->observations.size() < kWellKnownObservers) continue;
     ++proposal.well_known;
-    if (std::binary_search(matched.begin(), matched.end(), around[i].id)) {
+    if (std::binary_search(matched.begin(), matched.end(), c.id)) {
       ++proposal.found;
-      ++proposal.with_depth;
+      ++proposal.alike;
       continue;
     }
-    const Eigen::Vector3d in_cam = proposal.cam_from_world * around[i].position;
-    const Eigen::Vector2f at = camera_.project(in_cam).cast<float>();
-    int seen = 0, behind = 0;
-    features.grid.for_each_near(at.x(), at.y(), kDepthReach, [&](int f) {
-      const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
-      if (!(k.depth > 0) || k.suspect) return;
-      ++seen;
-      behind += k.depth > in_cam.z() + 3 * noise_.depth_sigma(k.depth);
-    });
-    proposal.with_depth += seen > 0;
-    proposal.see_through += seen > 0 && behind == seen;
+    if (!looks_the_same) continue;
+    const Eigen::Vector3d in_cam = proposal.cam_from_world * c.position;
+    const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
+    const int octave =
+        std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(scale_factor_))), 0, levels_ - 1);
+    const auto same = looks_the_same(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
+    if (!same) continue;
+    ++(*same ? proposal.alike : proposal.changed);
   }
-  proposal.verified = proposal.inliers >= options_.least_inliers &&
-                      proposal.found >= options_.least_share * proposal.well_known &&
-                      proposal.see_through <= options_.most_see_through * proposal.with_depth &&
-                      proposal.position_sd <= options_.largest_position_sd;
+  proposal.verified =
+      proposal.inliers >= options_.least_inliers && proposal.found >= options_.least_share * proposal.well_known &&
+      proposal.alike_share() >= options_.least_alike && proposal.position_sd <= options_.largest_position_sd;
 }
 
 }  // namespace dkb

@@ -14,6 +14,9 @@ namespace {
 
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
+// What the camera may do from one frame to the next; beyond it is taken as lost and sought.
+constexpr double kLongestStep = 0.5;  // [m]
+constexpr double kLargestTurn = 0.5;  // [rad]
 
 }  // namespace
 
@@ -90,12 +93,18 @@ Rigid3 Tracker::take_view(MapView view) {
   std::erase_if(retracted_, [&](PointId id) {
     return view_->keyframe(birth_keyframe(id)) != nullptr && view_->point(id) == nullptr;
   });
+  if (sighting_) express_anew(*sighting_);
   if (!last_) return {};
-  const Rigid3 moved = last_->cam_from_reference * keyframe_pose(last_->reference);
-  const Rigid3 new_world_from_old = moved.inverse() * last_->cam_from_world;
-  last_->cam_from_world = moved;
+  return express_anew(*last_);
+}
+
+// A frame's pose and points by the view as it is now; how the world moved under its camera.
+Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
+  const Rigid3 moved = frame.cam_from_reference * keyframe_pose(frame.reference);
+  const Rigid3 new_world_from_old = moved.inverse() * frame.cam_from_world;
+  frame.cam_from_world = moved;
   std::set<PointId> seen;  // two features may show points that have been fused since: the first keeps it
-  for (PointId& p : last_->points) {
+  for (PointId& p : frame.points) {
     if (p != kNoPoint && !provisional_.contains(p)) p = view_->resolve(p);
     if (p != kNoPoint && !seen.insert(p).second) p = kNoPoint;
   }
@@ -362,21 +371,55 @@ bool Tracker::track_from_last(TrackedFrame& frame) {
   if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
   if (!pose && view_->live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
-    auto near =
-        relocaliser_.propose_from(*view_, last_->reference, features, [this](PointId id) { return is_retracted(id); });
+    auto near = relocaliser_.propose_from(*view_, last_->reference, features,
+                                          [this](PointId id) { return is_retracted(id); }, {});
     if (!near) return false;
+    const Rigid3 step = near->cam_from_world * last_->cam_from_world.inverse();
+    if (step.translation.norm() > kLongestStep || vector_from_rotation(step.rotation).norm() > kLargestTurn)
+      return false;
     pose = near->cam_from_world;
     points = std::move(near->points);
   }
   return pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
 }
 
-bool Tracker::relocalise(TrackedFrame& frame) {
-  auto found = relocaliser_.find(*view_, *frame.features, [this](PointId id) { return is_retracted(id); });
+// Rooms that look alike are told apart by where the camera can have come to.
+bool Tracker::within_reach(const PoseProposal& found, double timestamp) const {
+  if (!last_) return true;
+  if (root(last_->reference) != root(found.keyframe)) return false;
+  const RelocalisationOptions& o = options_.relocalisation;
+  const double way = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
+  return way <= o.reach + o.reach_per_second * (timestamp - last_->timestamp);
+}
+
+bool Tracker::relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same) {
+  auto found = relocaliser_.find(
+      *view_, *frame.features, [this](PointId id) { return is_retracted(id); }, looks_the_same);
   if (!found) return false;
+  if (!within_reach(*found, frame.timestamp) && found->alike_share() < options_.relocalisation.least_alike_far)
+    return false;
   candidates_made_ = -1;
   return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.least_inliers,
                          found->points, frame);
+}
+
+bool Tracker::is_step_from_last(const TrackedFrame& frame) const {
+  if (!last_ || last_->index + 1 != frame.index || state_ == TrackingState::lost) return false;
+  const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
+  return step.translation.norm() <= kLongestStep && vector_from_rotation(step.rotation).norm() <= kLargestTurn;
+}
+
+// The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
+// rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
+bool Tracker::confirm_sighting(TrackedFrame& frame) {
+  if (!sighting_) return false;
+  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(sighting_, std::nullopt));
+  state_ = TrackingState::tracking;
+  candidates_made_ = -1;
+  if (last_->index + 1 == frame.index && track_from_last(frame)) return true;
+  last_ = std::move(before_loss);
+  state_ = TrackingState::lost;
+  return false;
 }
 
 // A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight.
@@ -394,7 +437,8 @@ bool Tracker::start_map(TrackedFrame& frame) {
   return true;
 }
 
-TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map) {
+TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map,
+                            const LooksTheSame& looks_the_same) {
   TrackOutcome outcome;
   TrackedFrame& frame = outcome.frame;
   frame.index = index;
@@ -406,12 +450,24 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   frame.odometry.assign(n, std::nullopt);
 
   const bool has_map = state_ != TrackingState::initialising;
-  const bool followed = has_map && track_from_last(frame);
-  const bool found_again = has_map && !followed && relocalise(frame);
+  bool followed = has_map && track_from_last(frame);
+  bool found_again = has_map && !followed && confirm_sighting(frame);
+  if (has_map && !followed && !found_again && relocalise(frame, looks_the_same)) {
+    // At once where it is but a step from the frame before; else when the next frame agrees.
+    followed = is_step_from_last(frame);
+    found_again = followed;
+    if (!followed) {
+      finish(frame);
+      sighting_ = frame;
+      odometry_.clear();
+      outcome.state = state_ = TrackingState::lost;
+      velocity_.reset();
+      return outcome;
+    }
+  }
   if (!followed && !found_again) {
     if (has_map) state_ = TrackingState::lost;
     velocity_.reset();
-    odometry_.clear();
     outcome.wants_first_keyframe = may_start_map && start_map(frame);
     if (outcome.wants_first_keyframe) {
       state_ = TrackingState::tracking;
@@ -422,13 +478,14 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
     return outcome;
   }
   lost_frames_ = 0;
-  if (found_again || !last_ || timestamp <= last_->timestamp) {
+  sighting_.reset();
+  if (!last_ || timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {
     // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
     // now. The full half would carry the noise of both steps into every feature.
-    const Vector6d before = velocity_.value_or(velocity_to(frame));
     const Vector6d step = velocity_to(frame);
+    const Vector6d before = velocity_.value_or(step);
     refine_at_velocity(step + kAccelerationShare * (step - before), features_at, frame);
     velocity_ = velocity_to(frame);
   }
@@ -439,94 +496,6 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   last_ = frame;
   odometry_.remember(frame);
   return outcome;
-}
-
-void Tracker::take_reports(KeyframePacket& packet) {
-  for (auto& [point, sighting] : sightings_) {
-    sighting.point = point;
-    packet.sightings.push_back(sighting);
-  }
-  sightings_.clear();
-  packet.retracted = std::exchange(unreported_, {});
-}
-
-KeyframePacket Tracker::make_report() {
-  KeyframePacket packet;
-  take_reports(packet);
-  return packet;
-}
-
-bool Tracker::is_retracted(PointId id) const {
-  return std::binary_search(retracted_.begin(), retracted_.end(), id);
-}
-
-void Tracker::retract(const std::vector<PointId>& points) {
-  for (PointId id : points) {
-    const auto at = std::lower_bound(retracted_.begin(), retracted_.end(), id);
-    if (at != retracted_.end() && *at == id) continue;
-    retracted_.insert(at, id);
-    unreported_.push_back(id);
-    provisional_.erase(id);
-    if (last_)
-      for (PointId& p : last_->points)
-        if (p == id) p = kNoPoint;
-  }
-}
-
-void Tracker::visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const {
-  if (!last_) return;
-  const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
-    const Eigen::Vector3d p = last_->cam_from_world * world;
-    if (p.z() < 0.1) return;
-    const Eigen::Vector2d pixel = camera_.project(p);
-    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height)
-      visit(id, pixel, p.z());
-  };
-  for (const Candidate& c : candidates_)
-    if (!is_retracted(c.id)) offer(c.id, c.position);
-  for (const auto& [id, p] : provisional_) offer(id, *position(id));
-}
-
-KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) {
-  KeyframePacket packet;
-  packet.id = id;
-  packet.frame = frame.index;
-  packet.timestamp = frame.timestamp;
-  packet.features = frame.features;
-  packet.reference = frame.reference;
-  packet.cam_from_reference = frame.reference == kNoKeyframe ? frame.cam_from_world : frame.cam_from_reference;
-  packet.points = frame.points;
-
-  std::vector<std::pair<float, int>> by_depth;
-  for (size_t f = 0; f < frame.points.size(); ++f) {
-    const float z = frame.features->keypoints[f].depth;
-    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f]) by_depth.emplace_back(z, static_cast<int>(f));
-  }
-  std::sort(by_depth.begin(), by_depth.end());
-  for (const auto& [z, f] : by_depth) {
-    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.least_new_points) break;
-    const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
-    ProvisionalPoint p;
-    p.id = make_point_id(id, f);
-    p.keyframe = id;
-    p.feature = f;
-    p.point_in_keyframe = camera_.unproject(k.pixel.cast<double>(), z);
-    p.scale = static_cast<float>(std::pow(scale_factor_, k.octave));
-    p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
-    packet.new_points.push_back(p);
-  }
-  take_reports(packet);
-
-  pending_.push_back({id, packet.reference, packet.cam_from_reference});
-  for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
-  if (last_ && last_->index == frame.index) {
-    for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
-    odometry_.drop_mapped(*last_);
-    last_->reference = id;  // from here on the frame hangs on its own keyframe
-    last_->cam_from_world = frame.cam_from_world;
-    last_->cam_from_reference = {};
-  }
-  return packet;
 }
 
 }  // namespace dkb

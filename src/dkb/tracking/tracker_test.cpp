@@ -207,6 +207,7 @@ TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
   black = true;
   track({});
   black = false;
+  track(on_path(6));
   o = track(on_path(6));
   ASSERT_EQ(o.state, TrackingState::relocalised);
   EXPECT_FALSE(shows_a_retracted_one()) << "found again";
@@ -264,6 +265,7 @@ TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
   }
   black = false;
   const Rigid3 elsewhere = on_path(12);
+  EXPECT_EQ(track(on_path(11), kNoisy).state, TrackingState::lost) << "it has to be confirmed";
   TrackOutcome o = track(elsewhere, kNoisy);
   EXPECT_EQ(o.state, TrackingState::relocalised);
   EXPECT_LT(distance_between(o.frame.cam_from_world, elsewhere), 0.015);
@@ -290,6 +292,7 @@ TEST_F(TrackerTest, LostBeforeTheFirstMapArrivesItWaitsForIt) {
   black = false;
   EXPECT_EQ(track({}).state, TrackingState::lost);
   publish(packet);
+  EXPECT_EQ(track({}).state, TrackingState::lost) << "found, and yet to be confirmed";
   EXPECT_EQ(track({}).state, TrackingState::relocalised);
 }
 
@@ -440,6 +443,7 @@ TEST_F(TrackerTest, AfterAResetOfMotionTheFrameIsFoundAnew) {
   publish(start(on_path(0)));
   track(on_path(1));
   tracker.reset_motion();
+  track(on_path(7));
   const TrackOutcome o = track(on_path(8));
   EXPECT_EQ(o.state, TrackingState::relocalised);
   EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(8)), 1e-4);
@@ -464,6 +468,60 @@ TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
   }
 }
 
+TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
+  TrackingOptions options;
+  options.new_map_after = 5;
+  tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options, 1);
+  publish(start(on_path(0)));
+  const TrackOutcome last = track(on_path(1));
+  const TestScene home = scene;
+  scene = TestScene(700, 99);
+  black = true;
+  for (int f = 0; f < 20; ++f) EXPECT_EQ(track({}).state, TrackingState::lost) << "the dark starts no map";
+  black = false;
+  for (int f = 0; f < 4; ++f) EXPECT_EQ(track({}).state, TrackingState::lost);
+  TrackOutcome o = track({});
+  ASSERT_EQ(o.state, TrackingState::tracking);
+  EXPECT_TRUE(o.wants_first_keyframe);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, last.frame.cam_from_world), 1e-12) << "where it was seen last";
+  const KeyframePacket packet = insert(o.frame);
+  EXPECT_EQ(packet.reference, kNoKeyframe);
+  EXPECT_EQ(tracker.root(1), 1);
+  EXPECT_EQ(track(on_path(1)).state, TrackingState::tracking) << "on provisional points";
+  publish(packet);
+  EXPECT_EQ(map.roots(), (std::vector<KeyframeId>{0, 1}));
+  o = track(on_path(2));
+  EXPECT_EQ(o.state, TrackingState::tracking);
+  EXPECT_EQ(tracker.root(o.frame.reference), 1);
+  scene = home;
+  o = track(on_path(2));
+  EXPECT_EQ(o.state, TrackingState::relocalised) << "the old map is not forgotten";
+  EXPECT_EQ(tracker.root(o.frame.reference), 0);
+  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(2)), 1e-4);
+}
+
+TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
+  view = scene.look({});
+  const auto features_at = [&](const Vector6d&) { return view.features; };
+  const TrackOutcome o = tracker.track(0, 0, features_at, false);
+  EXPECT_EQ(o.state, TrackingState::initialising);
+  EXPECT_FALSE(o.wants_first_keyframe);
+  EXPECT_TRUE(tracker.track(1, kFrameTime, features_at).wants_first_keyframe);
+}
+
+TEST_F(TrackerTest, FusedPointsAreShownByOneFeature) {
+  publish(start());
+  const TrackOutcome o = track({});
+  std::vector<PointId> shown;
+  for (PointId p : o.frame.points)
+    if (p != kNoPoint) shown.push_back(p);
+  map.fuse(shown[3], shown[7]);
+  publish();
+  const auto& points = tracker.last_frame()->points;
+  EXPECT_EQ(std::count(points.begin(), points.end(), shown[7]), 1);
+  EXPECT_EQ(std::count(points.begin(), points.end(), shown[3]), 0);
+}
+
 TEST(TrackingOptions, AreChecked) {
   const auto rejects = [](auto change) {
     TrackingOptions options;
@@ -477,6 +535,9 @@ TEST(TrackingOptions, AreChecked) {
   rejects([](auto& o) { o.match_distance = 257; });
   rejects([](auto& o) { o.match_ratio = 1.5; });
   rejects([](auto& o) { o.local_map.keyframes = 0; });
+  rejects([](auto& o) { o.new_map_after = -1; });
+  rejects([](auto& o) { o.relocalisation.candidates = 0; });
+  rejects([](auto& o) { o.relocalisation.least_share = 1.1; });
   EXPECT_NO_THROW(TrackingOptions().check());
 }
 

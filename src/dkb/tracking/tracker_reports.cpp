@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tracking tells mapping.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dkb/tracking/tracker.h"
+
+namespace dkb {
+
+void Tracker::take_reports(KeyframePacket& packet) {
+  for (auto& [point, sighting] : sightings_) {
+    sighting.point = point;
+    packet.sightings.push_back(sighting);
+  }
+  sightings_.clear();
+  packet.retracted = std::exchange(unreported_, {});
+}
+
+KeyframePacket Tracker::make_report() {
+  KeyframePacket packet;
+  take_reports(packet);
+  return packet;
+}
+
+bool Tracker::is_retracted(PointId id) const {
+  return std::binary_search(retracted_.begin(), retracted_.end(), id);
+}
+
+void Tracker::retract(const std::vector<PointId>& points) {
+  for (PointId id : points) {
+    const auto at = std::lower_bound(retracted_.begin(), retracted_.end(), id);
+    if (at != retracted_.end() && *at == id) continue;
+    retracted_.insert(at, id);
+    unreported_.push_back(id);
+    provisional_.erase(id);
+    if (last_)
+      for (PointId& p : last_->points)
+        if (p == id) p = kNoPoint;
+  }
+}
+
+void Tracker::visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const {
+  if (!last_) return;
+  const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
+    const Eigen::Vector3d p = last_->cam_from_world * world;
+    if (p.z() < 0.1) return;
+    const Eigen::Vector2d pixel = camera_.project(p);
+    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height)
+      visit(id, pixel, p.z());
+  };
+  for (const Candidate& c : candidates_)
+    if (!is_retracted(c.id)) offer(c.id, c.position);
+  for (const auto& [id, p] : provisional_) offer(id, *position(id));
+}
+
+KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) {
+  KeyframePacket packet;
+  packet.id = id;
+  packet.frame = frame.index;
+  packet.timestamp = frame.timestamp;
+  packet.features = frame.features;
+  packet.reference = frame.reference;
+  packet.cam_from_reference = frame.reference == kNoKeyframe ? frame.cam_from_world : frame.cam_from_reference;
+  packet.points = frame.points;
+
+  std::vector<std::pair<float, int>> by_depth;
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    const float z = frame.features->keypoints[f].depth;
+    if (z > 0 && frame.points[f] == kNoPoint && !frame.outlier[f]) by_depth.emplace_back(z, static_cast<int>(f));
+  }
+  std::sort(by_depth.begin(), by_depth.end());
+  for (const auto& [z, f] : by_depth) {
+    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.least_new_points) break;
+    const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
+    ProvisionalPoint p;
+    p.id = make_point_id(id, f);
+    p.keyframe = id;
+    p.feature = f;
+    p.point_in_keyframe = camera_.unproject(k.pixel.cast<double>(), z);
+    p.scale = static_cast<float>(std::pow(scale_factor_, k.octave));
+    p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
+    packet.new_points.push_back(p);
+  }
+  take_reports(packet);
+
+  pending_.push_back({id, packet.reference, packet.cam_from_reference});
+  for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
+  if (last_ && last_->index == frame.index) {
+    for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
+    odometry_.drop_mapped(*last_);
+    last_->reference = id;  // from here on the frame hangs on its own keyframe
+    last_->cam_from_world = frame.cam_from_world;
+    last_->cam_from_reference = {};
+  }
+  return packet;
+}
+
+}  // namespace dkb
