@@ -10,7 +10,18 @@
 
 namespace dkb {
 
-DenseOutput::DenseOutput(const SlamSystem& slam) : mapper_(slam.camera(), slam.options().noise, slam.options().dense) {}
+namespace {
+
+DenseOptions options_of(const SlamOptions& options) {
+  DenseOptions dense = options.dense;
+  if (!options.pipeline.threaded) dense.threads = 1;
+  return dense;
+}
+
+}  // namespace
+
+DenseOutput::DenseOutput(const SlamSystem& slam)
+    : mapper_(slam.camera(), slam.options().noise, options_of(slam.options())) {}
 
 void DenseOutput::note(const RgbdImage& image, const FrameResult& result, const SlamSystem& slam) {
   for (const LateMask& late : result.late_masks) mapper_.remove_movers(late.frame, late.mask);
