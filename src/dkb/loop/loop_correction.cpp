@@ -15,7 +15,8 @@ PoseGraphEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points
   e.b_from_a = b_from_a;
   const double length = b_from_a.translation.norm();
   const double position = options.edge_position_sd + options.edge_position_share * length;
-  const double rotation = options.edge_rotation_sd + options.edge_rotation_growth * length;
+  const double rotation = options.edge_rotation_sd + options.edge_rotation_growth * length +
+                          options.edge_rotation_share * vector_from_rotation(b_from_a.rotation).norm();
   // Keyframes that share many points hang together firmly.
   const double share = std::clamp(shared_points / static_cast<double>(options.essential_shared_points), 0.1, 4.0);
   e.information.setZero();

@@ -37,6 +37,7 @@ void LoopOptions::check() const {
   require_option(edge_position_share >= 0, "loop.edge_position_share", edge_position_share, "at least 0");
   require_option(edge_rotation_sd > 0, "loop.edge_rotation_sd", edge_rotation_sd, "greater than 0 rad");
   require_option(edge_rotation_growth >= 0, "loop.edge_rotation_growth", edge_rotation_growth, "at least 0");
+  require_option(edge_rotation_share >= 0, "loop.edge_rotation_share", edge_rotation_share, "at least 0");
   require_option(graph_iterations >= 1, "loop.graph_iterations", graph_iterations, "at least 1");
 }
 

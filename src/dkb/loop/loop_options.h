@@ -46,6 +46,7 @@ struct LoopOptions {
   double edge_position_share = 0.01;    // growth of that with the edge's length, >= 0
   double edge_rotation_sd = 0.002;      // [rad] > 0
   double edge_rotation_growth = 0.004;  // [rad/m] >= 0
+  double edge_rotation_share = 0.02;    // growth of that with the edge's turn: turning images are sheared, >= 0
   int graph_iterations = 20;            // steps of the optimisation, >= 1
 
   void check() const;

@@ -19,6 +19,7 @@ void SlamOptions::check() const {
   adaptive_keyframes.check();
   mapping.check();
   loop_closing.check();
+  readout.check();
   dynamics.check();
   evidence.check();
   movers.check();
@@ -211,6 +212,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("loop.edge_position_share", &l.edge_position_share, "... and its growth with the edge's length");
   s.bind("loop.edge_rotation_sd", &l.edge_rotation_sd, "[rad] the same of the direction");
   s.bind("loop.edge_rotation_growth", &l.edge_rotation_growth, "[rad/m] and its growth");
+  s.bind("loop.edge_rotation_share", &l.edge_rotation_share, "[1] and its growth with the edge's turn");
   s.bind("loop.graph_iterations", &l.graph_iterations, "steps of the pose graph's optimisation");
   s.bind("loop.latency", &o.loop_closing.loop_latency.base, "[frames] from a keyframe's view to its correction ...");
   s.bind("loop.latency_per_keyframe", &o.loop_closing.loop_latency.per_keyframe, "... and its growth with the map");
@@ -221,6 +223,10 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("global_ba.latency_per_keyframe", &o.loop_closing.global_ba_latency.per_keyframe,
          "... and its growth with the map");
   s.bind("global_ba.final", &o.final_ba, "adjust the whole map once more at the end");
+
+  s.bind("readout.estimate", &o.readout.estimate, "learn the rolling shutter's readout where the camera's is unknown");
+  s.bind("readout.step_sd", &o.readout.step_sd, "[s] uncertainty of a step below which it is taken");
+  s.bind("readout.longest", &o.readout.longest, "[s] largest readout believed in");
 
   DynamicsOptions& d = o.dynamics;
   s.bind("dynamics.filter", &d.filter,

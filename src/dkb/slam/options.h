@@ -15,6 +15,7 @@
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/slam/dynamic_stage.h"
 #include "dkb/slam/loop_stage.h"
+#include "dkb/slam/readout_calibration.h"
 #include "dkb/tracking/tracker.h"
 #include "dkb/util/settings.h"
 
@@ -41,6 +42,7 @@ struct SlamOptions {
   BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
   LoopStageOptions loop_closing;
+  ReadoutOptions readout;
   bool final_ba = false;  // adjust the whole map once more at the end
   DynamicsOptions dynamics;
   PointEvidenceOptions evidence;

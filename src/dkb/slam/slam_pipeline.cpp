@@ -42,6 +42,9 @@ void SlamSystem::Impl::start(Map map) {
   feature_reports_.clear();
   scene_ = {};
   evidence_.emplace(options_.evidence);
+  ReadoutOptions readout = options_.readout;
+  readout.estimate = readout.estimate && options_.depth.model_rolling_shutter;
+  readout_.emplace(camera_, options_.noise, orb.scale, readout);
   movers_.emplace(camera_, options_.movers);
   recent_keyframes_.clear();
   statistics_ = {};
@@ -148,9 +151,6 @@ void SlamSystem::Impl::weigh_evidence() {
   tracker_->retract(evidence_->take_convicted());
 }
 
-// Detections that came after their keyframe: what it made on movers goes.
-void SlamSystem::Impl::retract_late() {
-  for (const LateMask& late : dynamics_.take_late_masks())
 // By what a descriptor differs from the image where it should be found. Two random descriptors differ by 128 bits.
 std::optional<bool> SlamSystem::Impl::looks_the_same(const Eigen::Vector2d& pixel, double depth, int octave,
                                                      const Descriptor& descriptor) {
@@ -170,6 +170,9 @@ std::optional<bool> SlamSystem::Impl::looks_the_same(const Eigen::Vector2d& pixe
   return *bits <= kSameBits;
 }
 
+// Detections that came after their keyframe: what it made on movers goes.
+void SlamSystem::Impl::retract_late() {
+  for (const LateMask& late : dynamics_.take_late_masks())
     for (const RecentKeyframe& k : recent_keyframes_) {
       if (k.frame != late.frame) continue;
       std::vector<PointId> points;
@@ -255,12 +258,14 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   result.wait_ms = waiting.ms();
 
   const Stopwatch tracking;
+  describer_is_set_ = false;
   extract(image);
   filter_dynamic(image_);
   retract_late();
-  describer_is_set_ = false;
+  CameraModel camera = camera_;
+  camera.readout = readout_->readout();
   const auto features_at = [&](const Vector6d& velocity) {
-    RgbdFeatures features = make_rgbd_features(orb_, image, camera_, undistort_, velocity, options_.depth);
+    RgbdFeatures features = make_rgbd_features(orb_, image, camera, undistort_, velocity, options_.depth);
     for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
     return std::make_shared<const RgbdFeatures>(std::move(features));
   };
@@ -283,6 +288,7 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
     }
     keep_odometry_smooth(outcome);
     weigh_evidence();
+    readout_->add(frame, tracker_->velocity(), [this](PointId id) { return tracker_->position(id); });
     const Stopwatch deciding;
     const KeyframeDecision decision = decide(outcome);
     times_.add("keyframe_decision", deciding.ms());

@@ -7,6 +7,7 @@
 #include "dkb/features/patch_describer.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/slam_system.h"
 
 namespace dkb {
@@ -19,8 +20,8 @@ class SlamSystem::Impl {
         options_(options),
         undistort_(camera),
         extractor_(options.features),
-        dynamics_(camera, options.dynamics, std::move(detectors)) {
         describer_({.levels = options.features.levels, .scale = options.features.scale}),
+        dynamics_(camera, options.dynamics, std::move(detectors)) {
     camera_.check();
     options_.check();
     start();
@@ -34,9 +35,9 @@ class SlamSystem::Impl {
   SlamOptions options_;
   UndistortionTable undistort_;
   OrbExtractor extractor_;
-  OrbFeatures orb_;                         // of the frame at hand
   PatchDescriber describer_;                // of places without a corner, when a lost camera is sought
   bool describer_is_set_ = false;           // to the frame at hand
+  OrbFeatures orb_;                         // of the frame at hand
   std::shared_ptr<const RgbdImage> image_;  // likewise
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<KeyframePolicy> policy_;
@@ -45,6 +46,7 @@ class SlamSystem::Impl {
   DynamicStage dynamics_;
   DynamicScene scene_;  // of the last frame
   std::optional<PointEvidence> evidence_;
+  std::optional<ReadoutCalibration> readout_;
   std::optional<MoverTracker> movers_;
 
   // A frame of the trajectory hangs on a keyframe, since the world may still move.
@@ -81,22 +83,22 @@ class SlamSystem::Impl {
   void take_view(const MapView& view);
   void extract(const RgbdImage& image);
   void filter_dynamic(std::shared_ptr<const RgbdImage> image);
-  // Index among all extracted features.
-  size_t source_feature(const TrackedFrame& frame, size_t feature) const {
   // The table undoes the distortion at image pixels; its negative at the ideal pixel is near enough.
   Eigen::Vector2f image_pixel(const Eigen::Vector2d& ideal) const {
     return 2 * ideal.cast<float>() - undistort_(static_cast<float>(ideal.x()), static_cast<float>(ideal.y()));
   }
+  // Index among all extracted features.
+  size_t source_feature(const TrackedFrame& frame, size_t feature) const {
     return kept_[frame.source.empty() ? feature : static_cast<size_t>(frame.source[feature])];
   }
   void report_features(const TrackedFrame& frame);
   void weigh_evidence();
   void retract_late();
   std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
-  KeyframeDecision decide(const TrackOutcome& outcome) const;
-  void insert_keyframe(TrackedFrame& frame);
   std::optional<bool> looks_the_same(const Eigen::Vector2d& pixel, double depth, int octave,
                                      const Descriptor& descriptor);
+  KeyframeDecision decide(const TrackOutcome& outcome) const;
+  void insert_keyframe(TrackedFrame& frame);
   void keep_odometry_smooth(const TrackOutcome& outcome);
 };
 

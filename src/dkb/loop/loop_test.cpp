@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "dkb/loop/global_adjustment.h"
+#include "dkb/loop/loop_closer.h"
+#include "dkb/loop/loop_test_world.h"
+#include "dkb/mapping/local_mapper.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using test::OdometryWorld;
+using test::RoundTrip;
+
+LocalMapper mapper_of(const OdometryWorld& world, const Map& map) {
+  return LocalMapper(world.scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, Map(map));
+}
+
+double worst_error(const OdometryWorld& world, const Map& map) {
+  double worst = 0;
+  for (KeyframeId k = 0; k < map.keyframe_count(); ++k) worst = std::max(worst, world.error(map, k));
+  return worst;
+}
+
+TEST(LoopDetection, FindsNothingWhileEverythingIsNew) {
+  RoundTrip world;
+  for (int k = 0; k < RoundTrip::kRound - 10; ++k) {
+    world.go(1);
+    EXPECT_FALSE(find_loop(world.map, k, world.optics(), {}, 1)) << "keyframe " << k;
+  }
+}
+
+TEST(LoopDetection, FindsTheStartAgainAfterARound) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 2);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto found = find_loop(world.map, last, world.optics(), {}, 1);
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->merge);
+  EXPECT_EQ(found->sightings.front().keyframe, last);
+  EXPECT_GE(found->sightings.size(), 3U);
+  EXPECT_LE(found->far_area.front(), 6);
+  const Rigid3 truth = world.truths[static_cast<size_t>(last)];
+  EXPECT_LT(distance_between(found->sightings.front().fit.cam_from_world, truth), 0.05) << "in the world of the start";
+  EXPECT_GT(world.error(world.map, last), 0.1) << "where drift has brought it";
+}
+
+TEST(LoopDetection, KeyframesThatAreConnectedMakeNoLoop) {
+  RoundTrip world;
+  world.go(12);
+  LoopOptions eager;
+  eager.least_keyframes_between = 0;
+  eager.neighbourhood = 8;
+  EXPECT_FALSE(find_loop(world.map, 11, world.optics(), eager, 1));
+}
+
+TEST(LoopCorrection, ClosesTheRoundAndAdjustmentSharpensIt) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 2);
+  LocalMapper mapper = mapper_of(world, world.map);
+  LoopCloser closer(world.optics(), {}, 1);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const double before = worst_error(world, world.map);
+  const auto correction = closer.process(world.map, last);
+  ASSERT_TRUE(correction);
+  EXPECT_EQ(correction->kind, MapCorrection::Kind::loop);
+  const size_t points = world.map.point_count();
+  MapView view = mapper.apply(*correction);
+  EXPECT_LT(worst_error(world, *view), 0.6 * before);
+  EXPECT_LT(world.error(*view, last), 0.05);
+  EXPECT_LT(view->point_count(), points) << "points known twice were fused";
+  EXPECT_TRUE(std::any_of(view->keyframe(last)->covisible.begin(), view->keyframe(last)->covisible.end(),
+                          [](const Covisible& c) { return c.keyframe < 5; }))
+      << "the ends are connected now";
+  EXPECT_FALSE(closer.process(*view, last)) << "a loop is closed once";
+  view = mapper.apply(adjust_globally(*view, world.optics(), {}, {}));
+  EXPECT_LT(worst_error(world, *view), 0.25 * before);
+}
+
+TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 2);
+  LoopCloser closer(world.optics(), {}, 1);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto correction = closer.process(*world.map.snapshot(), last);
+  ASSERT_TRUE(correction);
+  world.go(2);
+  world.map.cull_keyframe(last - 3);
+  Map moved = world.map;
+  move_map(moved, *correction);
+  for (KeyframeId k : {last + 1, last + 2}) {
+    const KeyframeId parent = world.map.keyframe(k)->parent;
+    const Rigid3 before = world.map.cam_from_world(k) * world.map.cam_from_world(parent).inverse();
+    const Rigid3 after = moved.cam_from_world(k) * moved.cam_from_world(parent).inverse();
+    EXPECT_LT((before * after.inverse()).translation.norm(), 1e-9);
+    EXPECT_LT(world.error(moved, k), 0.3 * world.error(world.map, k));
+  }
+  const Keyframe& newest = *world.map.keyframe(last + 2);
+  for (PointId id : newest.points) {
+    if (id == kNoPoint || birth_keyframe(id) != last + 2) continue;
+    const Eigen::Vector3d before = newest.cam_from_world * world.map.point(id)->position;
+    EXPECT_LT((moved.cam_from_world(last + 2) * moved.point(id)->position - before).norm(), 1e-9);
+  }
+  EXPECT_EQ(moved.cam_from_world(0).translation, world.map.cam_from_world(0).translation) << "the first one stays";
+}
+
+// Two rooms with the same pictures, and a corridor with others between them.
+struct Twins : OdometryWorld {
+  static constexpr double kPitch = 7;
+  Twins() : OdometryWorld(1500) {
+    Random random(9);
+    for (size_t i = 0; i < 500; ++i) {
+      scene.points[i] = {random.uniform(-1.5, 2.5), random.uniform(-1.2, 1.2), random.uniform(2.0, 3.0)};
+      scene.points[i + 500] = scene.points[i] + Eigen::Vector3d(kPitch, 0, 0);
+      scene.descriptors[i + 500] = scene.descriptors[i];
+      scene.points[i + 1000] = {random.uniform(2.5, 5.5), random.uniform(-1.2, 1.2), random.uniform(2.0, 3.0)};
+    }
+    for (int k = 0; k < 31; ++k) {
+      const Rigid3 at = TestScene::camera_at({0.3 * k, 0, 0});
+      add(at, at);
+    }
+  }
+};
+
+TEST(LoopDetection, ALookAlikeRoomIsNotTheSameRoom) {
+  const Twins world;
+  LoopOptions credulous;
+  credulous.drift_translation_base = 100;
+  int deceived = 0;
+  for (KeyframeId k = 0; k < world.map.keyframe_count(); ++k) {
+    EXPECT_FALSE(find_loop(world.map, k, world.optics(), {}, 1)) << "keyframe " << k;
+    deceived += find_loop(world.map, k, world.optics(), credulous, 1).has_value();
+  }
+  EXPECT_GT(deceived, 0) << "by looks alone it would be";
+}
+
+TEST(LoopDetection, WaysLeadThroughTheMap) {
+  const Twins world;
+  const auto ways = ways_through_map(world.map, 30);
+  EXPECT_EQ(ways[30], 0);
+  EXPECT_NEAR(ways[0], 9, 1e-6);
+  EXPECT_NEAR(ways[20], 3, 1e-6);
+}
+
+TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
+  RoundTrip world;
+  world.go(12);
+  const Rigid3 other_from_world(rotation_from_vector({0.1, 1.2, -0.3}), {2, -1, 5});
+  for (int k = 12; k < 24; ++k) {  // a second map, of a world of its own, that comes round to the first one's start
+    const Rigid3 truth = RoundTrip::truth_at(k - 20);
+    world.add(truth, truth * other_from_world.inverse(), k == 12);
+  }
+  ASSERT_EQ(world.map.roots().size(), 2U);
+  LoopCloser closer(world.optics(), {}, 1);
+  const auto correction = closer.process(world.map, 23);
+  ASSERT_TRUE(correction);
+  EXPECT_EQ(correction->kind, MapCorrection::Kind::merge);
+  LocalMapper mapper = mapper_of(world, world.map);
+  const MapView view = mapper.apply(*correction);
+  EXPECT_EQ(view->roots(), std::vector<KeyframeId>{0});
+  for (KeyframeId k = 0; k < 12; ++k)
+    EXPECT_EQ(view->cam_from_world(k).translation, world.map.cam_from_world(k).translation) << "the older one stays";
+  for (KeyframeId k = 12; k < 24; ++k) EXPECT_LT(world.error(*view, k), 0.05) << "keyframe " << k;
+  const Rigid3 before = world.map.cam_from_world(23) * world.map.cam_from_world(13).inverse();
+  const Rigid3 after = view->cam_from_world(23) * view->cam_from_world(13).inverse();
+  EXPECT_LT((before * after.inverse()).translation.norm(), 1e-9);
+}
+
+TEST(MapMerge, MapsThatShareNothingStayApart) {
+  RoundTrip world;
+  world.go(5);
+  for (int k = 5; k < 10; ++k) {
+    const Rigid3 truth = RoundTrip::truth_at(k + 15);
+    world.add(truth, truth, k == 5);
+    EXPECT_FALSE(find_loop(world.map, k, world.optics(), {}, 1));
+  }
+}
+
+TEST(LoopCloser, TheSameSnapshotsGiveTheSameCorrections) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 2);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto a = LoopCloser(world.optics(), {}, 3).process(world.map, last);
+  const auto b = LoopCloser(world.optics(), {}, 3).process(*world.map.snapshot(), last);
+  ASSERT_TRUE(a && b);
+  ASSERT_EQ(a->poses.size(), b->poses.size());
+  for (size_t i = 0; i < a->poses.size(); ++i) {
+    EXPECT_EQ(a->poses[i].after.translation, b->poses[i].after.translation);
+    EXPECT_EQ(a->poses[i].after.rotation.coeffs(), b->poses[i].after.rotation.coeffs());
+  }
+  EXPECT_EQ(a->same, b->same);
+}
+
+TEST(LoopOptions, OutOfRangeIsRefused) {
+  LoopOptions options;
+  EXPECT_NO_THROW(options.check());
+  options.candidates = 0;
+  EXPECT_THROW(options.check(), InvalidOption);
+  options = {};
+  options.drift_translation_share = -1;
+  EXPECT_THROW(LoopCloser(Optics{}, options, 1), InvalidOption);
+  GlobalBaOptions ba;
+  ba.iterations_second = 0;
+  EXPECT_THROW(ba.check(), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/loop_stage.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "dkb/loop/loop_test_world.h"
+
+namespace dkb {
+namespace {
+
+LoopStageOptions prompt() {
+  LoopStageOptions options;
+  options.loop_latency = {3, 0.1};
+  options.global_ba_latency = {5, 0.1};
+  return options;
+}
+
+TEST(BackgroundLatency, GrowsWithTheMapInWholeFrames) {
+  const BackgroundLatency latency{10, 0.02};
+  EXPECT_EQ(latency(0), 10);
+  EXPECT_EQ(latency(1), 11);
+  EXPECT_EQ(latency(50), 11);
+  EXPECT_EQ(latency(2000), 50);
+}
+
+TEST(DueStage, ResultsComeInOrderAtTheirDueTimesAndNotBefore) {
+  for (const bool threaded : {false, true}) {
+    DueStage<int, int> stage([](const int& x) { return x * x; }, threaded);
+    stage.push(3, 10);
+    stage.push(4, 10);
+    stage.push(5, 12);
+    EXPECT_FALSE(stage.take_due(9, true));
+    EXPECT_EQ(stage.take_due(10, true), 9);
+    EXPECT_EQ(stage.take_due(10, true), 16);
+    EXPECT_FALSE(stage.take_due(11, true));
+    EXPECT_EQ(stage.outstanding(), 1U);
+    EXPECT_EQ(stage.take_due(40, true), 25);
+  }
+}
+
+// A round trip whose loop closes, seen by a stage keyframe by keyframe: what it hands out, frame by frame.
+std::vector<std::pair<FrameIndex, std::shared_ptr<const MapCorrection>>> corrections(bool threaded) {
+  test::RoundTrip world;
+  LoopStage stage(world.optics(), prompt(), {}, 1, threaded);
+  std::vector<std::pair<FrameIndex, std::shared_ptr<const MapCorrection>>> handed_out;
+  world.go(test::RoundTrip::kRound - 4);
+  stage.start_at(world.map.keyframe_count());
+  for (FrameIndex frame = 0; frame < 80; ++frame) {
+    if (frame % 5 == 0 && frame < 40) {
+      world.go(1);
+      stage.offer(world.map.snapshot(), frame, false);
+    }
+    for (auto& correction : stage.take_due(frame, true)) {
+      move_map(world.map, *correction);
+      stage.offer(world.map.snapshot(), frame, false);
+      handed_out.emplace_back(frame, std::move(correction));
+    }
+  }
+  EXPECT_TRUE(stage.idle());
+  EXPECT_EQ(stage.merges(), 0);
+  EXPECT_EQ(stage.loops(), static_cast<int>(std::count_if(handed_out.begin(), handed_out.end(), [](const auto& c) {
+              return c.second->kind == MapCorrection::Kind::loop;
+            })));
+  return handed_out;
+}
+
+TEST(LoopStage, ALoopIsClosedAndThenTheMapAdjusted) {
+  const auto handed_out = corrections(true);
+  ASSERT_GE(handed_out.size(), 2U);
+  EXPECT_EQ(handed_out[0].second->kind, MapCorrection::Kind::loop);
+  EXPECT_EQ(handed_out.back().second->kind, MapCorrection::Kind::adjustment);
+}
+
+TEST(LoopStage, ThreadsDoNotChangeABit) {
+  const auto with = corrections(true), without = corrections(false);
+  ASSERT_EQ(with.size(), without.size());
+  for (size_t i = 0; i < with.size(); ++i) {
+    EXPECT_EQ(with[i].first, without[i].first);
+    const auto &a = with[i].second->poses, &b = without[i].second->poses;
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t k = 0; k < a.size(); ++k) {
+      EXPECT_EQ(a[k].after.translation, b[k].after.translation);
+      EXPECT_EQ(a[k].after.rotation.coeffs(), b[k].after.rotation.coeffs());
+    }
+  }
+}
+
+TEST(LoopStage, EndsWithWorkOutstanding) {
+  test::RoundTrip world;
+  world.go(10);
+  LoopStage stage(world.optics(), prompt(), {}, 1, true);
+  stage.want_adjustment();
+  stage.offer(world.map.snapshot(), 0, false);
+  EXPECT_FALSE(stage.idle());
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/readout_calibration.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+constexpr int kLeastMatches = 30;
+}  // namespace
+
+void ReadoutOptions::check() const {
+  require_option(step_sd > 0, "readout.step_sd", step_sd, "greater than 0 s");
+  require_option(longest > 0, "readout.longest", longest, "greater than 0 s");
+}
+
+ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
+                                       const ReadoutOptions& options)
+    : camera_(camera),
+      noise_(noise),
+      scale_factor_(scale_factor),
+      options_(options),
+      readout_(camera.readout),
+      known_(camera.readout > 0 || !options.estimate) {
+  options_.check();
+}
+
+void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
+                             const std::function<std::optional<Eigen::Vector3d>(PointId)>& position_of) {
+  if (known_ || velocity.isZero()) return;
+  // Normal equations of [pose, readout]: pixel error = J pose + d readout.
+  Matrix6d pose_pose = Matrix6d::Zero();
+  Vector6d pose_readout = Vector6d::Zero(), pose_gradient = Vector6d::Zero();
+  double readout_readout = 0, readout_gradient = 0;
+  int matches = 0;
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    if (frame.points[f] == kNoPoint) continue;
+    const auto position = position_of(frame.points[f]);
+    if (!position) continue;
+    const Eigen::Vector3d p = frame.cam_from_world * *position;
+    if (p.z() < 0.1) continue;
+    const Keypoint& k = frame.features->keypoints[f];
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << camera_.fx / p.z(), 0, -camera_.fx * p.x() / (p.z() * p.z()), 0, camera_.fy / p.z(),
+        -camera_.fy * p.y() / (p.z() * p.z());
+    Eigen::Matrix<double, 2, 6> jacobian;
+    jacobian.leftCols<3>() = projection;
+    Eigen::Matrix3d cross;
+    cross << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
+    jacobian.rightCols<3>() = -projection * cross;
+    const Eigen::Vector2d flow = jacobian * velocity;
+    const Eigen::Vector2d late = flow * (k.image_pixel.y() / camera_.height - 0.5);
+    const Eigen::Vector2d error = k.pixel.cast<double>() - camera_.project(p);
+    const double sigma = noise_.corner_sigma(k.octave, scale_factor_), weight = 1 / (sigma * sigma);
+    pose_pose += weight * jacobian.transpose() * jacobian;
+    pose_readout += weight * jacobian.transpose() * late;
+    pose_gradient += weight * jacobian.transpose() * error;
+    readout_readout += weight * late.squaredNorm();
+    readout_gradient += weight * late.dot(error);
+    ++matches;
+  }
+  if (matches < kLeastMatches) return;
+  const Eigen::LDLT<Matrix6d> factor(pose_pose);
+  if (factor.info() != Eigen::Success || !factor.isPositive()) return;
+  const Vector6d explained = factor.solve(pose_readout);
+  information_ += std::max(0.0, readout_readout - explained.dot(pose_readout));
+  gradient_ += readout_gradient - explained.dot(pose_gradient);
+  if (information_ * options_.step_sd * options_.step_sd < 1) return;
+  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, options_.longest);
+  information_ = gradient_ = 0;
+}
+
+}  // namespace dkb

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/tracking/frame.h"
+
+namespace dkb {
+
+struct ReadoutOptions {
+  bool estimate = true;    // when the camera's file does not tell the readout
+  double step_sd = 5e-4;   // [s] uncertainty of a step below which it is taken, > 0
+  double longest = 0.033;  // [s] largest readout believed in, > 0
+  void check() const;
+};
+
+// Learns how long a rolling shutter takes from the first row to the last, while the camera is in use. Rows that are
+// exposed early or late show their points off by the image's motion times the row's delay; what a pose cannot explain
+// of that pattern tells the delay. Least squares with the pose of each frame eliminated, in steps, each as soon as its
+// standard deviation is small enough. The first steps fall short, since the map was made from the same sheared images;
+// later ones make up for it. Deterministic.
+class ReadoutCalibration {
+ public:
+  ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
+                     const ReadoutOptions& options);
+
+  // [s] to be used for the next frame; the camera file's own where it has one.
+  double readout() const { return readout_; }
+  // A tracked frame, whose features were made with readout(), and the camera's motion then [m/s, rad/s].
+  void add(const TrackedFrame& frame, const Vector6d& velocity,
+           const std::function<std::optional<Eigen::Vector3d>(PointId)>& position_of);
+
+ private:
+  CameraModel camera_;
+  SensorNoise noise_;
+  double scale_factor_;
+  ReadoutOptions options_;
+  double readout_;
+  bool known_;
+  double information_ = 0, gradient_ = 0;  // of the step at work
+};
+
+}  // namespace dkb

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/readout_calibration.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/tracking/test_scene.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// Frames of a scene under motion that changes, with rows exposed late by `readout`, of which `known` was taken out.
+double calibrated(double readout, ReadoutOptions options = {}, double file = 0) {
+  const TestScene scene(500);
+  CameraModel camera = scene.camera;
+  camera.readout = file;
+  ReadoutCalibration calibration(camera, {}, TestScene::kScaleFactor, options);
+  for (int n = 0; n < 60; ++n) {
+    Vector6d velocity;
+    velocity << 0.3 * std::sin(0.3 * n), 0.1, 0.2 * std::cos(0.2 * n), 0.2 * std::sin(0.5 * n), 0.7 * std::cos(0.4 * n),
+        0.1;
+    TrackedFrame frame;
+    frame.cam_from_world = TestScene::camera_at({0.01 * n, 0, 0}, {0, 0.005 * n, 0});
+    const View view = scene.look(frame.cam_from_world, {.pixel_noise = 0.5, .seed = static_cast<uint64_t>(n) + 1});
+    RgbdFeatures features = *view.features;
+    for (size_t f = 0; f < features.size(); ++f) {
+      Keypoint& k = features.keypoints[f];
+      const Eigen::Vector3d p = frame.cam_from_world * scene.points[static_cast<size_t>(view.shows[f])];
+      const double late = (readout - calibration.readout()) * (k.image_pixel.y() / camera.height - 0.5);
+      const Eigen::Vector3d then = p + late * (velocity.head<3>() + velocity.tail<3>().cross(p));
+      k.pixel += (camera.project(then) - camera.project(p)).cast<float>();
+      frame.points.push_back(static_cast<PointId>(view.shows[f]));
+    }
+    frame.features = std::make_shared<const RgbdFeatures>(std::move(features));
+    calibration.add(frame, velocity, [&](PointId id) { return std::optional(scene.points[id]); });
+  }
+  return calibration.readout();
+}
+
+TEST(ReadoutCalibration, FindsTheReadoutWithinAMillisecond) {
+  for (const double readout : {0.0, 0.012, 0.025}) EXPECT_NEAR(calibrated(readout), readout, 1e-3);
+}
+
+TEST(ReadoutCalibration, ACameraThatTellsItsReadoutIsBelieved) {
+  EXPECT_EQ(calibrated(0.02, {}, 0.01), 0.01);
+}
+
+TEST(ReadoutCalibration, StaysOutWhenItIsNotWanted) {
+  EXPECT_EQ(calibrated(0.02, {.estimate = false}), 0.0);
+}
+
+TEST(ReadoutCalibration, NeverLeavesWhatIsBelievable) {
+  EXPECT_EQ(calibrated(0.06), 0.033);
+  EXPECT_EQ(calibrated(-0.01), 0.0);
+  ReadoutOptions options;
+  options.longest = 0;
+  EXPECT_THROW(calibrated(0.01, options), InvalidOption);
+}
+
+}  // namespace
+}  // namespace dkb
