@@ -47,7 +47,6 @@ void DynamicsOptions::check() const {
   flow.check();
   carry.check();
   require_option(points_per_box >= 4, "dynamics.points_per_box", points_per_box, "at least 4");
-  require_option(points_outside >= 20, "dynamics.points_outside", points_outside, "at least 20");
   require_option(support_cell >= 2 && support_cell <= 32, "dynamics.support_cell", support_cell, "2 ... 32 px");
   require_option(missed_results >= 0, "dynamics.missed_results", missed_results, "at least 0");
 }
@@ -202,6 +201,85 @@ void DynamicStage::begin_frame(FrameIndex frame, std::shared_ptr<const RgbdImage
   due_ = slow_->take_due(frame);
 }
 
+// carry() may drop boxes that left the image, so each goes alone and keeps its count of misses.
+void DynamicStage::move_boxes_here(const ImagePyramid& pyramid) {
+  if (past_.empty() || carried_.empty()) return;
+  const auto motions = follow(past_.back(), pyramid, detections_of(carried_));
+  std::vector<Carried> moved;
+  for (const Carried& c : carried_) {
+    Detections one;
+    one.boxes = {c.detection};
+    const Detections there = carry(one, motions, 1, camera_.width, camera_.height, options_.carry);
+    if (!there.boxes.empty()) moved.push_back({there.boxes.front(), c.missed});
+  }
+  carried_ = std::move(moved);
+}
+
+MoverMask DynamicStage::ask_prompt_detectors(const RgbdImage& image, std::vector<Detection>& boxes) const {
+  MoverMask given;
+  for (const auto& detector : prompt_) {
+    const Detections d = detector->detect(image);
+    boxes.insert(boxes.end(), d.boxes.begin(), d.boxes.end());
+    if (!d.mask.empty()) given = {1, d.mask};
+  }
+  return given;
+}
+
+MoverMask DynamicStage::segment_motion(const Context& context, std::vector<Detection>& boxes) {
+  if (!motion_) return {};
+  const Stopwatch watch;
+  MoverMask moving = motion_->segment(*context.image, context.cam_from_world);
+  times_.add("motion", watch.ms());
+  // The other filters know boxes only.
+  if (options_.filter != FilterKind::standard && segments_motion_ && !moving.empty())
+    for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
+      const float c = static_cast<float>(moving.cell);
+      boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
+    }
+  return moving;
+}
+
+void DynamicStage::filter(const Context& context, const std::vector<FilterFeature>& features, const MoverMask& given,
+                          const MoverMask& moving, DynamicScene& scene) const {
+  const auto motion = [&] { return own_motion(features, scene.boxes, context.current_from_previous); };
+  switch (options_.filter) {
+    case FilterKind::none:
+      break;
+    case FilterKind::box:
+      scene.dynamic = box_filter(features, scene.boxes);
+      break;
+    case FilterKind::epipolar:
+      scene.dynamic = epipolar_filter(features, scene.boxes, camera_, motion(), options_.epipolar);
+      break;
+    case FilterKind::paper:
+      scene.dynamic = paper_filter(features, scene.boxes, camera_, motion(), options_.paper);
+      break;
+    case FilterKind::multiview:
+      scene.dynamic = multiview_filter(features, context.keyframe_points_in_camera, camera_, context.image->depth,
+                                       options_.multiview);
+      break;
+    case FilterKind::standard:
+      scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
+      if (motion_) clear_still(scene.mask, motion_->score(), moving.cell);
+      unite(scene.mask, given, camera_.width, camera_.height);
+      if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
+      scene.dynamic = mask_filter(features, scene.mask);
+      break;
+  }
+}
+
+void DynamicStage::remember(const Context& context, std::shared_ptr<const ImagePyramid> pyramid) {
+  PastFrame now;
+  now.frame = context.frame;
+  now.image = context.image;
+  now.pyramid = std::move(pyramid);
+  if (motion_) now.score = motion_->score();
+  for (const Corner& c : context.orb->corners) now.corners.emplace_back(c.x, c.y);
+  past_.push_back(std::move(now));
+  const size_t kept = slow_ ? static_cast<size_t>(schedule_.latency + schedule_.every) + 1 : 1;
+  while (past_.size() > kept) past_.pop_front();
+}
+
 DynamicScene DynamicStage::process(const Context& context) {
   DynamicScene scene;
   scene.dynamic.assign(context.orb->corners.size(), 0);
@@ -216,86 +294,20 @@ DynamicScene DynamicStage::process(const Context& context) {
     pyramid = std::move(made);
   }
   if (slow_) {
-    if (!past_.empty() && !carried_.empty()) {
-      Detections boxes;
-      boxes.boxes = detections_of(carried_);
-      // carry() may drop boxes that left the image, so each goes alone and keeps its count of misses.
-      const auto motions = follow(past_.back(), *pyramid, boxes.boxes);
-      std::vector<Carried> moved;
-      for (const Carried& c : carried_) {
-        Detections one;
-        one.boxes = {c.detection};
-        const Detections there = carry(one, motions, 1, camera_.width, camera_.height, options_.carry);
-        if (!there.boxes.empty()) moved.push_back({there.boxes.front(), c.missed});
-      }
-      carried_ = std::move(moved);
-    }
+    move_boxes_here(*pyramid);
     receive(context, pyramid);
   }
   scene.boxes = detections_of(carried_);
-  MoverMask given;
-  for (const auto& detector : prompt_) {
-    const Detections d = detector->detect(*context.image);
-    scene.boxes.insert(scene.boxes.end(), d.boxes.begin(), d.boxes.end());
-    if (!d.mask.empty()) given = {1, d.mask};
-  }
-  MoverMask moving;
-  if (motion_) {
-    const Stopwatch segmenting;
-    moving = motion_->segment(*context.image, context.cam_from_world);
-    times_.add("motion", segmenting.ms());
-    // The other filters know boxes only.
-    if (options_.filter != FilterKind::standard && segments_motion_ && !moving.empty())
-      for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
-        const float c = static_cast<float>(moving.cell);
-        scene.boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
-      }
-  }
+  const MoverMask given = ask_prompt_detectors(*context.image, scene.boxes);
+  const MoverMask moving = segment_motion(context, scene.boxes);
   const bool with_flow = paper_like && !scene.boxes.empty();
   const std::vector<FilterFeature> features = describe(context, pyramid ? *pyramid : ImagePyramid(), with_flow);
   times_.add("flow", watch.ms());
 
   watch = Stopwatch();
-  switch (options_.filter) {
-    case FilterKind::none:
-      break;
-    case FilterKind::box:
-      scene.dynamic = box_filter(features, scene.boxes);
-      break;
-    case FilterKind::epipolar:
-      scene.dynamic =
-          epipolar_filter(features, scene.boxes, camera_,
-                          own_motion(features, scene.boxes, context.current_from_previous), options_.epipolar);
-      break;
-    case FilterKind::paper:
-      scene.dynamic = paper_filter(features, scene.boxes, camera_,
-                                   own_motion(features, scene.boxes, context.current_from_previous), options_.paper);
-      break;
-    case FilterKind::multiview:
-      scene.dynamic = multiview_filter(features, context.keyframe_points_in_camera, camera_, context.image->depth,
-                                       options_.multiview);
-      break;
-    case FilterKind::standard:
-      scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
-      if (motion_) clear_still(scene.mask, motion_->score(), moving.cell);
-      unite(scene.mask, given, camera_.width, camera_.height);
-      if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
-      scene.dynamic = mask_filter(features, scene.mask);
-      break;
-  }
+  filter(context, features, given, moving, scene);
   times_.add("filter", watch.ms());
-
-  if (pyramid) {
-    PastFrame now;
-    now.frame = context.frame;
-    now.image = context.image;
-    now.pyramid = pyramid;
-    if (motion_) now.score = motion_->score();
-    for (const Corner& c : context.orb->corners) now.corners.emplace_back(c.x, c.y);
-    past_.push_back(std::move(now));
-    const size_t kept = slow_ ? static_cast<size_t>(schedule_.latency + schedule_.every) + 1 : 1;
-    while (past_.size() > kept) past_.pop_front();
-  }
+  if (pyramid) remember(context, std::move(pyramid));
   return scene;
 }
 

@@ -32,10 +32,9 @@ struct DynamicsOptions {
   MotionOptions motion;
   OpticalFlowOptions flow;
   CarryOptions carry;
-  int support_cell = 8;      // [px] cells of the motion segmentation when it only supports another detector, 2 ... 32
-  int points_per_box = 40;   // features followed to carry a box, >= 4
-  int points_outside = 200;  // features outside the boxes that tell the camera's own motion, >= 20
-  int missed_results = 2;    // detector results that may miss an object before its box is dropped, >= 0
+  int support_cell = 4;     // [px] cells of the motion segmentation when it only supports another detector, 2 ... 32
+  int points_per_box = 40;  // features followed to carry a box, >= 4
+  int missed_results = 2;   // detector results that may miss an object before its box is dropped, >= 0
   void check() const;
 };
 
@@ -113,7 +112,13 @@ class DynamicStage {
   std::vector<PointMotion> follow(const PastFrame& from, const ImagePyramid& to,
                                   const std::vector<Detection>& boxes) const;
   void mark_keyframes(const PastFrame& source, const Detections& detections);
+  void move_boxes_here(const ImagePyramid& pyramid);
   void receive(const Context& context, const std::shared_ptr<const ImagePyramid>& pyramid);
+  MoverMask ask_prompt_detectors(const RgbdImage& image, std::vector<Detection>& boxes) const;
+  MoverMask segment_motion(const Context& context, std::vector<Detection>& boxes);
+  void filter(const Context& context, const std::vector<FilterFeature>& features, const MoverMask& given,
+              const MoverMask& moving, DynamicScene& scene) const;
+  void remember(const Context& context, std::shared_ptr<const ImagePyramid> pyramid);
   std::vector<FilterFeature> describe(const Context& context, const ImagePyramid& pyramid, bool with_flow) const;
   Rigid3 own_motion(const std::vector<FilterFeature>& features, const std::vector<Detection>& boxes,
                     const Rigid3& expected) const;

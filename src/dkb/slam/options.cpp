@@ -253,6 +253,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
   s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
   s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
+  s.bind("dynamics.motion.views_per_frame", &d.motion.views_per_frame, "past views compared with each frame");
   s.bind("dynamics.motion.threshold", &d.motion.threshold, "score from which a cell moves");
   s.bind("dynamics.motion.rim", &d.motion.rim, "[cells] by which its mask is widened");
   s.bind("dynamics.motion.lone_hole", &d.motion.lone_hole,
