@@ -45,7 +45,7 @@ struct RunArguments {
   std::string filter, disable;
   std::string load_map;
   bool localise = false;
-  bool realtime = false, dump_features = false, cv_orb = false, quiet = false;
+  bool realtime = false, final_ba = false, dump_features = false, cv_orb = false, quiet = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -139,6 +139,7 @@ int run(const RunArguments& args) {
   if (args.has_seed) options.seed = args.seed;
   options.pipeline.threaded = args.threads != 1;
   options.pipeline.realtime = args.realtime;
+  if (args.final_ba) options.final_ba = true;
   options.check();
 
   TumDataset dataset = open_tum_dataset(args.dataset);
@@ -273,6 +274,7 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
   command->add_flag("--localize", args->localise, "Track in that map without changing it");
+  command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
   command->add_flag("--cv-orb", args->cv_orb,
