@@ -26,7 +26,10 @@ std::string Ended::failure(const std::string& error_output) const {
   for (char& c : last)
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
   if (last.starts_with("error: ")) last.erase(0, 7);
-  if (last.size() > 300) last = last.substr(0, 300) + "...";
+  if (last.size() > 300) {
+    last.resize(300);
+    last += "...";
+  }
   if (signal != 0) {
     const char* name = strsignal(signal);
     return "crashed: signal " + std::to_string(signal) + (name != nullptr ? std::string(" (") + name + ")" : "") +

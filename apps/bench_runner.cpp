@@ -205,8 +205,11 @@ void read_errors(const fs::path& out, const fs::path& truth_file, RunRecord* r) 
 class Runner {
  public:
   Runner(const ResultsFolder& folder, const RunnerOptions& options, const std::atomic<bool>& stop)
-      : folder_(folder), suite_(folder.suite()), options_(options), stop_(stop) {
-    program_ = options.program.empty() ? fs::read_symlink("/proc/self/exe") : fs::absolute(options.program);
+      : folder_(folder),
+        suite_(folder.suite()),
+        options_(options),
+        stop_(stop),
+        program_(options.program.empty() ? fs::read_symlink("/proc/self/exe") : fs::absolute(options.program)) {
     if (::access(program_.c_str(), X_OK) != 0)
       throw InputError(program_.string() + ": is no program that can be run (--program)");
     program_id_ = program_id(program_);

@@ -16,6 +16,7 @@
 #include <sstream>
 
 #include "bench_cv_orb.h"
+#include "dense_output.h"
 #include "detector_choice.h"
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
@@ -45,7 +46,7 @@ struct RunArguments {
   std::string filter, disable;
   std::string load_map;
   bool localise = false;
-  bool realtime = false, dump_features = false, cv_orb = false, quiet = false;
+  bool realtime = false, dense = false, final_ba = false, dump_features = false, cv_orb = false, quiet = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -139,6 +140,7 @@ int run(const RunArguments& args) {
   if (args.has_seed) options.seed = args.seed;
   options.pipeline.threaded = args.threads != 1;
   options.pipeline.realtime = args.realtime;
+  if (args.final_ba) options.final_ba = true;
   options.check();
 
   TumDataset dataset = open_tum_dataset(args.dataset);
@@ -168,6 +170,8 @@ int run(const RunArguments& args) {
   SlamSystem slam(camera.camera, options, std::move(detectors));
   if (map) slam.load(std::move(map->map));
   slam.set_localise_only(args.localise);
+  std::optional<DenseOutput> dense;
+  if (args.dense) dense.emplace(slam);
   RunFacts facts;
   facts.writes_map = !args.localise;
   facts.offered = static_cast<int>(dataset.pairs.size());
@@ -190,6 +194,7 @@ int run(const RunArguments& args) {
     facts.stamps.push_back(frame->stamp);
     const FrameResult result = slam.process(frame->image);
     for (const Mover& mover : result.movers) facts.movers.push_back({frame->timestamp, frame->stamp, mover});
+    if (dense) dense->note(*frame->image, result, slam);
     if (const auto warning = slam.take_warning())
       warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
     if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
@@ -204,6 +209,11 @@ int run(const RunArguments& args) {
   facts.wall_s = wall.ms() / 1000;
   facts.config_yaml = settings.to_yaml();
   facts.times = reader.times();
+  if (dense) {
+    const std::string line = dense->write(out, slam);
+    if (!args.quiet) fmt::print("{}\n", line);
+    facts.times.merge(dense->times());
+  }
   write_outputs(out, slam, facts);
   if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(dataset.pairs, camera.camera));
   warnings.finish();
@@ -273,7 +283,9 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
   command->add_flag("--localize", args->localise, "Track in that map without changing it");
+  command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
+  command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
   command->add_flag("--cv-orb", args->cv_orb,
                     "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");

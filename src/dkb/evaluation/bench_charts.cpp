@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "dkb/evaluation/svg_drawing.h"
 
@@ -13,10 +14,10 @@ namespace dkb {
 namespace {
 
 constexpr const char* kTruth = "#8b949e";
-constexpr std::array<const char*, 10> kColours = {"#1f6feb", "#f0883e", "#2da44e", "#d1242f", "#8250df",
-                                                  "#9a6700", "#bf3989", "#1b7c83", "#57606a", "#b5a800"};
+constexpr const char* kColours[] = {"#1f6feb", "#f0883e", "#2da44e", "#d1242f", "#8250df",
+                                    "#9a6700", "#bf3989", "#1b7c83", "#57606a", "#b5a800"};
 const char* colour_of(size_t system) {
-  return kColours[system % kColours.size()];
+  return kColours[system % std::size(kColours)];
 }
 
 // One line of squares and names; wraps at `width`. Returns the height taken.

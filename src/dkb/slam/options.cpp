@@ -23,6 +23,7 @@ void SlamOptions::check() const {
   dynamics.check();
   evidence.check();
   movers.check();
+  dense.check();
   pipeline.check();
 }
 
@@ -264,6 +265,22 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.missed_results", &d.missed_results,
          "detector results that may miss an object before its box is dropped");
   s.bind("dynamics.evidence_sightings", &o.evidence.sightings, "times on a mover before a map point is retracted");
+
+  DenseOptions& v = o.dense;
+  s.bind("dense.voxel", &v.voxel, "[m] side of a voxel of the dense map (--dense)");
+  s.bind("dense.truncation", &v.truncation, "[m] distances to a surface are kept up to here");
+  s.bind("dense.max_depth", &v.max_depth, "[m] depths beyond tell of free space only");
+  s.bind("dense.pixel_step", &v.pixel_step, "[px] every how many pixels depth is kept of a keyframe");
+  s.bind("dense.mover_margin", &v.mover_margin, "[px] around movers that is left out as well");
+  s.bind("dense.edge_fraction", &v.edge_fraction, "[1] depths beside a step of this share are left out");
+  s.bind("dense.least_views", &v.least_views, "keyframes that must see a surface");
+  s.bind("dense.free_share", &v.free_share, "of a voxel's keyframes that may have seen through it");
+  s.bind("dense.least_patch", &v.least_patch, "[m^2] smaller connected surfaces are dropped");
+  s.bind("dense.grid_cell", &v.grid_cell, "[m] side of a cell of the occupancy grid");
+  s.bind("dense.obstacle_low", &v.obstacle_low, "[m] above the floor: what is lower can be driven over");
+  s.bind("dense.obstacle_high", &v.obstacle_high, "[m] what is higher can be driven under");
+  s.bind("dense.obstacle_voxels", &v.obstacle_voxels, "surface voxels of that height that make a cell occupied");
+  s.bind("dense.threads", &v.threads, "of the fusion; the result does not depend on it");
 
   s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency,
          "[frames] after which a keyframe's mapping becomes visible");

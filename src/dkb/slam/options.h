@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "dkb/dense/dense_options.h"
 #include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
@@ -47,6 +48,7 @@ struct SlamOptions {
   DynamicsOptions dynamics;
   PointEvidenceOptions evidence;
   MoverTrackerOptions movers;
+  DenseOptions dense;
   PipelineOptions pipeline;
   uint64_t seed = 1;     // reaches every source of randomness
   Rigid3 base_from_cam;  // mount: the world is the robot's base at the first tracked frame

@@ -171,8 +171,9 @@ std::optional<bool> SlamSystem::Impl::looks_the_same(const Eigen::Vector2d& pixe
 }
 
 // Detections that came after their keyframe: what it made on movers goes.
-void SlamSystem::Impl::retract_late() {
-  for (const LateMask& late : dynamics_.take_late_masks())
+std::vector<LateMask> SlamSystem::Impl::retract_late() {
+  std::vector<LateMask> masks = dynamics_.take_late_masks();
+  for (const LateMask& late : masks)
     for (const RecentKeyframe& k : recent_keyframes_) {
       if (k.frame != late.frame) continue;
       std::vector<PointId> points;
@@ -183,6 +184,7 @@ void SlamSystem::Impl::retract_late() {
       }
       tracker_->retract(points);
     }
+  return masks;
 }
 
 KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
@@ -261,7 +263,7 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   describer_is_set_ = false;
   extract(image);
   filter_dynamic(image_);
-  retract_late();
+  result.late_masks = retract_late();
   CameraModel camera = camera_;
   camera.readout = readout_->readout();
   const auto features_at = [&](const Vector6d& velocity) {

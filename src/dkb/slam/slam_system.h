@@ -31,6 +31,7 @@ struct FrameResult {
   KeyframeId reference = kNoKeyframe;      // keyframe that shows most of them
   bool keyframe = false;                   // the frame became a keyframe
   std::vector<Mover> movers;               // obstacles that move by themselves, seen in this frame
+  std::vector<LateMask> late_masks;        // where movers were in earlier keyframes, as detections have shown since
   double tracking_ms = 0, wait_ms = 0;     // steady clock: own work, waiting for mapping
 
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }

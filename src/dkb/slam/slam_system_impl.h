@@ -93,7 +93,7 @@ class SlamSystem::Impl {
   }
   void report_features(const TrackedFrame& frame);
   void weigh_evidence();
-  void retract_late();
+  std::vector<LateMask> retract_late();
   std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
   std::optional<bool> looks_the_same(const Eigen::Vector2d& pixel, double depth, int octave,
                                      const Descriptor& descriptor);
