@@ -16,10 +16,9 @@ enum class TranslationUnit {
 
 // The gate before the votes: a frame that moved little since the last keyframe is none (DKB section 3.2, eqs. 14-25).
 struct ParallaxGateOptions {
-  int window = 10;  // [frames] parallaxes averaged, >= 1                              (DKB eqs. 17, 18)
-  double threshold_min =
-      12.0;  // [deg + unit] parallax that opens the gate in fast motion, >= 0; paper 10  (DKB eq. 25)
-  double threshold_max = 36.0;    // [deg + unit] the same at rest, >= threshold_min; paper 30
+  int window = 10;                // [frames] parallaxes averaged, >= 1                              (DKB eqs. 17, 18)
+  double threshold_min = 10.0;    // [deg + unit] parallax that opens the gate in fast motion, >= 0  (DKB eq. 25)
+  double threshold_max = 30.0;    // [deg + unit] the same at rest, >= threshold_min
   double rotation_max = 45.0;     // [deg] Theta_max, > 0                                            (DKB eq. 24)
   double translation_max = 10.0;  // [unit] t_max, > 0
   TranslationUnit translation_unit = TranslationUnit::depth_percent;

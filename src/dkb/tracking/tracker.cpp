@@ -14,9 +14,6 @@ namespace {
 
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
-// What the camera may do from one frame to the next; beyond it is taken as lost and sought.
-constexpr double kLongestStep = 0.5;  // [m]
-constexpr double kLargestTurn = 0.5;  // [rad]
 
 }  // namespace
 
@@ -61,6 +58,7 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       scale_factor_(scale_factor),
       levels_(levels),
       options_(options),
+      seed_(seed),
       relocaliser_(camera, noise, scale_factor, levels, options.relocalisation, options.local_map, seed),
       view_(std::make_shared<const Map>()),
       odometry_(camera, scale_factor, options.close_depth) {
@@ -160,37 +158,6 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     observations.push_back(o);
   }
   return optimise_pose(camera_, initial, observations);
-}
-
-std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
-                                                std::vector<PointId>& points) const {
-  std::vector<Candidate> candidates;
-  const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
-  for (size_t f = 0; f < last_->points.size(); ++f) {
-    const PointId id = last_->points[f];
-    if (id == kNoPoint || is_retracted(id)) continue;
-    const auto at = position(id);
-    if (!at) continue;
-    const Keypoint& k = last_->features->keypoints[f];
-    candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
-                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle,
-                          last_->features->descriptors[f], established(id, last_->index)});
-  }
-  ProjectionMatchOptions match;
-  match.radius = static_cast<float>(radius);
-  match.max_distance = options_.match_distance;
-  match.ratio = 0.9f;
-  const auto matches =
-      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
-  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
-  std::vector<Pair> pairs;
-  for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
-  const PoseEstimate pose = refine(predicted, pairs, features);
-  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
-  for (size_t i = 0; i < matches.size(); ++i)
-    if (pose.inlier[i])
-      points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
-  return pose.cam_from_world;
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
@@ -361,28 +328,6 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
   frame.covariance = pose.covariance;
 }
 
-bool Tracker::track_from_last(TrackedFrame& frame) {
-  if (state_ == TrackingState::lost || !last_) return false;
-  const RgbdFeatures& features = *frame.features;
-  std::vector<PointId> points(features.size(), kNoPoint);
-  const double dt = frame.timestamp - last_->timestamp;
-  std::optional<Rigid3> pose =
-      track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, features, points);
-  if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
-  if (!pose && view_->live_keyframe(last_->reference) != nullptr) {
-    // Without the motion: the camera cannot be far from what it saw last.
-    auto near = relocaliser_.propose_from(*view_, last_->reference, features,
-                                          [this](PointId id) { return is_retracted(id); }, {});
-    if (!near) return false;
-    const Rigid3 step = near->cam_from_world * last_->cam_from_world.inverse();
-    if (step.translation.norm() > kLongestStep || vector_from_rotation(step.rotation).norm() > kLargestTurn)
-      return false;
-    pose = near->cam_from_world;
-    points = std::move(near->points);
-  }
-  return pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
-}
-
 // Rooms that look alike are told apart by where the camera can have come to.
 bool Tracker::within_reach(const PoseProposal& found, double timestamp) const {
   if (!last_) return true;
@@ -401,12 +346,6 @@ bool Tracker::relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same
   candidates_made_ = -1;
   return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.least_inliers,
                          found->points, frame);
-}
-
-bool Tracker::is_step_from_last(const TrackedFrame& frame) const {
-  if (!last_ || last_->index + 1 != frame.index || state_ == TrackingState::lost) return false;
-  const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
-  return step.translation.norm() <= kLongestStep && vector_from_rotation(step.rotation).norm() <= kLargestTurn;
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the

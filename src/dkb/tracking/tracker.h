@@ -110,7 +110,9 @@ class Tracker {
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
                                          std::vector<PointId>& points) const;
+  std::optional<Rigid3> match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const;
   bool track_from_last(TrackedFrame& frame);
+  bool is_step(const Rigid3& cam_from_world) const;
   bool relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same);
   bool is_step_from_last(const TrackedFrame& frame) const;
   bool confirm_sighting(TrackedFrame& frame);
@@ -133,6 +135,7 @@ class Tracker {
   double scale_factor_;
   int levels_;
   TrackingOptions options_;
+  uint64_t seed_;
   Relocaliser relocaliser_;
   Rigid3 start_;  // cam_from_world
 

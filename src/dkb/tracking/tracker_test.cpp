@@ -187,6 +187,18 @@ TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
   EXPECT_GT(third.frame.inliers, second.frame.inliers + 50);
 }
 
+// Two frames, a turn of 3 degrees between them and no notion of it: the narrow search would find wrong matches only.
+TEST_F(TrackerTest, FollowsACameraThatTurnsFastFromTheVeryFirstFrame) {
+  start({}, kNoisy);
+  for (int f = 1; f <= 5; ++f) {
+    const Rigid3 truth = TestScene::camera_at({0, 0, 0}, {0, 0.06 * f, 0});
+    const TrackOutcome o = track(truth, kNoisy);
+    ASSERT_EQ(o.state, TrackingState::tracking) << f;
+    EXPECT_LT(distance_between(o.frame.cam_from_world, truth), 0.02) << f;
+    EXPECT_LT(turn_between(o.frame.cam_from_world, truth), 0.4) << f;
+  }
+}
+
 TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
   publish(start(on_path(0)));
   TrackOutcome o = track(on_path(1));

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the last frame to this one.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dkb/features/matching.h"
+#include "dkb/solver/absolute_pose.h"
+#include "dkb/tracking/pose_observation.h"
+#include "dkb/tracking/tracker.h"
+
+namespace dkb {
+namespace {
+
+// What the camera may do from one frame to the next; beyond it is taken as lost and sought.
+constexpr double kLongestStep = 0.5;  // [m]
+constexpr double kLargestTurn = 0.5;  // [rad]
+
+}  // namespace
+
+std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
+                                                std::vector<PointId>& points) const {
+  std::vector<Candidate> candidates;
+  const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
+  for (size_t f = 0; f < last_->points.size(); ++f) {
+    const PointId id = last_->points[f];
+    if (id == kNoPoint || is_retracted(id)) continue;
+    const auto at = position(id);
+    if (!at) continue;
+    const Keypoint& k = last_->features->keypoints[f];
+    candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
+                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle,
+                          last_->features->descriptors[f], established(id, last_->index)});
+  }
+  ProjectionMatchOptions match;
+  match.radius = static_cast<float>(radius);
+  match.max_distance = options_.match_distance;
+  match.ratio = 0.9f;
+  const auto matches =
+      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
+  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  std::vector<Pair> pairs;
+  for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
+  const PoseEstimate pose = refine(predicted, pairs, features);
+  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i])
+      points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
+  return pose.cam_from_world;
+}
+
+// By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
+// the last place of each point finds just enough wrong ones for a wrong pose.
+std::optional<Rigid3> Tracker::match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const {
+  std::vector<PointId> ids;
+  std::vector<Descriptor> descriptors;
+  for (size_t f = 0; f < last_->points.size(); ++f) {
+    const PointId id = last_->points[f];
+    if (id == kNoPoint || is_retracted(id) || !position(id)) continue;
+    ids.push_back(id);
+    descriptors.push_back(last_->features->descriptors[f]);
+  }
+  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
+  std::erase_if(matches,
+                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
+  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  std::vector<PoseObservation> observations;
+  for (const DescriptorMatch& m : matches)
+    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.b)],
+                                            *position(ids[static_cast<size_t>(m.a)]), noise_, scale_factor_));
+  RansacOptions ransac;
+  ransac.seed = seed_;
+  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
+  if (!pose.ok || pose.inliers < options_.least_matches || !is_step(pose.pose)) return std::nullopt;
+  for (size_t i = 0; i < matches.size(); ++i)
+    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = ids[static_cast<size_t>(matches[i].a)];
+  return pose.pose;
+}
+
+bool Tracker::track_from_last(TrackedFrame& frame) {
+  if (state_ == TrackingState::lost || !last_) return false;
+  const RgbdFeatures& features = *frame.features;
+  std::vector<PointId> points(features.size(), kNoPoint);
+  const double dt = frame.timestamp - last_->timestamp;
+  std::optional<Rigid3> pose;
+  if (velocity_)
+    pose = track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, features, points);
+  if (!pose) pose = match_last_frame(features, points);
+  if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
+  if (!pose && view_->live_keyframe(last_->reference) != nullptr) {
+    // Without the motion: the camera cannot be far from what it saw last.
+    auto near = relocaliser_.propose_from(*view_, last_->reference, features,
+                                          [this](PointId id) { return is_retracted(id); }, {});
+    if (!near || !is_step(near->cam_from_world)) return false;
+    pose = near->cam_from_world;
+    points = std::move(near->points);
+  }
+  return pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
+}
+
+bool Tracker::is_step(const Rigid3& cam_from_world) const {
+  const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
+  return step.translation.norm() <= kLongestStep && vector_from_rotation(step.rotation).norm() <= kLargestTurn;
+}
+
+bool Tracker::is_step_from_last(const TrackedFrame& frame) const {
+  return last_ && last_->index + 1 == frame.index && state_ != TrackingState::lost && is_step(frame.cam_from_world);
+}
+
+}  // namespace dkb
