@@ -14,7 +14,7 @@ KeyframeQuery due() {
   q.frame = 100;
   q.last_keyframe_frame = 90;
   q.mapper_idle = true;
-  q.tracked_points = 179;
+  q.tracked_points = 169;
   q.reference_points = 200;
   q.tracked_close_points = 150;
   q.creatable_close_points = 0;
@@ -31,7 +31,7 @@ TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
   const KeyframeDecision decision = decide(q);
   EXPECT_TRUE(decision.insert);
   EXPECT_EQ(decision.rule, KeyframeRule::baseline);
-  q.tracked_points = 180;
+  q.tracked_points = 170;
   EXPECT_FALSE(decide(q).insert);
   EXPECT_EQ(decide(q).rule, KeyframeRule::none);
 }
@@ -79,9 +79,9 @@ TEST(BaselineKeyframes, EveryNumberIsAnOption) {
   BaselineKeyframeOptions options;
   options.reference_ratio = 0.5;
   const Map map;
-  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);  // 179 of 200 is more than half
+  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);  // 169 of 200 is more than half
   options = {};
-  options.least_tracked = 180;
+  options.least_tracked = 170;
   EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);
   options = {};
   options.frames_between = 5;
