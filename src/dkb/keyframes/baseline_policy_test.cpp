@@ -7,8 +7,8 @@
 namespace dkb {
 namespace {
 
-// A frame that just calls for a keyframe: 179 of the reference's 200 points are tracked, the limit being 0.9 * 200 =
-// 180.
+// A frame that just calls for a keyframe: 169 of the reference's 200 points are tracked, the limit being 0.85 * 200 =
+// 170.
 KeyframeQuery due() {
   KeyframeQuery q;
   q.frame = 100;
