@@ -23,7 +23,7 @@ struct TrackingOptions {
   int initial_points = 100;            // features with depth that the first frame of a map needs, >= 10
   int least_matches = 20;              // matches with the last frame that make a pose worth trying, >= 6
   int least_inliers = 20;              // inliers of the final pose; fewer: lost, >= 6
-  double close_depth = 4.0;            // [m] depths below make map points at once, > 0
+  double close_depth = 6.0;            // [m] depths below make map points at once, > 0
   int least_new_points = 100;          // nearest depths that make points at a keyframe whatever close_depth says, >= 0
   double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
   double radius_wide = 30.0;           // [px] second try, > 0
