@@ -420,7 +420,7 @@ TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
 }
 
 TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {
-  scene = TestScene(900, 2, 5.0, 9.0);  // all beyond the close depth of 4 m
+  scene = TestScene(900, 2, 7.0, 11.0);  // all beyond the close depth of 6 m
   const KeyframePacket far = start();
   EXPECT_EQ(far.new_points.size(), 100U);
   double farthest = 0;
