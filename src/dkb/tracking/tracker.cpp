@@ -398,7 +398,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
     if (!followed) {
       finish(frame);
       sighting_ = frame;
-      odometry_.clear();
+      odometry_.clear();  // they belong to the last frame, which the sighting will replace
       outcome.state = state_ = TrackingState::lost;
       velocity_.reset();
       return outcome;
@@ -407,6 +407,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
   if (!followed && !found_again) {
     if (has_map) state_ = TrackingState::lost;
     velocity_.reset();
+    odometry_.clear();
     outcome.wants_first_keyframe = may_start_map && start_map(frame);
     if (outcome.wants_first_keyframe) {
       state_ = TrackingState::tracking;

@@ -199,6 +199,25 @@ TEST_F(TrackerTest, FollowsACameraThatTurnsFastFromTheVeryFirstFrame) {
   }
 }
 
+// Odometry points are named after the features of the last frame; a map that starts anew has other features.
+TEST_F(TrackerTest, ALossEndsOdometryPointsBeforeAnotherMapStarts) {
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  track(on_path(1));
+  const TrackOutcome before = track(on_path(2));
+  int followed = 0;
+  for (const auto& o : before.frame.odometry) followed += o.has_value();
+  ASSERT_GT(followed, 50);
+  // Elsewhere, with few features: what is left over would name features that are not there.
+  scene = TestScene(400, 99);
+  TrackOutcome o;
+  for (int f = 0; f < 40 && !o.wants_first_keyframe; ++f) o = track(on_path(0));
+  ASSERT_TRUE(o.wants_first_keyframe);
+  publish(insert(o.frame));
+  const TrackOutcome next = track(on_path(0));
+  ASSERT_EQ(next.state, TrackingState::tracking);
+  for (const auto& left : next.frame.odometry) EXPECT_FALSE(left.has_value());
+}
+
 TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
   publish(start(on_path(0)));
   TrackOutcome o = track(on_path(1));
