@@ -7,46 +7,15 @@
 #include <thread>
 
 #include "dkb/map/map_test_tools.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
+using test::born;
 using test::broken_invariant;
 using test::fingerprint;
-
-Keyframe keyframe_at(KeyframeId id, double x, int features = 6) {
-  Random random(static_cast<uint64_t>(id) + 1);
-  Keyframe k;
-  k.id = id;
-  k.features = test::random_features(random, features, CameraModel(), true);
-  k.cam_from_world.translation.x() = x;
-  k.parent = id - 1;  // kNoKeyframe for the first
-  return k;
-}
-
-PointId born(Map& map, KeyframeId keyframe, int feature) {
-  MapPoint p;
-  p.id = make_point_id(keyframe, feature);
-  map.add_point(p);
-  map.observe(p.id, keyframe, feature);
-  return p.id;
-}
-
-// Keyframes 0, 1, 2 in a chain; points a, b, c, d born at features 0 ... 3 of keyframe 0. Keyframe 1 sees a, b, c;
-// keyframe 2 sees a.
-struct ThreeKeyframes {
-  Map map;
-  PointId a, b, c, d;
-  ThreeKeyframes() {
-    for (KeyframeId id = 0; id < 3; ++id) map.add_keyframe(keyframe_at(id, id));
-    a = born(map, 0, 0), b = born(map, 0, 1), c = born(map, 0, 2), d = born(map, 0, 3);
-    map.observe(a, 1, 5);
-    map.observe(b, 1, 4);
-    map.observe(c, 1, 3);
-    map.observe(a, 2, 0);
-  }
-};
+using test::keyframe_at;
+using test::ThreeKeyframes;
 
 TEST(PointIds, NameBirthKeyframeAndFeature) {
   const PointId id = make_point_id(300, 8191);
@@ -375,86 +344,6 @@ TEST(Map, CulledPosesKeepTheirPlaceBesideTheirParentThroughRandomEdits) {
     EXPECT_TRUE(now.translation.isApprox(relative[static_cast<size_t>(id)].translation, 1e-9));
     EXPECT_LT(now.rotation.angularDistance(relative[static_cast<size_t>(id)].rotation), 1e-7);
   }
-}
-
-struct Parts {
-  std::vector<Keyframe> keyframes;
-  std::vector<MapPoint> points;
-  std::vector<RemovedPoint> removed;
-};
-
-Parts parts_of(const Map& map) {
-  Parts parts;
-  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) parts.keyframes.push_back(*map.keyframe(id));
-  for (PointId id : map.live_points()) parts.points.push_back(*map.point(id));
-  parts.removed = map.removed_points();
-  return parts;
-}
-
-TEST(MapRestore, GivesTheSameMapFromItsParts) {
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
-    const Map map = test::random_map(seed, 10, 20, 20);
-    const Parts parts = parts_of(map);
-    Map restored = Map::restore(parts.keyframes, parts.points, parts.removed);
-    ASSERT_EQ(fingerprint(restored), fingerprint(map));
-    // The restored map goes on as the first would have.
-    Map other = map;
-    Random a(seed), b(seed);
-    for (int i = 0; i < 50; ++i) {
-      test::random_edit(other, a);
-      test::random_edit(restored, b);
-    }
-    ASSERT_EQ(fingerprint(restored), fingerprint(other));
-    ASSERT_EQ(broken_invariant(restored), "");
-  }
-}
-
-TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
-  ThreeKeyframes world;
-  world.map.fuse(world.d, world.c);
-  world.map.update_covisibility(1, 1);
-  const Parts good = parts_of(world.map);
-  const auto message = [&](auto&& spoil) -> std::string {
-    Parts parts = good;
-    spoil(parts);
-    try {
-      Map::restore(parts.keyframes, parts.points, parts.removed);
-    } catch (const InputError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(message([](Parts&) {}), "");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].id = 2; }), "keyframe 2 stands where keyframe 1 should");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = 3; }), "keyframe 1 has the impossible parent 3");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = -2; }), "keyframe 1 has the impossible parent -2");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].parent = 2; }), "parents of keyframes run in a circle");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].culled = true; }), "keyframe 0 is culled but has no parent");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].culled = true; }), "keyframe 1 is culled but has features");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].features.reset(); }),
-            "keyframe 1 has not as many points and descriptors as features");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].points.pop_back(); }),
-            "keyframe 1 has not as many points and descriptors as features");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].covisible[0].keyframe = 1; }),
-            "keyframe 1 names an impossible covisible keyframe");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[1].covisible[0].shared_points = 0; }),
-            "keyframe 1 names an impossible covisible keyframe");
-  EXPECT_EQ(message([](Parts& p) { std::swap(p.keyframes[1].covisible[0], p.keyframes[1].covisible[1]); }),
-            "covisible keyframes of keyframe 1 are out of order");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[0].covisible.clear(); }),
-            "two keyframes disagree on how many points they share");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[2].points[3] = make_point_id(0, 5); }),
-            "keyframe 2 shows point 5, which is not there");
-  EXPECT_EQ(message([](Parts& p) { p.keyframes[2].points[3] = make_point_id(0, 0); }),
-            "keyframe 2 shows point 0 twice");
-  EXPECT_EQ(message([](Parts& p) { std::swap(p.points[0], p.points[1]); }), "point 0 is out of order");
-  EXPECT_EQ(message([](Parts& p) { p.points[0].id = make_point_id(7, 0); }),
-            "point 57344 was born at a keyframe that is not there");  // 7 * 8192
-  EXPECT_EQ(message([](Parts& p) { p.points[0].born_at = 3; }), "point 0 was made at a keyframe that is not there");
-  EXPECT_EQ(message([](Parts& p) { p.removed[0].id = 0; }), "point 0 is both there and removed");
-  EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 5; }),
-            "point 3 was replaced by point 5, which never was");
-  EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 3; }), "replacements of points run in a circle");
 }
 
 TEST(Map, FindsAKeyframeByItsLooksUntilItIsCulled) {

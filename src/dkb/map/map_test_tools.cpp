@@ -257,6 +257,33 @@ Map random_map(uint64_t seed, int keyframes, int features, int edits_per_keyfram
   return map;
 }
 
+Keyframe keyframe_at(KeyframeId id, double x, int features) {
+  Random random(static_cast<uint64_t>(id) + 1);
+  Keyframe k;
+  k.id = id;
+  k.features = random_features(random, features, CameraModel(), true);
+  k.cam_from_world.translation.x() = x;
+  k.parent = id - 1;  // kNoKeyframe for the first
+  return k;
+}
+
+PointId born(Map& map, KeyframeId keyframe, int feature) {
+  MapPoint p;
+  p.id = make_point_id(keyframe, feature);
+  map.add_point(p);
+  map.observe(p.id, keyframe, feature);
+  return p.id;
+}
+
+ThreeKeyframes::ThreeKeyframes() {
+  for (KeyframeId id = 0; id < 3; ++id) map.add_keyframe(keyframe_at(id, id));
+  a = born(map, 0, 0), b = born(map, 0, 1), c = born(map, 0, 2), d = born(map, 0, 3);
+  map.observe(a, 1, 5);
+  map.observe(b, 1, 4);
+  map.observe(c, 1, 3);
+  map.observe(a, 2, 0);
+}
+
 std::string broken_invariant(const Map& map) {
   for (const auto& check : {observations_broken, covisibility_broken, tree_broken, removed_broken})
     if (const std::string broken = check(map); !broken.empty()) return broken;

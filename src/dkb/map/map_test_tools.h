@@ -25,6 +25,19 @@ void random_edit(Map& map, Random& random);
 // `keyframes` keyframes with random edits between them.
 Map random_map(uint64_t seed, int keyframes, int features, int edits_per_keyframe);
 
+// A keyframe with features that show no point; its centre lies at -x [m] and its parent is the keyframe before it.
+Keyframe keyframe_at(KeyframeId id, double x, int features = 6);
+// Adds the point that is born at this feature.
+PointId born(Map& map, KeyframeId keyframe, int feature);
+
+// Keyframes 0, 1, 2 in a chain; points a, b, c, d born at features 0 ... 3 of keyframe 0. Keyframe 1 sees a, b, c;
+// keyframe 2 sees a.
+struct ThreeKeyframes {
+  Map map;
+  PointId a, b, c, d;
+  ThreeKeyframes();
+};
+
 // What holds of every map and does not hold of this one; empty when all is well.
 std::string broken_invariant(const Map& map);
 

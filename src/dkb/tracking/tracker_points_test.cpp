@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which points a frame shows, and what mapping is told of them.
+#include "dkb/tracking/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "dkb/tracking/tracker_fixture.h"
+
+namespace dkb {
+namespace {
+
+TEST_F(TrackerTest, ProvisionalPointsMatchBeforeMappingPublishes) {
+  start(on_path(0));
+  for (int f = 1; f <= 3; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    EXPECT_GT(o.frame.inliers, 150);
+    EXPECT_EQ(o.frame.reference, 0);
+  }
+}
+
+TEST_F(TrackerTest, ProvisionalPointsOfALaterKeyframeAddToTheMapBeforeMappingPublishes) {
+  publish(start(on_path(0)));
+  TrackOutcome o;
+  for (int f = 1; f <= 25; ++f) o = track(on_path(f));
+  const KeyframePacket packet = insert(o.frame);
+  EXPECT_GT(packet.new_points.size(), 30U);
+  o = track(on_path(26));
+  int of_the_new_one = 0;
+  for (PointId p : o.frame.points) of_the_new_one += p != kNoPoint && birth_keyframe(p) == 1;
+  EXPECT_GT(of_the_new_one, static_cast<int>(packet.new_points.size()) / 2);
+}
+
+TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
+  // A map of half the scene: the other half has no depth at the only keyframe.
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  int shown = 0, guessed = 0;
+  for (int f = 1; f <= 4; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+    shown = guessed = 0;
+    for (size_t i = 0; i < o.frame.points.size(); ++i) {
+      if (!o.frame.odometry[i]) continue;
+      EXPECT_EQ(o.frame.points[i], kNoPoint);
+      ++shown;
+      guessed += o.frame.odometry[i]->guessed;
+      const Eigen::Vector3d& truth = scene.points[static_cast<size_t>(view.shows[i])];
+      EXPECT_LT((o.frame.odometry[i]->point_in_world - truth).norm(), 0.01);
+    }
+  }
+  EXPECT_GT(shown, 50);
+  EXPECT_EQ(guessed, 0);
+}
+
+TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  track(on_path(1));
+  const TrackOutcome second = track(on_path(2));
+  const KeyframePacket packet = insert(second.frame);
+  EXPECT_GT(packet.new_points.size(), 50u);
+  const TrackOutcome third = track(on_path(3));
+  for (size_t i = 0; i < third.frame.points.size(); ++i)
+    EXPECT_FALSE(third.frame.points[i] != kNoPoint && third.frame.odometry[i]);
+  EXPECT_GT(third.frame.inliers, second.frame.inliers + 50);
+}
+
+// Odometry points are named after the features of the last frame; a map that starts anew has other features.
+TEST_F(TrackerTest, ALossEndsOdometryPointsBeforeAnotherMapStarts) {
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  track(on_path(1));
+  const TrackOutcome before = track(on_path(2));
+  int followed = 0;
+  for (const auto& o : before.frame.odometry) followed += o.has_value();
+  ASSERT_GT(followed, 50);
+  // Elsewhere, with few features: what is left over would name features that are not there.
+  scene = TestScene(400, 99);
+  TrackOutcome o;
+  for (int f = 0; f < 40 && !o.wants_first_keyframe; ++f) o = track(on_path(0));
+  ASSERT_TRUE(o.wants_first_keyframe);
+  publish(insert(o.frame));
+  const TrackOutcome next = track(on_path(0));
+  ASSERT_EQ(next.state, TrackingState::tracking);
+  for (const auto& left : next.frame.odometry) EXPECT_FALSE(left.has_value());
+}
+
+TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
+  publish(start(on_path(0)));
+  TrackOutcome o = track(on_path(1));
+  std::vector<PointId> moving;
+  for (PointId p : o.frame.points)
+    if (p != kNoPoint && scene_point(p) % 3 == 0) moving.push_back(p);
+  ASSERT_GT(moving.size(), 50U);
+  tracker.retract(moving);
+  const auto shows_a_retracted_one = [&] {
+    return std::any_of(o.frame.points.begin(), o.frame.points.end(),
+                       [&](PointId p) { return std::find(moving.begin(), moving.end(), p) != moving.end(); });
+  };
+  for (int f = 2; f <= 5; ++f) {
+    o = track(on_path(f));
+    ASSERT_EQ(o.state, TrackingState::tracking);
+    EXPECT_FALSE(shows_a_retracted_one()) << "frame " << f;
+  }
+  black = true;
+  track({});
+  black = false;
+  track(on_path(6));
+  o = track(on_path(6));
+  ASSERT_EQ(o.state, TrackingState::relocalised);
+  EXPECT_FALSE(shows_a_retracted_one()) << "found again";
+}
+
+TEST_F(TrackerTest, MappingIsToldOnceOfRetractedPoints) {
+  publish(start(on_path(0)));
+  const std::vector<PointId> live = map.live_points();
+  const std::vector<PointId> moving = {live[7], live[3]};
+  tracker.retract(moving);
+  tracker.retract({live[3]});
+  const TrackOutcome o = track(on_path(1));
+  EXPECT_EQ(insert(o.frame).retracted, moving);
+  tracker.retract({live[9]});
+  const KeyframePacket report = tracker.make_report();
+  EXPECT_EQ(report.id, kNoKeyframe);
+  EXPECT_EQ(report.retracted, std::vector<PointId>{live[9]});
+  EXPECT_TRUE(tracker.make_report().retracted.empty());
+}
+
+TEST_F(TrackerTest, ARetractedProvisionalPointIsGoneAtOnceAndAfterMappingPublishedIt) {
+  const KeyframePacket packet = start(on_path(0));
+  const PointId moving = packet.new_points[10].id;
+  tracker.retract({moving});
+  EXPECT_FALSE(tracker.position(moving));
+  publish(packet);  // mapping did not know yet
+  for (int f = 1; f <= 3; ++f) {
+    const TrackOutcome o = track(on_path(f));
+    EXPECT_EQ(std::count(o.frame.points.begin(), o.frame.points.end(), moving), 0);
+  }
+}
+
+TEST_F(TrackerTest, VisitsThePointsThatItsPosePutsInView) {
+  publish(start(on_path(0)));
+  track(on_path(1));
+  const TrackOutcome o = track(on_path(2));
+  std::vector<PointId> seen;
+  tracker.visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double depth) {
+    const Eigen::Vector3d in_cam = on_path(2) * scene.points[static_cast<size_t>(scene_point(id))];
+    EXPECT_LT((scene.camera.project(in_cam) - pixel).norm(), 0.05);
+    EXPECT_NEAR(in_cam.z(), depth, 1e-3);
+    seen.push_back(id);
+  });
+  for (PointId p : o.frame.points) EXPECT_TRUE(p == kNoPoint || std::find(seen.begin(), seen.end(), p) != seen.end());
+}
+
+TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
+  const KeyframePacket packet = start(on_path(0));
+  track(on_path(1));
+  work_in(packet);
+  const PointId dropped = packet.new_points[0].id, fused = packet.new_points[1].id, survivor = packet.new_points[2].id;
+  map.remove_point(dropped);
+  map.fuse(fused, survivor);
+  publish();
+  EXPECT_FALSE(tracker.position(dropped));
+  EXPECT_FALSE(tracker.position(fused));
+  EXPECT_TRUE(tracker.position(survivor));
+  const TrackOutcome o = track(on_path(2));
+  ASSERT_EQ(o.state, TrackingState::tracking);
+  for (PointId p : o.frame.points) EXPECT_TRUE(p != dropped && p != fused);
+}
+
+TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
+  publish(start());
+  const int hidden = scene_point(map.live_points()[3]);
+  TrackOutcome o;
+  for (int f = 0; f < 10; ++f) {
+    o = track({}, {.hidden = hidden});
+  }
+  const KeyframePacket packet = insert(o.frame);
+  ASSERT_GT(packet.sightings.size(), 100U);
+  for (size_t i = 0; i < packet.sightings.size(); ++i) {
+    const PointSighting& s = packet.sightings[i];
+    if (i > 0) {
+      EXPECT_LT(packet.sightings[i - 1].point, s.point);
+    }
+    EXPECT_LE(s.found, s.visible);
+    if (scene_point(s.point) == hidden) {
+      EXPECT_EQ(s.found, 0);
+      EXPECT_GE(s.visible, 9);
+    } else {
+      EXPECT_EQ(s.found, 10);
+    }
+  }
+  EXPECT_TRUE(insert(track({}).frame).sightings.size() < 2 * packet.sightings.size());
+}
+
+TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {
+  scene = TestScene(900, 2, 7.0, 11.0);  // all beyond the close depth of 6 m
+  const KeyframePacket far = start();
+  EXPECT_EQ(far.new_points.size(), 100U);
+  double farthest = 0;
+  for (const ProvisionalPoint& p : far.new_points) farthest = std::max(farthest, p.point_in_keyframe.z());
+  std::vector<double> depths;
+  for (const Keypoint& k : view.features->keypoints) depths.push_back(k.depth);
+  std::sort(depths.begin(), depths.end());
+  EXPECT_NEAR(farthest, depths[99], 1e-5) << "the nearest ones";
+}
+
+TEST_F(TrackerTest, AllCloseDepthsMakePoints) {
+  const KeyframePacket close = start();
+  EXPECT_EQ(close.new_points.size(), view.shows.size());
+  for (const ProvisionalPoint& p : close.new_points) {
+    EXPECT_EQ(p.id, make_point_id(0, p.feature));
+    EXPECT_LT((p.point_in_keyframe - scene.points[static_cast<size_t>(scene_point(p.id))]).norm(), 1e-4);
+  }
+}
+
+TEST_F(TrackerTest, CountsTheReferencesPoints) {
+  const KeyframePacket packet = start();
+  const int points = static_cast<int>(packet.new_points.size());
+  EXPECT_EQ(tracker.reference_point_count(0, 1), points) << "provisional ones";
+  publish(packet);
+  EXPECT_EQ(tracker.reference_point_count(0, 1), points);
+  EXPECT_EQ(tracker.reference_point_count(0, 2), 0) << "one keyframe sees them";
+  EXPECT_EQ(tracker.reference_point_count(7, 1), 0);
+}
+
+TEST_F(TrackerTest, FusedPointsAreShownByOneFeature) {
+  publish(start());
+  const TrackOutcome o = track({});
+  std::vector<PointId> shown;
+  for (PointId p : o.frame.points)
+    if (p != kNoPoint) shown.push_back(p);
+  map.fuse(shown[3], shown[7]);
+  publish();
+  const auto& points = tracker.last_frame()->points;
+  EXPECT_EQ(std::count(points.begin(), points.end(), shown[7]), 1);
+  EXPECT_EQ(std::count(points.begin(), points.end(), shown[3]), 0);
+}
+
+}  // namespace
+}  // namespace dkb
