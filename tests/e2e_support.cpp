@@ -135,6 +135,15 @@ void write_text(const fs::path& file, const std::string& text) {
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }
 
+SlamRun::SlamRun(const fs::path& dataset, const fs::path& out_folder, const std::vector<std::string>& more)
+    : out(out_folder) {
+  std::vector<std::string> arguments = {"run",        dataset.string(), "--out",  out.string(),
+                                        "--detector", "none",           "--quiet"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  finished = run_program(arguments);
+  if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
+}
+
 std::vector<std::vector<std::string>> rows_of(const fs::path& file) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream text(read_text(file));

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -58,6 +59,15 @@ void copy_sequence(const std::filesystem::path& folder, int frames, bool own_ima
 
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
+// `run` on `dataset` without a detector, finished, with its results in `out`.
+struct SlamRun {
+  SlamRun(const std::filesystem::path& dataset, const std::filesystem::path& out_folder,
+          const std::vector<std::string>& more = {});
+  std::filesystem::path out;
+  Finished finished;
+  nlohmann::json stats;  // of stats.json, where it is
+};
+
 // The rows of a list or trajectory without comments, split at white space.
 std::vector<std::vector<std::string>> rows_of(const std::filesystem::path& file);
 

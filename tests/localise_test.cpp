@@ -2,8 +2,6 @@
 // Save, load, localise: a map that is used again.
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
@@ -15,19 +13,6 @@ namespace dkb::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct SlamRun {
-  SlamRun(const fs::path& out_folder, std::vector<std::string> more) : out(out_folder) {
-    std::vector<std::string> arguments = {"run",    sequence().string(), "--out", out.string(), "--detector", "none",
-                                          "--quiet"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    finished = run_program(arguments);
-    if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
-  }
-  fs::path out;
-  Finished finished;
-  nlohmann::json stats;
-};
 
 // [m] largest distance between poses of the same stamp; nothing in common is infinitely far.
 double apart(const fs::path& a, const fs::path& b) {
@@ -42,7 +27,7 @@ double apart(const fs::path& a, const fs::path& b) {
 
 class Localise : public ::testing::Test {
  protected:
-  Localise() : mapped(temp / "mapped", {"--max-frames", "30"}), map(mapped.out / "map.dkb") {}
+  Localise() : mapped(sequence(), temp / "mapped", {"--max-frames", "30"}), map(mapped.out / "map.dkb") {}
   TempFolder temp;
   SlamRun mapped;
   fs::path map;
@@ -51,7 +36,7 @@ class Localise : public ::testing::Test {
 TEST_F(Localise, FromAnotherStartInTheMapsWorldAndTheMapStaysAsItIs) {
   ASSERT_EQ(mapped.finished.exit_code, 0) << mapped.finished.err;
   const std::string before = read_text(map);
-  const SlamRun run(temp / "localised", {"--load-map", map.string(), "--localize", "--start", "0.5"});
+  const SlamRun run(sequence(), temp / "localised", {"--load-map", map.string(), "--localize", "--start", "0.5"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   EXPECT_EQ(run.stats["lost"], 1) << "the second frame confirms where the first one was found";
   EXPECT_EQ(run.stats["tracked"].get<int>() + 1, run.stats["frames"]);
@@ -64,7 +49,7 @@ TEST_F(Localise, FromAnotherStartInTheMapsWorldAndTheMapStaysAsItIs) {
 }
 
 TEST_F(Localise, OrGoOnAndExtendTheMap) {
-  const SlamRun run(temp / "extended", {"--load-map", map.string(), "--start", "0.5"});
+  const SlamRun run(sequence(), temp / "extended", {"--load-map", map.string(), "--start", "0.5"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   EXPECT_EQ(run.stats["tracked"].get<int>() + 1, run.stats["frames"]);
   EXPECT_LT(apart(run.out / "trajectory.txt", mapped.out / "trajectory.txt"), 0.02);
@@ -78,21 +63,21 @@ TEST_F(Localise, WithAMapOfAnotherCameraOrWithNoneIsRefused) {
   MapFile foreign = load_map(map);
   foreign.context.camera.fx += 1;
   save_map(temp / "foreign.dkb", foreign.map, foreign.context);
-  const SlamRun other(temp / "a", {"--load-map", (temp / "foreign.dkb").string(), "--localize"});
+  const SlamRun other(sequence(), temp / "a", {"--load-map", (temp / "foreign.dkb").string(), "--localize"});
   EXPECT_EQ(other.finished.exit_code, 2);
   EXPECT_NE(other.finished.err.find("another camera"), std::string::npos);
   EXPECT_EQ(other.finished.error_lines(), 1U);
-  const SlamRun none(temp / "b", {"--localize"});
+  const SlamRun none(sequence(), temp / "b", {"--localize"});
   EXPECT_EQ(none.finished.exit_code, 2);
   EXPECT_NE(none.finished.err.find("--load-map"), std::string::npos);
   write_text(temp / "damaged.dkb", read_text(map).substr(0, 5000));
-  const SlamRun damaged(temp / "c", {"--load-map", (temp / "damaged.dkb").string()});
+  const SlamRun damaged(sequence(), temp / "c", {"--load-map", (temp / "damaged.dkb").string()});
   EXPECT_EQ(damaged.finished.exit_code, 2);
   EXPECT_EQ(damaged.finished.error_lines(), 1U);
 }
 
 TEST_F(Localise, MapsThatMeetAreMergedInTheWorldOfTheFirst) {
-  const SlamRun second(temp / "second", {"--start", "0.4"});
+  const SlamRun second(sequence(), temp / "second", {"--start", "0.4"});
   ASSERT_EQ(second.finished.exit_code, 0) << second.finished.err;
   const fs::path both = temp / "both.dkb";
   const Finished merged =
@@ -101,7 +86,7 @@ TEST_F(Localise, MapsThatMeetAreMergedInTheWorldOfTheFirst) {
   const MapFile a = load_map(map), b = load_map(second.out / "map.dkb"), joined = load_map(both);
   EXPECT_EQ(joined.map.roots(), std::vector<KeyframeId>{0});
   EXPECT_LT(joined.map.point_count(), a.map.point_count() + b.map.point_count()) << "what both saw is one";
-  const SlamRun run(temp / "in_both", {"--load-map", both.string(), "--localize"});
+  const SlamRun run(sequence(), temp / "in_both", {"--load-map", both.string(), "--localize"});
   EXPECT_EQ(run.stats["tracked"], kSequenceFrames - 1);
   EXPECT_LT(apart(run.out / "trajectory.txt", mapped.out / "trajectory.txt"), 0.03);
 }

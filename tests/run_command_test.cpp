@@ -20,21 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Runs on `dataset` and leaves the results in `out`.
-struct SlamRun {
-  explicit SlamRun(const fs::path& dataset, const fs::path& out_folder, std::vector<std::string> more = {})
-      : out(out_folder) {
-    std::vector<std::string> arguments = {"run",        dataset.string(), "--out",  out.string(),
-                                          "--detector", "none",           "--quiet"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    finished = run_program(arguments);
-    if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
-  }
-  fs::path out;
-  Finished finished;
-  nlohmann::json stats;
-};
-
 const std::vector<std::string> kSameBytes = {"trajectory.txt", "trajectory_online.txt", "keyframes.txt", "map.dkb",
                                              "map.ply",        "config.yaml",           "features.csv"};
 
@@ -116,7 +101,8 @@ TEST(RunCommand, ItsConfigurationRepeatsTheRun) {
   const SlamRun first(sequence(), temp / "first", {"--set", "features.count=600", "--max-frames", "15"});
   ASSERT_EQ(first.finished.exit_code, 0) << first.finished.err;
   EXPECT_NE(read_text(first.out / "config.yaml").find("600"), std::string::npos);
-  const SlamRun again(sequence(), temp / "again", {"--config", (first.out / "config.yaml").string(), "--max-frames", "15"});
+  const SlamRun again(sequence(), temp / "again",
+                      {"--config", (first.out / "config.yaml").string(), "--max-frames", "15"});
   ASSERT_EQ(again.finished.exit_code, 0) << again.finished.err;
   for (const char* name : {"trajectory.txt", "map.dkb", "config.yaml"})
     EXPECT_EQ(read_text(first.out / name), read_text(again.out / name)) << name;

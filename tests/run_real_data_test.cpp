@@ -2,8 +2,6 @@
 // Recorded by a hand-held Kinect (TUM fr1_xyz), where the sequence is at hand.
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -15,12 +13,10 @@ TEST(RunRealData, FollowsEveryFrameOfAHandHeldKinect) {
   const fs::path dataset = fs::path(DKB_SOURCE_DIR) / "../shared/data/rgbd_dataset_freiburg1_xyz";
   if (!fs::exists(dataset / "associations.txt")) GTEST_SKIP() << "skipped: no recorded sequence at " << dataset;
   const TempFolder temp;
-  const Finished run = run_program({"run", dataset.string(), "--out", (temp / "out").string(), "--detector", "none",
-                                    "--max-frames", "60", "--quiet"});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
-  const auto stats = nlohmann::json::parse(read_text(temp.path() / "out" / "stats.json"));
-  EXPECT_EQ(stats.at("tracked"), 60);
-  EXPECT_LT(ape_of(dataset, temp.path() / "out" / "trajectory.txt"), 0.02);
+  const SlamRun run(dataset, temp / "out", {"--max-frames", "60"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), 60);
+  EXPECT_LT(ape_of(dataset, run.out / "trajectory.txt"), 0.02);
 }
 
 }  // namespace
