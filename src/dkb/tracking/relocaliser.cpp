@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/features/matching.h"
-#include "dkb/solver/absolute_pose.h"
+#include "dkb/tracking/descriptor_pose.h"
 #include "dkb/tracking/pose_observation.h"
 #include "dkb/util/errors.h"
 
@@ -111,44 +110,29 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
 // By descriptors alone.
 std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, const RgbdFeatures& features,
                                                const IgnoresPoint& ignores, std::vector<PointId>& points) const {
-  struct Known {
-    PointId id;
-    Descriptor descriptor;
-  };
-  std::vector<Known> known;
+  std::vector<DescribedPoint> known;
   const Keyframe& keyframe = *map.keyframe(id);
   for (size_t f = 0; f < keyframe.points.size(); ++f)
-    if (keyframe.points[f] != kNoPoint) known.push_back({keyframe.points[f], keyframe.features->descriptors[f]});
+    if (const MapPoint* seen = map.point(keyframe.points[f]))
+      known.push_back({seen->id, seen->position, keyframe.features->descriptors[f]});
   const size_t neighbours = std::min(keyframe.covisible.size(), static_cast<size_t>(options_.neighbours));
   for (size_t n = 0; n < neighbours; ++n)
     for (PointId p : map.keyframe(keyframe.covisible[n].keyframe)->points)
-      if (const MapPoint* seen = map.point(p)) known.push_back({p, seen->descriptor});
+      if (const MapPoint* seen = map.point(p)) known.push_back({seen->id, seen->position, seen->descriptor});
   // The keyframe's own descriptors come first and stay.
-  std::stable_sort(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.id < b.id; });
-  known.erase(std::unique(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.id == b.id; }),
-              known.end());
-  std::erase_if(known, [&](const Known& k) { return map.point(k.id) == nullptr || ignores(k.id); });
+  const auto before = [](const DescribedPoint& a, const DescribedPoint& b) { return a.id < b.id; };
+  const auto same = [](const DescribedPoint& a, const DescribedPoint& b) { return a.id == b.id; };
+  std::stable_sort(known.begin(), known.end(), before);
+  known.erase(std::unique(known.begin(), known.end(), same), known.end());
+  std::erase_if(known, [&](const DescribedPoint& k) { return ignores(k.id); });
 
-  std::vector<Descriptor> descriptors;
-  for (const Known& k : known) descriptors.push_back(k.descriptor);
-  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
-  std::erase_if(matches,
-                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
-  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
-  std::vector<PoseObservation> observations;
-  for (const DescriptorMatch& m : matches)
-    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.b)],
-                                            map.point(known[static_cast<size_t>(m.a)].id)->position, noise_,
-                                            scale_factor_));
   RansacOptions ransac;
   ransac.seed = seed_ + static_cast<uint64_t>(id);
   ransac.min_inliers = options_.least_agreeing;
-  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
-  if (!pose.ok) return std::nullopt;
-  points.assign(features.size(), kNoPoint);
-  for (size_t i = 0; i < matches.size(); ++i)
-    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = known[static_cast<size_t>(matches[i].a)].id;
-  return pose.pose;
+  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.least_matches, ransac);
+  if (!found) return std::nullopt;
+  points = std::move(found->points);
+  return found->cam_from_world;
 }
 
 // Matches the map around anew under the proposal's pose and refines it.

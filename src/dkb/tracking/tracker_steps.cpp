@@ -4,9 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dkb/features/matching.h"
-#include "dkb/solver/absolute_pose.h"
-#include "dkb/tracking/pose_observation.h"
+#include "dkb/tracking/descriptor_pose.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -52,29 +50,18 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
 // By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
 // the last place of each point finds just enough wrong ones for a wrong pose.
 std::optional<Rigid3> Tracker::match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const {
-  std::vector<PointId> ids;
-  std::vector<Descriptor> descriptors;
+  std::vector<DescribedPoint> known;
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
-    if (id == kNoPoint || is_retracted(id) || !position(id)) continue;
-    ids.push_back(id);
-    descriptors.push_back(last_->features->descriptors[f]);
+    if (id == kNoPoint || is_retracted(id)) continue;
+    if (const auto at = position(id)) known.push_back({id, *at, last_->features->descriptors[f]});
   }
-  std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
-  std::erase_if(matches,
-                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
-  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
-  std::vector<PoseObservation> observations;
-  for (const DescriptorMatch& m : matches)
-    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.b)],
-                                            *position(ids[static_cast<size_t>(m.a)]), noise_, scale_factor_));
   RansacOptions ransac;
   ransac.seed = seed_;
-  const RansacPose pose = estimate_absolute_pose(camera_, observations, ransac);
-  if (!pose.ok || pose.inliers < options_.least_matches || !is_step(pose.pose)) return std::nullopt;
-  for (size_t i = 0; i < matches.size(); ++i)
-    if (pose.inlier[i]) points[static_cast<size_t>(matches[i].b)] = ids[static_cast<size_t>(matches[i].a)];
-  return pose.pose;
+  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.least_matches, ransac);
+  if (!found || found->inliers < options_.least_matches || !is_step(found->cam_from_world)) return std::nullopt;
+  points = std::move(found->points);
+  return found->cam_from_world;
 }
 
 bool Tracker::track_from_last(TrackedFrame& frame) {
