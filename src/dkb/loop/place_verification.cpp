@@ -7,22 +7,13 @@
 #include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
 #include "dkb/tracking/local_map.h"
+#include "dkb/tracking/pose_observation.h"
 
 namespace dkb {
 namespace {
 
 constexpr int kReliableObservers = 3;
 constexpr int kLeastForPose = 10;
-
-PoseObservation observation_of(const Keypoint& k, const Eigen::Vector3d& point, const Optics& optics) {
-  PoseObservation o;
-  o.point_in_world = point;
-  o.pixel = k.pixel.cast<double>();
-  o.pixel_sigma = optics.noise.corner_sigma(k.octave, optics.scale_factor);
-  o.depth = k.depth;
-  if (k.depth > 0) o.depth_sigma = optics.noise.depth_sigma(k.depth);
-  return o;
-}
 
 }  // namespace
 
@@ -96,8 +87,9 @@ std::optional<PlaceFit> fit_to_area(const Map& map, KeyframeId keyframe, const R
     if (static_cast<int>(matches.size()) < kLeastForPose) return std::nullopt;
     std::vector<PoseObservation> observations;
     for (const ProjectionMatch& m : matches)
-      observations.push_back(observation_of(features.keypoints[static_cast<size_t>(m.feature)],
-                                            area.points[static_cast<size_t>(m.candidate)].position, optics));
+      observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
+                                              area.points[static_cast<size_t>(m.candidate)].position, optics.noise,
+                                              optics.scale_factor));
     const PoseEstimate pose = optimise_pose(optics.camera, fit.cam_from_world, observations);
     if (!pose.ok || pose.inliers < kLeastForPose) return std::nullopt;
     fit.cam_from_world = pose.cam_from_world;
