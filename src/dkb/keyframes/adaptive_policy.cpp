@@ -14,12 +14,6 @@ const char* yes_or_no(bool yes) {
   return yes ? "yes" : "no";
 }
 
-// The points that a keyframe shows, by increasing id.
-void add_points_of(const Keyframe& keyframe, const Map& map, std::vector<PointId>& points) {
-  for (PointId id : keyframe.points)
-    if (map.point(id) != nullptr) points.push_back(id);
-}
-
 // Median depth [m] of the features that show a map point; 0 when none has a depth.
 double median_depth(const KeyframeQuery& q) {
   std::vector<float> depths;
@@ -30,11 +24,6 @@ double median_depth(const KeyframeQuery& q) {
   const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
   return *middle;
-}
-
-void sort_unique(std::vector<PointId>& points) {
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
 }
 
 }  // namespace
@@ -85,13 +74,9 @@ bool AdaptiveKeyframePolicy::level_changed(const KeyframePoint& p, const Eigen::
 // Normals and levels of the keyframe's points and the reference frame's counts: once per keyframe, when first asked
 // for.
 void AdaptiveKeyframePolicy::study_keyframe(KeyframeId id, const Map& map) {
-  const Keyframe& keyframe = *map.keyframe(id);
-  std::vector<PointId> points, cloud;
-  add_points_of(keyframe, map, points);
-  sort_unique(points);
-  cloud = points;
-  for (const Covisible& c : keyframe.covisible) add_points_of(*map.keyframe(c.keyframe), map, cloud);
-  sort_unique(cloud);
+  std::vector<KeyframeId> around = {id};
+  for (const Covisible& c : map.keyframe(id)->covisible) around.push_back(c.keyframe);
+  const std::vector<PointId> points = map.points_of({id}), cloud = map.points_of(around);
   const auto normals = surface_normals(map, points, cloud, options_.normals);
 
   const Rigid3 keyframe_from_world = map.cam_from_world(id);

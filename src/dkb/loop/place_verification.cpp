@@ -22,13 +22,7 @@ MapArea area_around(const Map& map, KeyframeId centre, int keyframes) {
   area.keyframes.push_back(centre);
   for (const Covisible& c : map.keyframe(centre)->covisible)
     if (static_cast<int>(area.keyframes.size()) < keyframes) area.keyframes.push_back(c.keyframe);
-  std::vector<PointId> ids;
-  for (KeyframeId k : area.keyframes)
-    for (PointId p : map.keyframe(k)->points)
-      if (p != kNoPoint) ids.push_back(p);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  for (PointId id : ids) {
+  for (PointId id : map.points_of(area.keyframes)) {
     const MapPoint& p = *map.point(id);
     area.points.push_back(candidate_of(p));
     area.reliable.push_back(static_cast<int>(p.observations.size()) >= kReliableObservers);

@@ -101,6 +101,16 @@ std::vector<PointId> Map::live_points() const {
   return ids;
 }
 
+std::vector<PointId> Map::points_of(const std::vector<KeyframeId>& keyframes) const {
+  std::vector<PointId> ids;
+  for (KeyframeId k : keyframes)
+    for (PointId p : keyframe(k)->points)
+      if (p != kNoPoint) ids.push_back(p);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
 std::vector<RemovedPoint> Map::removed_points() const {
   std::vector<RemovedPoint> removed;
   for (const auto& block : blocks_) {

@@ -88,6 +88,8 @@ class Map {
   // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
+  // The points that these keyframes show, which must exist: increasing, each once.
+  std::vector<PointId> points_of(const std::vector<KeyframeId>& keyframes) const;
   // The live keyframes that look most like `descriptors`, best first; see PlaceIndex.
   std::vector<PlaceMatch> similar_keyframes(std::span<const Descriptor> descriptors, size_t max_results) const {
     return places_.query(descriptors, max_results);

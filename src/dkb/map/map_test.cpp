@@ -140,6 +140,19 @@ TEST(Map, ChainsOfFusionsResolveToTheSurvivor) {
   EXPECT_EQ(world.map.resolve(world.a), kNoPoint);
 }
 
+TEST(Map, ThePointsOfKeyframesAreGivenOnceEachInOrder) {
+  ThreeKeyframes world;
+  EXPECT_EQ(world.map.points_of({1}), (std::vector<PointId>{world.a, world.b, world.c})) << "seen at 5, 4 and 3";
+  const PointId e = born(world.map, 2, 4);
+  EXPECT_EQ(world.map.points_of({2, 1}), (std::vector<PointId>{world.a, world.b, world.c, e}));
+  EXPECT_EQ(world.map.points_of({2, 2}), (std::vector<PointId>{world.a, e}));
+  world.map.remove_point(world.a);
+  EXPECT_EQ(world.map.points_of({2}), std::vector<PointId>{e});
+  world.map.cull_keyframe(1);
+  EXPECT_TRUE(world.map.points_of({1}).empty());
+  EXPECT_TRUE(world.map.points_of({}).empty());
+}
+
 TEST(Map, CovisibilityCountsSharedPointsAndIsMirrored) {
   ThreeKeyframes world;
   world.map.update_covisibility(1, 1);

@@ -25,13 +25,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
     if (static_cast<int>(keyframes.size()) < options.free_keyframes) keyframes.push_back(c.keyframe);
   std::sort(keyframes.begin(), keyframes.end());
 
-  std::vector<PointId> points;
-  for (KeyframeId k : keyframes)
-    for (PointId p : map.keyframe(k)->points)
-      if (p != kNoPoint) points.push_back(p);
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-
+  std::vector<PointId> points = map.points_of(keyframes);
   std::vector<Covisible> around;  // keyframes outside the window, by how many of its points they see
   {
     std::vector<int> count(static_cast<size_t>(map.keyframe_count()), 0);

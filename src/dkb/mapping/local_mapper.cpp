@@ -75,10 +75,10 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
     if (map_.live_keyframe(k) != nullptr) near.push_back(k);
   for (KeyframeId k : correction.far_side)
     if (map_.live_keyframe(k) != nullptr) far.push_back(k);
-  for (KeyframeId k : near) report_.points_fused += fuse_into(k, points_of(far), options_.seam_tolerance);
-  for (KeyframeId k : far) report_.points_fused += fuse_into(k, points_of(near), options_.seam_tolerance);
+  for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), options_.seam_tolerance);
+  for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), options_.seam_tolerance);
   near.insert(near.end(), far.begin(), far.end());
-  refresh(points_of(near));
+  refresh(map_.points_of(near));
   for (KeyframeId k : near) map_.update_covisibility(k, options_.least_shared_points);
   times_.add("map_correction", whole.ms());
   return map_.snapshot();
@@ -125,10 +125,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   }
   report_.points_created += static_cast<int>(born.size());
   young_.insert(young_.end(), born.begin(), born.end());
-  std::vector<PointId> seen;
-  for (PointId p : map_.keyframe(packet.id)->points)
-    if (p != kNoPoint) seen.push_back(p);
-  refresh(seen);
+  refresh(map_.points_of({packet.id}));
   map_.update_covisibility(packet.id, options_.least_shared_points);
   const auto& covisible = map_.keyframe(packet.id)->covisible;
   if (!covisible.empty())
@@ -154,16 +151,6 @@ void LocalMapper::cull_points(KeyframeId newest) {
     }
   }
   young_ = std::move(still_young);
-}
-
-std::vector<PointId> LocalMapper::points_of(const std::vector<KeyframeId>& keyframes) const {
-  std::vector<PointId> points;
-  for (KeyframeId k : keyframes)
-    for (PointId p : map_.keyframe(k)->points)
-      if (p != kNoPoint) points.push_back(p);
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-  return points;
 }
 
 // The better observed point survives; the older one in a tie.
@@ -220,10 +207,10 @@ void LocalMapper::fuse_neighbours(KeyframeId id) {
   std::vector<KeyframeId> neighbours;
   for (const Covisible& c : map_.keyframe(id)->covisible)
     if (static_cast<int>(neighbours.size()) < options_.fusion_keyframes) neighbours.push_back(c.keyframe);
-  for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, points_of({id}));
-  const std::vector<PointId> all = points_of(neighbours);
+  for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, map_.points_of({id}));
+  const std::vector<PointId> all = map_.points_of(neighbours);
   report_.points_fused += fuse_into(id, all);
-  refresh(points_of({id}));
+  refresh(map_.points_of({id}));
 }
 
 void LocalMapper::cull_keyframes(KeyframeId newest) {

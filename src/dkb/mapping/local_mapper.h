@@ -54,7 +54,6 @@ class LocalMapper {
   void apply_reports(const KeyframePacket& packet);
   void cull_points(KeyframeId newest);
   void fuse_neighbours(KeyframeId id);
-  std::vector<PointId> points_of(const std::vector<KeyframeId>& keyframes) const;
   void fuse_pair(PointId a, PointId b);
   int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points, double tolerance = 1);
   void cull_keyframes(KeyframeId newest);

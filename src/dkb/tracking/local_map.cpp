@@ -55,16 +55,10 @@ std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, 
     for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours_of_each)); ++n)
       add(neighbours[n].keyframe);
   }
-  std::vector<PointId> ids;
-  for (KeyframeId k : keyframes)
-    for (PointId p : map.keyframe(k)->points)
-      if (p != kNoPoint) ids.push_back(p);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const std::vector<PointId> ids = map.points_of(keyframes);
   std::vector<Candidate> candidates;
   candidates.reserve(ids.size());
-  for (PointId id : ids)
-    if (const MapPoint* p = map.point(id)) candidates.push_back(candidate_of(*p));
+  for (PointId id : ids) candidates.push_back(candidate_of(*map.point(id)));
   return candidates;
 }
 
