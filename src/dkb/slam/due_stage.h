@@ -27,10 +27,7 @@ class DueStage {
         while (const auto task = tasks_.pop()) results_.push(work_(*task));
       });
   }
-  ~DueStage() {  // what is outstanding is finished first
-    tasks_.close();
-    if (thread_.joinable()) thread_.join();
-  }
+  ~DueStage() { stop(); }
   DueStage(const DueStage&) = delete;
   DueStage& operator=(const DueStage&) = delete;
 
@@ -49,7 +46,13 @@ class DueStage {
     if (result) due_.pop_front();
     return result;
   }
+  // Tasks pushed whose results were not taken.
   size_t outstanding() const { return due_.size(); }
+  // Ends the thread once what is outstanding is finished.
+  void stop() {
+    tasks_.close();
+    if (thread_.joinable()) thread_.join();
+  }
 
  private:
   // More than can ever be outstanding: tracking waits for each task at its due time, or holds back new ones.

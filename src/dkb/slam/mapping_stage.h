@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "dkb/mapping/local_mapper.h"
-#include "dkb/util/bounded_queue.h"
+#include "dkb/slam/due_stage.h"
 
 namespace dkb {
 
@@ -16,9 +14,6 @@ namespace dkb {
 class MappingStage {
  public:
   MappingStage(LocalMapper mapper, bool threaded);
-  ~MappingStage();  // drains and joins
-  MappingStage(const MappingStage&) = delete;
-  MappingStage& operator=(const MappingStage&) = delete;
 
   // Packets and corrections are worked in as they are pushed, one after the other. Due times must not fall.
   void push(KeyframePacket packet, FrameIndex due);
@@ -26,13 +21,13 @@ class MappingStage {
   // The newest view due at `now`, if any. Waits for what is due when `wait`; else takes only what is ready.
   std::optional<MapView> take_due(FrameIndex now, bool wait);
   // Keyframes and corrections pushed whose result was not taken.
-  size_t outstanding() const { return due_.size(); }
+  size_t outstanding() const { return stage_.outstanding(); }
   // Corrections among them: those that the view taken last does not hold.
-  size_t outstanding_corrections() const;
+  size_t outstanding_corrections() const { return corrections_; }
   // Waits for all outstanding work.
   std::optional<MapView> drain();
   // Ends the thread; the mapper may be looked at afterwards.
-  void stop();
+  void stop() { stage_.stop(); }
   const LocalMapper& mapper() const { return mapper_; }  // only after stop(), or without a thread
 
  private:
@@ -40,18 +35,15 @@ class MappingStage {
     KeyframePacket packet;
     std::shared_ptr<const MapCorrection> correction;
   };
-  struct Due {
-    FrameIndex frame = 0;
-    bool correction = false;
+  struct Result {
+    MapView view;
+    bool of_correction = false;
   };
-  void push(Task task, Due due);
-  MapView work(const Task& task);
+  Result work(const Task& task);
 
   LocalMapper mapper_;
-  BoundedQueue<Task> tasks_;
-  BoundedQueue<MapView> views_;
-  std::deque<Due> due_;  // of outstanding tasks, in order
-  std::thread thread_;
+  size_t corrections_ = 0;        // outstanding ones
+  DueStage<Task, Result> stage_;  // last: its thread uses the mapper
 };
 
 }  // namespace dkb
