@@ -17,6 +17,19 @@ float angle_between(float a, float b) {
 
 }  // namespace
 
+Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
+                       double scale_factor) {
+  const Keypoint& k = features.keypoints[feature];
+  Candidate c;
+  c.position = position;
+  c.normal.setZero();
+  c.reference_distance = static_cast<float>(distance);
+  c.reference_scale = static_cast<float>(std::pow(scale_factor, k.octave));
+  c.angle = k.angle;
+  c.descriptor = features.descriptors[feature];
+  return c;
+}
+
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
                                                  const CameraModel& camera, const Rigid3& cam_from_world,
                                                  double scale_factor, int levels, const ProjectionMatchOptions& options,

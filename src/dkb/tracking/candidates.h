@@ -23,6 +23,11 @@ struct Candidate {
   bool established = false;  // known still for long enough that it may be found even where a mover is suspected
 };
 
+// What feature `feature` shows, to be found again in another frame: it stands at `position` [m] in the world,
+// `distance` [m] from the camera that saw it.
+Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
+                       double scale_factor);
+
 struct ProjectionMatchOptions {
   float suspect_depth_gate = 0.03f;  // [1] largest depth difference, relative, at features that are suspected to move
   float radius = 4.0f;               // [px] search radius at the finest level, > 0; grows with the predicted scale

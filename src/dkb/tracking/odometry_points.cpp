@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/tracking/odometry_points.h"
 
-#include <cmath>
-
 namespace dkb {
 namespace {
 
@@ -15,15 +13,9 @@ std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) con
   std::vector<Candidate> result;
   result.reserve(points_.size());
   for (const Point& p : points_) {
-    const Keypoint& k = frame.features->keypoints[static_cast<size_t>(p.feature)];
-    Candidate c;
-    c.position = world_from_cam * p.point_in_cam;
-    c.normal.setZero();
-    c.reference_distance = static_cast<float>(p.point_in_cam.norm());
-    c.reference_scale = static_cast<float>(std::pow(scale_factor_, k.octave));
-    c.angle = k.angle;
-    c.descriptor = frame.features->descriptors[static_cast<size_t>(p.feature)];
-    result.push_back(c);
+    const Eigen::Vector3d position = world_from_cam * p.point_in_cam;
+    result.push_back(
+        candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(), scale_factor_));
   }
   return result;
 }

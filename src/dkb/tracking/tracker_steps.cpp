@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the last frame to this one.
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "dkb/tracking/descriptor_pose.h"
@@ -25,10 +23,10 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (id == kNoPoint || is_retracted(id)) continue;
     const auto at = position(id);
     if (!at) continue;
-    const Keypoint& k = last_->features->keypoints[f];
-    candidates.push_back({id, *at, Eigen::Vector3f::Zero(), static_cast<float>((*at - centre).norm()),
-                          static_cast<float>(std::pow(scale_factor_, k.octave)), k.angle,
-                          last_->features->descriptors[f], established(id, last_->index)});
+    Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), scale_factor_);
+    c.id = id;
+    c.established = established(id, last_->index);
+    candidates.push_back(c);
   }
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
