@@ -7,16 +7,10 @@
 #include <vector>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
-
-// The element at `share` (0 ... 1) of the sorted values; 0.5 is the (upper) median.
-float quantile(std::vector<float>& values, double share) {
-  const size_t k = std::min(values.size() - 1, static_cast<size_t>(share * static_cast<double>(values.size())));
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(k), values.end());
-  return values[k];
-}
 
 // How one coordinate moves: to = centre + scale * (from - centre) + shift, where the shift lies within low ... high.
 struct AxisMotion {

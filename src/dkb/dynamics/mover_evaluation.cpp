@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -30,11 +31,8 @@ struct TrueFrame {
   }
 };
 
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
+double median_or_zero(std::vector<double>& values) {
+  return values.empty() ? 0 : upper_median(values);
 }
 
 std::vector<TrueFrame> frames_of(const MoverRows& truth) {
@@ -165,8 +163,8 @@ MoverEvaluation evaluate_movers(const MoverRows& truth, const MoverRows& estimat
     }
   }
   result.ids = given_ids.size();
-  result.median_position_error = median(std::move(position_errors));
-  result.median_velocity_error = median(std::move(velocity_errors));
+  result.median_position_error = median_or_zero(position_errors);
+  result.median_velocity_error = median_or_zero(velocity_errors);
   if (result.found > 0)
     result.share_within_two_sd = static_cast<double>(within) / static_cast<double>(3 * result.found);
   const CrossingCounter counter(frames, options);

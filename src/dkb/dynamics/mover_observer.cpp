@@ -8,18 +8,13 @@
 #include <numeric>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
 
 constexpr float kBin = 0.05f;        // [m] of depth histograms
 constexpr size_t kMostPoints = 300;  // per object, that medians are taken of
-
-float median(std::vector<float>& v) {
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
 
 // What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
 // sensor's noise.
@@ -92,7 +87,7 @@ Eigen::Vector3d MoverObserver::median_position(std::span<const size_t> cells) co
     for (size_t i = 0; i < 3; ++i) values[i].push_back(p[static_cast<Eigen::Index>(i)]);
   }
   return world_from_cam_.translation +
-         Eigen::Vector3f(median(values[0]), median(values[1]), median(values[2])).cast<double>();
+         Eigen::Vector3f(upper_median(values[0]), upper_median(values[1]), upper_median(values[2])).cast<double>();
 }
 
 // Middle of the stretch of depth, twice `layer` long, that holds most of the depths; the nearest of equals.
@@ -118,7 +113,7 @@ float MoverObserver::main_layer(const std::vector<float>& depths) const {
   for (float d : depths)
     if (const auto bin = static_cast<size_t>(d / kBin); bin <= end_of_most && bin + window > end_of_most)
       in.push_back(d);
-  return median(in);
+  return upper_median(in);
 }
 
 // Depth [m] of the object in each box; 0 = not known. The cells that a box alone has tell it; for a box within others,
@@ -230,7 +225,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
                (i + width >= part_of.size() || mine(i + width));
     }
     if (static_cast<double>(inner) < options_.inner_share * static_cast<double>(cells.size())) continue;
-    parts.push_back({{bounds, std::move(cells)}, median(depths), parts.size()});
+    parts.push_back({{bounds, std::move(cells)}, upper_median(depths), parts.size()});
   }
   // Holes of the depth image and arms held out cut bodies into parts.
   const auto root = [&](size_t p) {
@@ -294,7 +289,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
     observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),
-                            position_sd(static_cast<double>(median(depths)))});
+                            position_sd(static_cast<double>(upper_median(depths)))});
   }
   return observations;
 }

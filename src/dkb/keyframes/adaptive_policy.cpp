@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -20,10 +21,7 @@ double median_depth(const KeyframeQuery& q) {
   for (size_t f = 0; f < q.points->size(); ++f)
     if ((*q.points)[f] != kNoPoint && q.features->keypoints[f].depth > 0)
       depths.push_back(q.features->keypoints[f].depth);
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 0 : upper_median(depths);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "dkb/mapping/test_map.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -51,8 +52,7 @@ class LocalBa : public ::testing::Test {
     for (size_t i = 0; i < id_of.size(); ++i)
       if (const MapPoint* p = map.point(id_of[i]))
         if (p->observations.size() >= 3) errors.push_back((p->position - scene.points[i]).norm());
-    std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2), errors.end());
-    return errors.at(errors.size() / 2);
+    return upper_median(errors);
   }
 
   TestScene scene{400};

@@ -7,6 +7,7 @@
 #include "dkb/tracking/candidates.h"
 #include "dkb/tracking/local_map.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 
@@ -260,9 +261,9 @@ void refresh_point(Map& map, PointId id, double scale_factor) {
     std::vector<int> distances(descriptors.size());
     for (size_t i = 0; i < descriptors.size(); ++i) {
       for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
-      std::nth_element(distances.begin(), distances.begin() + static_cast<long>(distances.size() / 2), distances.end());
-      if (distances[distances.size() / 2] < least) {
-        least = distances[distances.size() / 2];
+      const int median = upper_median(distances);
+      if (median < least) {
+        least = median;
         chosen = i;
       }
     }

@@ -10,6 +10,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
+#include "dkb/util/quantile.h"
 #include "dkb/util/random.h"
 #include "dkb/util/timing.h"
 
@@ -41,6 +42,19 @@ TEST(Random, BelowStaysInRangeAndReachesEveryValue) {
   std::vector<int> seen(7);
   for (int i = 0; i < 1000; ++i) ++seen.at(r.below(7));
   for (int count : seen) EXPECT_GT(count, 80);
+}
+
+TEST(Quantile, IsOneOfTheValues) {
+  std::vector<float> values = {5, 1, 4, 2, 3, 8, 7, 6};
+  EXPECT_EQ(quantile(values, 0), 1);
+  EXPECT_EQ(quantile(values, 0.25), 3);
+  EXPECT_EQ(quantile(values, 0.75), 7);
+  EXPECT_EQ(quantile(values, 1), 8);
+  EXPECT_EQ(upper_median(values), 5) << "the upper of 4 and 5";
+  std::vector<int> odd = {9, 1, 5}, one = {3};
+  EXPECT_EQ(upper_median(odd), 5);
+  EXPECT_EQ(upper_median(one), 3);
+  EXPECT_EQ(quantile(one, 1), 3);
 }
 
 TEST(BoundedQueue, KeepsOrderAcrossThreadsAndDrainsAfterClose) {

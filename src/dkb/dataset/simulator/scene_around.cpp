@@ -4,6 +4,7 @@
 
 #include "dkb/dataset/simulator/noise.h"
 #include "dkb/dataset/simulator/scene.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb::sim {
 namespace {
@@ -12,11 +13,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kDeskHeight = 0.74, kDeskWidth = 1.4, kDeskDepth = 0.75;  // [m]
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
 
 // Rotation to a frame with z up in which the camera looks towards +y on average.
 Eigen::Quaterniond upright(const std::vector<TimedPose>& poses) {
@@ -122,7 +118,7 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
     middle += looked_at(views.back()) / static_cast<double>(samples.size());
   }
   // Desks stand where the camera looks from about 1.1 m; it stays above them.
-  const double lift = std::max(kDeskHeight - median(looked_heights), kDeskHeight + 0.42 - lowest);
+  const double lift = std::max(kDeskHeight - upper_median(looked_heights), kDeskHeight + 0.42 - lowest);
   scene_from_world.translation = Vector3d(-middle.x(), -middle.y(), lift);
   Footprint room{1e9, 1e9, -1e9, -1e9};
   const auto include = [&](const Vector2d& p, double margin) {

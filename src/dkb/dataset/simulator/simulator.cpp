@@ -13,6 +13,7 @@
 #include "dkb/dataset/simulator/sensor.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -41,12 +42,6 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
     throw InputError(file + ": holds " + std::to_string(poses.size()) +
                      " poses; a camera path needs at least 2 at different times");
   return poses;
-}
-
-double median_of(std::vector<float>* v) {
-  const auto middle = v->begin() + static_cast<std::ptrdiff_t>(v->size() / 2);
-  std::nth_element(v->begin(), middle, v->end());
-  return static_cast<double>(*middle);
 }
 
 }  // namespace
@@ -147,7 +142,7 @@ void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const s
     SimulatedMover out;
     out.id = scene.movers[m].id;
     out.kind = scene.movers[m].kind;
-    out.position_in_world = {median_of(&s.x), median_of(&s.y), median_of(&s.z)};
+    out.position_in_world = Eigen::Vector3f(upper_median(s.x), upper_median(s.y), upper_median(s.z)).cast<double>();
     const Eigen::Vector2d v = scene.movers[m].track.at(t).velocity;
     out.velocity_in_world = scene.world_from_scene.rotation * Eigen::Vector3d(v.x(), v.y(), 0);
     out.box_x = s.x0;
