@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb::bench {
 
@@ -23,8 +24,7 @@ std::string Ended::failure(const std::string& error_output) const {
   std::istringstream lines(error_output);
   for (std::string line; std::getline(lines, line);)
     if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
-  for (char& c : last)
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  last = one_line(std::move(last));
   if (last.starts_with("error: ")) last.erase(0, 7);
   if (last.size() > 300) {
     last.resize(300);

@@ -15,6 +15,7 @@
 #include "dkb/slam/options.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 #include "run_command.h"
 
@@ -26,11 +27,8 @@ constexpr size_t kMaxBytes = size_t{1} << 20;
 constexpr int64_t kMaxSeeds = 1000, kMaxFrames = 10'000'000;
 constexpr size_t kMaxSequences = 1000, kMaxVariants = 1000;
 
-// Keeps a message one line long, whatever it quotes.
 std::string in_quotes(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text.substr(0, 80)) out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  return out + (text.size() > 80 ? "...\"" : "\"");
+  return "\"" + one_line(text.substr(0, 80)) + (text.size() > 80 ? "...\"" : "\"");
 }
 
 // A node with its place in the file, for messages.
@@ -57,9 +55,7 @@ class Reader {
       if (!known.empty() && std::find(known.begin(), known.end(), key) == known.end())
         key_reader.fail("unknown key " + in_quotes(key) + did_you_mean(key, known));
       if (!seen.insert(key).second) key_reader.fail("key " + in_quotes(key) + " is given twice");
-      std::string path = path_.empty() ? key : path_ + "." + key;
-      for (char& c : path)
-        if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+      const std::string path = one_line(path_.empty() ? key : path_ + "." + key);
       result.emplace_back(key, Reader(item.second, file_, path.substr(0, 160)));
     }
     return result;
@@ -113,11 +109,8 @@ void with_yaml(const std::string& text, const std::string& name, const std::func
   try {
     read(Reader(YAML::Load(text), name, ""));
   } catch (const YAML::Exception& e) {
-    std::string what = e.msg;
-    for (char& c : what)
-      if (static_cast<unsigned char>(c) < 0x20) c = ' ';
     throw InputError((e.mark.is_null() ? name : name + ":" + std::to_string(e.mark.line + 1)) +
-                     ": is not valid YAML (" + what.substr(0, 120) + ")");
+                     ": is not valid YAML (" + one_line(e.msg).substr(0, 120) + ")");
   }
 }
 

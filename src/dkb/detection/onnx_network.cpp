@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -58,8 +59,7 @@ std::string between(const std::string& text, const std::string& before, const st
 // What to do about OpenCV's message, in one line with the layer first where it names one:
 // `Node [Gemm@ai.onnx]:(onnx_node!name) parse error: ... error: reason`, or `Can't create layer "..." of type "Gemm"`.
 std::string explain(const std::string& message) {
-  std::string text;
-  for (const char c : message) text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  const std::string text = one_line(message);
   std::string type = between(text, "Node [", "@"), layer = between(text, "]:(", ")");
   if (type.empty()) type = between(text, "of type \"", "\"");
   if (layer.empty()) layer = between(text, "Can't create layer \"", "\"");

@@ -2,15 +2,16 @@
 #include "dkb/evaluation/text_table.h"
 
 #include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb {
 namespace {
 
 std::string markdown_cell(const std::string& text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : one_line(text)) {
     if (c == '|') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    out += c;
   }
   return out;
 }

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <utility>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb {
 namespace {
@@ -60,10 +62,9 @@ std::string yaml_quoted(const std::string& text) {
   return out + "\"";
 }
 
-// Keeps a message one line long, whatever it quotes.
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+// What a message quotes of `text`.
+std::string excerpt(std::string text) {
+  text = one_line(std::move(text));
   if (text.size() > 120) text = text.substr(0, 117) + "...";
   return text;
 }
@@ -191,16 +192,16 @@ void Settings::bind(const std::string& key, std::string* field, const std::strin
 void Settings::set(const std::string& key, const std::string& value, const std::string& where) {
   const auto it = bindings_.find(key);
   if (it == bindings_.end())
-    throw InputError(where + ": unknown key \"" + one_line(key) + "\"" + did_you_mean(key, keys()));
+    throw InputError(where + ": unknown key \"" + excerpt(key) + "\"" + did_you_mean(key, keys()));
   if (!it->second.read(value))
-    throw InputError(where + ": " + key + ": \"" + one_line(value) + "\" is not " + it->second.expected);
+    throw InputError(where + ": " + key + ": \"" + excerpt(value) + "\" is not " + it->second.expected);
   it->second.where = where;
 }
 
 void Settings::set_assignment(const std::string& assignment, const std::string& where) {
   const size_t equals = assignment.find('=');
   if (equals == std::string::npos)
-    throw InputError(where + ": \"" + one_line(assignment) + "\" has no value; write key=value");
+    throw InputError(where + ": \"" + excerpt(assignment) + "\" has no value; write key=value");
   set(assignment.substr(0, equals), assignment.substr(equals + 1), where);
 }
 
@@ -215,7 +216,7 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
   try {
     root = YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw InputError(place(name, e.mark) + ": is not valid YAML (" + one_line(e.msg) + ")");
+    throw InputError(place(name, e.mark) + ": is not valid YAML (" + excerpt(e.msg) + ")");
   }
 
   // Every node that is entered has a key of its own that is a known one or a known section, so that aliases cannot make
@@ -234,7 +235,7 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
           const std::string where = place(name, first.Mark());
           if (!first.IsScalar()) throw InputError(where + ": a key must be a word");
           const std::string key = prefix + first.Scalar();
-          if (!seen.insert(key).second) throw InputError(where + ": key \"" + one_line(key) + "\" is given twice");
+          if (!seen.insert(key).second) throw InputError(where + ": key \"" + excerpt(key) + "\" is given twice");
           const auto at = std::lower_bound(known.begin(), known.end(), key + ".");
           const bool is_section = at != known.end() && at->compare(0, key.size() + 1, key + ".") == 0;
           if (is_section) {
@@ -249,7 +250,7 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
   try {
     walk(root, "", 0);
   } catch (const YAML::Exception& e) {
-    throw InputError(place(name, e.mark) + ": is not valid YAML (" + one_line(e.msg) + ")");
+    throw InputError(place(name, e.mark) + ": is not valid YAML (" + excerpt(e.msg) + ")");
   }
 }
 

@@ -10,6 +10,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/quantile.h"
 #include "dkb/util/random.h"
 #include "dkb/util/timing.h"
@@ -42,6 +43,12 @@ TEST(Random, BelowStaysInRangeAndReachesEveryValue) {
   std::vector<int> seen(7);
   for (int i = 0; i < 1000; ++i) ++seen.at(r.below(7));
   for (int count : seen) EXPECT_GT(count, 80);
+}
+
+TEST(OneLine, HasASpaceForEachControlCharacter) {
+  EXPECT_EQ(one_line("a\nb\r\n\tc"), "a b   c");
+  EXPECT_EQ(one_line(std::string("\0x", 2)), " x");
+  EXPECT_EQ(one_line("d\xC3\xA9j\xC3\xA0 vu~"), "d\xC3\xA9j\xC3\xA0 vu~") << "UTF-8 stays";
 }
 
 TEST(Quantile, IsOneOfTheValues) {
