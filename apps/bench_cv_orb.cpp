@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench_cv_orb.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +8,7 @@
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/module.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -17,15 +16,11 @@ namespace {
 
 using Measure = decltype(&dkb_cv_orb_1);
 
-// Beside the program, in the library folder of its installation, and where it was built.
+// Null when this build has none.
 Measure load_module() {
-  std::error_code ignored;
-  const fs::path own = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const fs::path& folder : {own, own / ".." / DKB_MODULE_LIBDIR, fs::path(DKB_MODULE_INSTALL_DIR)})
-    // Never closed: OpenCV's threads and statics outlive any call.
-    if (void* module = dlopen((folder / "libdkb_cv_orb.so").c_str(), RTLD_NOW | RTLD_LOCAL))
-      return reinterpret_cast<Measure>(dlsym(module, "dkb_cv_orb_1"));
-  return nullptr;
+  std::string reason;
+  const Module module{"libdkb_cv_orb.so", DKB_MODULE_LIBDIR, {DKB_MODULE_INSTALL_DIR}};
+  return reinterpret_cast<Measure>(module_symbol(module, "dkb_cv_orb_1", &reason));
 }
 
 }  // namespace

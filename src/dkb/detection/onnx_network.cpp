@@ -1,52 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/detection/onnx_network.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <array>
-#include <filesystem>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/module.h"
 #include "dkb/util/one_line.h"
 
 namespace dkb {
-namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kModule = "libdkb_onnx.so";
-
-// The folder of the program or shared library that this code was linked into.
-fs::path own_folder() {
-  Dl_info info{};
-  if (dladdr(reinterpret_cast<const void*>(&own_folder), &info) == 0 || info.dli_fname == nullptr) return {};
-  const fs::path name = info.dli_fname;  // for a program as it was called, so without a folder when found by PATH
-  std::error_code error;
-  const fs::path self = fs::canonical(name.has_parent_path() ? name : fs::path("/proc/self/exe"), error);
-  return error ? fs::path() : self.parent_path();
-}
-
-// Beside an installed program first; then the build tree, and where this build installs to.
 // `reason`: why not, in one line, when the answer is null.
 const DkbOnnxApi* load_module(std::string* reason) {
-  *reason = std::string(kModule) + " is not installed beside it";
-  std::vector<fs::path> folders;
-  if (const fs::path own = own_folder(); !own.empty())
-    folders = {own, (own / ".." / DKB_MODULE_LIBDIR).lexically_normal()};
-  folders.emplace_back(DKB_MODULE_BUILD_DIR);
-  folders.emplace_back(DKB_MODULE_INSTALL_DIR);
-  for (const fs::path& folder : folders) {
-    // Never closed: OpenCV's threads and statics outlive any network.
-    void* module = folder.empty() ? nullptr : dlopen((folder / kModule).c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (module == nullptr) {
-      const char* error = dlerror();
-      std::error_code ignored;
-      if (error != nullptr && !folder.empty() && fs::exists(folder / kModule, ignored)) *reason = error;
-      continue;
-    }
-    if (void* symbol = dlsym(module, "dkb_onnx_api_1")) return reinterpret_cast<const DkbOnnxApi* (*)()>(symbol)();
-  }
-  return nullptr;
+  const Module module{"libdkb_onnx.so", DKB_MODULE_LIBDIR, {DKB_MODULE_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
+  void* symbol = module_symbol(module, "dkb_onnx_api_1", reason);
+  return symbol == nullptr ? nullptr : reinterpret_cast<const DkbOnnxApi* (*)()>(symbol)();
 }
 
 std::string between(const std::string& text, const std::string& before, const std::string& after) {
