@@ -21,13 +21,15 @@ constexpr Figure kFigures[] = {{"rmse", &ErrorStatistics::rmse},     {"mean", &E
                                {"median", &ErrorStatistics::median}, {"std", &ErrorStatistics::std},
                                {"min", &ErrorStatistics::min},       {"max", &ErrorStatistics::max}};
 
-std::optional<Bar> rmse_bar(const Cell& cell) {
-  const std::vector<double> ape = cell.ape();
-  if (ape.empty()) return {};
-  const MedianInterval m = median_interval(ape);
+Bar bar_of(const MedianInterval& m) {
   Bar bar{m.median, {}};
   if (m.known) bar.whisker = {m.interval.low, m.interval.high};
   return bar;
+}
+
+std::optional<Bar> rmse_bar(const Cell& cell) {
+  const std::vector<double> ape = cell.ape();
+  return ape.empty() ? std::nullopt : std::optional(bar_of(median_interval(ape)));
 }
 
 // The run whose APE is the (lower) median.
@@ -114,11 +116,7 @@ class Plotter {
     std::vector<BarPanel> panels;
     for (const SweepResult& s : results_.sweep) {
       BarPanel panel{s.sequence, {{"median, 95% interval", {}}}};
-      for (const MedianInterval& m : s.ape) {
-        Bar bar{m.median, {}};
-        if (m.known) bar.whisker = {m.interval.low, m.interval.high};
-        panel.groups[0].bars.push_back(bar);
-      }
+      for (const MedianInterval& m : s.ape) panel.groups[0].bars.emplace_back(bar_of(m));
       panels.push_back(std::move(panel));
     }
     return bar_panels_svg("Sensitivity to " + sweep.label, "APE [m]", names, panels);

@@ -323,9 +323,7 @@ class Runner {
     const int64_t most = s.max_frames > 0 ? s.max_frames : suite_.max_frames;
     add("--max-frames", most > 0 ? std::to_string(most) : "");
     add("--camera", s.camera);
-    std::string disabled;
-    for (const std::string& part : v.disable) disabled += (disabled.empty() ? "" : ",") + part;
-    add("--disable", disabled);
+    add("--disable", v.disabled());
     add("--detector", v.detector);
     add("--filter", v.filter);
     if (const auto model = model_.find(job.variant); model != model_.end()) add("--model", model->second.string());

@@ -180,9 +180,7 @@ void check_options(const SuiteVariant& v, const Reader& reader) {
     bind_settings(settings, options);
     for (const auto& [key, value] : v.set) settings.set(key, value, "set");
     if (!v.filter.empty()) settings.set("dynamics.filter", v.filter, "filter");
-    std::string disabled;
-    for (const std::string& part : v.disable) disabled += (disabled.empty() ? "" : ",") + part;
-    disable_parts(options, parse_disabled(disabled));
+    disable_parts(options, parse_disabled(v.disabled()));
     options.check();
     if (!v.detector.empty()) detector_kinds(v.detector, "");
   } catch (const InputError& e) {
@@ -271,6 +269,12 @@ std::map<std::string, std::map<std::string, double>> read_numbers(const Reader& 
 }
 
 }  // namespace
+
+std::string SuiteVariant::disabled() const {
+  std::string words;
+  for (const std::string& part : disable) words += (words.empty() ? "" : ",") + part;
+  return words;
+}
 
 const SuiteSequence* Suite::sequence(const std::string& sequence_name) const {
   const auto it =

@@ -35,6 +35,8 @@ struct SuiteVariant {
   std::string get;        // how to get what it needs, e.g. a model; with it, what is missing is named and left out
   std::string published;  // its name in the table of published numbers; empty: its own name
   std::optional<double> swept;  // its value, if it was made by the suite's sweep
+
+  std::string disabled() const;  // as for `run --disable`
 };
 
 // One setting taken through a list of values; each value becomes a variant.

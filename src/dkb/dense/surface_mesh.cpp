@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <bit>
-#include <cstring>
 #include <numeric>
+
+#include "dkb/map/byte_stream.h"
 
 namespace dkb {
 namespace {
@@ -122,14 +122,6 @@ int32_t find_root(std::vector<int32_t>& parent, int32_t i) {
   return i;
 }
 
-template <class T>
-void append(std::string* bytes, T value) {
-  static_assert(std::endian::native == std::endian::little);
-  char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));
-  bytes->append(raw, sizeof(T));
-}
-
 }  // namespace
 
 SurfaceMesh extract_surface(const TsdfVolume& volume) {
@@ -213,7 +205,7 @@ SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double least_area) {
 }
 
 std::string mesh_ply(const SurfaceMesh& mesh) {
-  std::string bytes = fmt::format(
+  const std::string header = fmt::format(
       "ply\n"
       "format binary_little_endian 1.0\n"
       "comment surface of the still world by dkb-slam; metres\n"
@@ -228,16 +220,18 @@ std::string mesh_ply(const SurfaceMesh& mesh) {
       "property list uchar int vertex_indices\n"
       "end_header\n",
       mesh.vertices.size(), mesh.triangles.size());
-  bytes.reserve(bytes.size() + 15 * mesh.vertices.size() + 13 * mesh.triangles.size());
+  ByteWriter out;
+  out.reserve(header.size() + 15 * mesh.vertices.size() + 13 * mesh.triangles.size());
+  out.raw(header);
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
-    for (int i = 0; i < 3; ++i) append(&bytes, mesh.vertices[v][i]);
-    for (uint8_t channel : {mesh.colours[v].r, mesh.colours[v].g, mesh.colours[v].b}) append(&bytes, channel);
+    for (int i = 0; i < 3; ++i) out.f32(mesh.vertices[v][i]);
+    for (uint8_t channel : {mesh.colours[v].r, mesh.colours[v].g, mesh.colours[v].b}) out.u8(channel);
   }
   for (const auto& t : mesh.triangles) {
-    append(&bytes, uint8_t{3});
-    for (int32_t v : t) append(&bytes, v);
+    out.u8(3);
+    for (int32_t v : t) out.i32(v);
   }
-  return bytes;
+  return out.take();
 }
 
 }  // namespace dkb

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace dkb {
 
@@ -18,6 +19,7 @@ class ByteWriter {
   void u32(uint32_t v) { fixed(v); }
   void u64(uint64_t v) { fixed(v); }
   void i32(int32_t v) { fixed(static_cast<uint32_t>(v)); }
+  void f32(float v) { fixed(std::bit_cast<uint32_t>(v)); }
   void f64(double v) { fixed(std::bit_cast<uint64_t>(v)); }
   // 7 bits per byte, low ones first; the top bit says that more follow.
   void varint(uint64_t v) {
@@ -28,7 +30,9 @@ class ByteWriter {
   void zigzag(int64_t v) { varint((static_cast<uint64_t>(v) << 1) ^ static_cast<uint64_t>(v >> 63)); }
   void raw(std::string_view v) { bytes_.append(v); }
 
+  void reserve(size_t size) { bytes_.reserve(size); }
   const std::string& bytes() const { return bytes_; }
+  std::string take() { return std::exchange(bytes_, {}); }  // what was written; goes on empty
 
  private:
   template <class T>

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <iterator>
 
 #include "dkb/map/byte_stream.h"
@@ -12,7 +11,7 @@ namespace dkb {
 namespace {
 
 void write_position(ByteWriter& out, const Eigen::Vector3d& position) {
-  for (int i = 0; i < 3; ++i) out.u32(std::bit_cast<uint32_t>(static_cast<float>(position[i])));
+  for (int i = 0; i < 3; ++i) out.f32(static_cast<float>(position[i]));
 }
 
 }  // namespace
@@ -39,7 +38,7 @@ std::string point_cloud_ply(const Map& map) {
     for (uint8_t channel : {p.colour.r, p.colour.g, p.colour.b}) out.u8(channel);
     out.i32(static_cast<int32_t>(p.observations.size()));
   }
-  return out.bytes();
+  return out.take();
 }
 
 std::string point_cloud_pcd(const Map& map) {
@@ -62,7 +61,7 @@ std::string point_cloud_pcd(const Map& map) {
     write_position(out, p.position);
     out.u32(static_cast<uint32_t>(p.colour.r) << 16 | static_cast<uint32_t>(p.colour.g) << 8 | p.colour.b);
   }
-  return out.bytes();
+  return out.take();
 }
 
 std::string point_cloud_json(const Map& map) {
