@@ -76,7 +76,9 @@ void DynamicStage::move_world(const Rigid3& new_world_from_old_world) {
 }
 
 void DynamicStage::note_keyframe() {
-  if (!past_.empty()) past_.back().keyframe = true;
+  if (past_.empty()) return;
+  past_.back().keyframe = true;
+  if (motion_) past_.back().score = motion_->score();
 }
 
 std::vector<PointMotion> DynamicStage::follow(const PastFrame& from, const ImagePyramid& to,
@@ -141,6 +143,9 @@ void DynamicStage::receive(const Context& context, const std::shared_ptr<const I
 
 std::vector<FilterFeature> DynamicStage::describe(const Context& context, const ImagePyramid& pyramid,
                                                   bool with_flow) const {
+  // The others ask only where in the image a corner lies.
+  const bool in_space = options_.filter == FilterKind::paper || options_.filter == FilterKind::epipolar ||
+                        options_.filter == FilterKind::multiview;
   const auto& corners = context.orb->corners;
   std::vector<FilterFeature> features(corners.size());
   std::vector<Eigen::Vector2f> points(corners.size());
@@ -148,6 +153,7 @@ std::vector<FilterFeature> DynamicStage::describe(const Context& context, const 
     FilterFeature& f = features[i];
     points[i] = {corners[i].x, corners[i].y};
     f.image_pixel = points[i].cast<double>();
+    if (!in_space) continue;
     f.pixel = (*context.undistort)(corners[i].x, corners[i].y).cast<double>();
     f.depth = depth_near(context.image->depth, corners[i].x, corners[i].y);
   }
@@ -273,7 +279,6 @@ void DynamicStage::remember(const Context& context, std::shared_ptr<const ImageP
   now.frame = context.frame;
   now.image = context.image;
   now.pyramid = std::move(pyramid);
-  if (motion_) now.score = motion_->score();
   for (const Corner& c : context.orb->corners) now.corners.emplace_back(c.x, c.y);
   past_.push_back(std::move(now));
   const size_t kept = slow_ ? static_cast<size_t>(schedule_.latency + schedule_.every) + 1 : 1;

@@ -275,12 +275,11 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
                                          [this](const auto&... point) { return looks_the_same(point...); });
   TrackedFrame& frame = outcome.frame;
   report_features(frame);
-  const bool has_pose = outcome.state == TrackingState::tracking || outcome.state == TrackingState::relocalised;
-  dynamics_.commit(has_pose ? std::optional(frame.cam_from_world) : std::nullopt);
+  result.state = outcome.state;
+  dynamics_.commit(result.tracked() ? std::optional(frame.cam_from_world) : std::nullopt);
 
   result.frame = next_frame_++;
   result.timestamp = image.timestamp;
-  result.state = outcome.state;
   ++statistics_.frames;
   if (result.tracked()) {
     if (outcome.state == TrackingState::relocalised) {
