@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "dkb/tracking/tracker_fixture.h"
+#include "dkb/tracking/tracker_test_fixture.h"
 
 namespace dkb {
 namespace {

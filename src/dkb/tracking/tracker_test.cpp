@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dkb/tracking/tracker_fixture.h"
+#include "dkb/tracking/tracker_test_fixture.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
