@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <functional>
 
 #include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -21,16 +21,8 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(text.find(from), from.size(), to);
 }
 
-std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "no error";
-}
 std::string parse_message(const std::string& text) {
-  return message([&] { parse_camera(text, "camera.yaml"); });
+  return test::input_error_of([&] { parse_camera(text, "camera.yaml"); });
 }
 
 TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
@@ -75,7 +67,9 @@ TEST(CameraFile, FilesInConfigAreTheBuiltInCameras) {
 
 class ChooseCamera : public testing::Test {
  protected:
-  ChooseCamera() : root(fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_choose_camera")) { fs::remove_all(root); }
+  ChooseCamera() : root(fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_choose_camera")) {
+    fs::remove_all(root);
+  }
   ~ChooseCamera() override { fs::remove_all(root); }
   fs::path folder(const std::string& name) const {
     fs::create_directories(root / name);
@@ -104,9 +98,10 @@ TEST_F(ChooseCamera, KnowsFolderNamesAsWords) {
 }
 
 TEST_F(ChooseCamera, RefusalsNameTheFile) {
-  EXPECT_NE(message([&] { choose_camera("/no/none.yaml", folder("a")); }).find("/no/none.yaml"), std::string::npos);
-  EXPECT_NE(message([&] { choose_camera("fr4", folder("a")); }).find("did you mean"), std::string::npos);
-  EXPECT_NE(message([&] { choose_camera("", folder("a")); }).find("--camera"), std::string::npos);
+  EXPECT_NE(test::input_error_of([&] { choose_camera("/no/none.yaml", folder("a")); }).find("/no/none.yaml"),
+            std::string::npos);
+  EXPECT_NE(test::input_error_of([&] { choose_camera("fr4", folder("a")); }).find("did you mean"), std::string::npos);
+  EXPECT_NE(test::input_error_of([&] { choose_camera("", folder("a")); }).find("--camera"), std::string::npos);
 }
 
 TEST(CameraFile, MutatedFilesThrowNothingButInputErrors) {

@@ -6,12 +6,12 @@
 
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <limits>
 
 #include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -29,15 +29,6 @@ Image<float> float_depth(int width = 19, int height = 17) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) image(x, y) = 1.0f + 0.01f * static_cast<float>(x) + 0.1f * static_cast<float>(y);
   return image;
-}
-
-std::string error(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 // Bytes of a .npy file of float32, little endian.
@@ -160,16 +151,16 @@ TEST(FloatDepth, BigEndianTiffInSeveralStripsIsRead) {
 TEST(ImageCodecs, WrongTypesAreCalledByName) {
   const CameraModel camera;
   const std::string ending = "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY";
-  EXPECT_EQ(error([&] { decode_depth(encode_png(GreyImage(20, 20)), "d.png", camera); }),
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_png(GreyImage(20, 20)), "d.png", camera); }),
             "d.png: is an 8-bit grey PNG" + ending);
-  EXPECT_EQ(error([&] { decode_depth(encode_jpeg(colour_picture()), "d.png", camera); }),
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_jpeg(colour_picture()), "d.png", camera); }),
             "d.png: is an 8-bit colour JPEG" + ending);
-  EXPECT_EQ(error([&] { decode_picture(encode_pfm(float_depth()), "a.png"); }),
+  EXPECT_EQ(test::input_error_of([&] { decode_picture(encode_pfm(float_depth()), "a.png"); }),
             "a.png: is a 32-bit float grey PFM; a picture must be PNG or JPEG");
-  EXPECT_EQ(error([&] { decode_picture("", "a.png"); }), "a.png: is empty");
-  EXPECT_EQ(error([&] { decode_picture("GIF89a", "a.png"); }),
+  EXPECT_EQ(test::input_error_of([&] { decode_picture("", "a.png"); }), "a.png: is empty");
+  EXPECT_EQ(test::input_error_of([&] { decode_picture("GIF89a", "a.png"); }),
             "a.png: is not an image of a known kind (PNG, JPEG; depth also TIFF, PFM, NPY)");
-  EXPECT_NE(error([&] { read_picture("/no/a.png"); }).find("/no/a.png"), std::string::npos);
+  EXPECT_NE(test::input_error_of([&] { read_picture("/no/a.png"); }).find("/no/a.png"), std::string::npos);
 }
 
 TEST(ImageCodecs, ContentDecidesNotTheName) {
@@ -192,9 +183,12 @@ TEST(ImageCodecs, EveryTruncationIsAnInputError) {
 TEST(ImageCodecs, SidesAreBounded) {
   std::string png = encode_png(GreyImage(20, 20));
   png[16] = 0x7F;  // width 0x7F000014
-  EXPECT_NE(error([&] { decode_picture(png, "a.png"); }).find("sides must be 1 ... 16384"), std::string::npos);
-  EXPECT_NE(error([&] { decode_depth("Pf\n0 5\n-1\n", "a", CameraModel()); }).find("sides must be"), std::string::npos);
-  EXPECT_EQ(error([&] { decode_depth("Pf\n16384 16384\n-1\n", "a", CameraModel()); }), "a: is truncated");
+  EXPECT_NE(test::input_error_of([&] { decode_picture(png, "a.png"); }).find("sides must be 1 ... 16384"),
+            std::string::npos);
+  EXPECT_NE(test::input_error_of([&] { decode_depth("Pf\n0 5\n-1\n", "a", CameraModel()); }).find("sides must be"),
+            std::string::npos);
+  EXPECT_EQ(test::input_error_of([&] { decode_depth("Pf\n16384 16384\n-1\n", "a", CameraModel()); }),
+            "a: is truncated");
 }
 
 TEST(ImageCodecs, MutatedImagesThrowNothingButInputErrors) {
@@ -220,7 +214,8 @@ TEST(ImageCodecs, MutatedImagesThrowNothingButInputErrors) {
 }
 
 TEST(ImageCodecs, FilesAreWrittenAndReadBack) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_codec.png");
+  const std::filesystem::path path =
+      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_codec.png");
   write_image_file(path, encode_png(colour_picture()));
   EXPECT_EQ(read_picture(path).colour, colour_picture());
   EXPECT_EQ(read_grey(path), grey_from_colour(colour_picture()));

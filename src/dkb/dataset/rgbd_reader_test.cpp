@@ -12,6 +12,7 @@
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -39,12 +40,7 @@ class RgbdReaderTest : public testing::Test {
   ~RgbdReaderTest() override { fs::remove_all(folder); }
 
   std::string probe_error() const {
-    try {
-      RgbdReader reader(pairs, camera, {}, nullptr);
-    } catch (const InputError& e) {
-      return e.what();
-    }
-    return "no error";
+    return test::input_error_of([&] { RgbdReader reader(pairs, camera, {}, nullptr); });
   }
   std::vector<DatasetFrame> read_all(const RgbdReaderOptions& options, WarningLog* warnings = nullptr) const {
     RgbdReader reader(pairs, camera, options, warnings);

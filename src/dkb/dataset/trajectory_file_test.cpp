@@ -8,17 +8,13 @@
 
 #include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
 
 std::string error(const std::string& text) {
-  try {
-    parse_trajectory(text, "t.txt");
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "no error";
+  return test::input_error_of([&] { parse_trajectory(text, "t.txt"); });
 }
 
 TEST(TrajectoryFile, ReadsRowsSortedByStampEqualStampsInOrder) {
@@ -55,7 +51,8 @@ TEST(TrajectoryFile, WritesStampsAsReadAndNineDecimals) {
 }
 
 TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_trajectory.txt");
+  const std::filesystem::path path =
+      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_trajectory.txt");
   const Trajectory t = parse_trajectory("1.25 0.1 0.2 0.3 0.5 0.5 0.5 0.5\n3 -1 -2 -3 0 0 0 1\n", "t.txt");
   write_trajectory(path, t);
   EXPECT_EQ(trajectory_to_text(read_trajectory(path)), trajectory_to_text(t));

@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <functional>
 
 #include "dkb/dataset/mutation_testing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -26,13 +26,8 @@ class TumFolder : public testing::Test {
   void write(const std::string& name, const std::string& text) const { write_file_atomically(folder / name, text); }
   // The message without the folder's path.
   std::string error() const {
-    try {
-      open_tum_dataset(folder);
-    } catch (const InputError& e) {
-      const std::string what = e.what(), prefix = folder.string() + "/";
-      return what.rfind(prefix, 0) == 0 ? what.substr(prefix.size()) : what;
-    }
-    return "no error";
+    const std::string what = test::input_error_of([&] { open_tum_dataset(folder); }), prefix = folder.string() + "/";
+    return what.rfind(prefix, 0) == 0 ? what.substr(prefix.size()) : what;
   }
   const fs::path folder;
 };

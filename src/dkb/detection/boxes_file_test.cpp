@@ -5,17 +5,13 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
 
 std::string error_of(const std::string& text) {
-  try {
-    parse_boxes(text, "b.txt", 640, 480);
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "none";
+  return test::input_error_of([&] { parse_boxes(text, "b.txt", 640, 480); });
 }
 
 TEST(BoxesFile, RowsAreGroupedByStampAndSorted) {

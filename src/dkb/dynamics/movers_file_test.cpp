@@ -8,6 +8,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -22,12 +23,7 @@ MoverRow example() {
 }
 
 std::string error_of(const std::string& text) {
-  try {
-    parse_movers(text, "m.csv");
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "none";
+  return test::input_error_of([&] { parse_movers(text, "m.csv"); });
 }
 
 TEST(MoversFile, RowsAreWrittenWithTheStampAsRead) {
@@ -48,7 +44,8 @@ TEST(MoversFile, ByteOrderMarksCarriageReturnsAndEmptyLinesAreTolerated) {
 }
 
 TEST(MoversFile, WhatIsWrittenIsReadBack) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "movers_file_test.csv");
+  const std::filesystem::path path =
+      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "movers_file_test.csv");
   write_movers(path, {example()});
   EXPECT_EQ(read_movers(path), (MoverRows{example()}));
   std::filesystem::remove(path);

@@ -3,7 +3,7 @@
 
 #include "dkb/map/map.h"
 #include "dkb/map/map_test_tools.h"
-#include "dkb/util/errors.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -49,17 +49,12 @@ TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
   world.map.fuse(world.d, world.c);
   world.map.update_covisibility(1, 1);
   const Parts good = parts_of(world.map);
-  const auto message = [&](auto&& spoil) -> std::string {
+  const auto message = [&](auto&& spoil) {
     Parts parts = good;
     spoil(parts);
-    try {
-      Map::restore(parts.keyframes, parts.points, parts.removed);
-    } catch (const InputError& e) {
-      return e.what();
-    }
-    return "";
+    return test::input_error_of([&] { Map::restore(parts.keyframes, parts.points, parts.removed); });
   };
-  EXPECT_EQ(message([](Parts&) {}), "");
+  EXPECT_EQ(message([](Parts&) {}), "no error");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].id = 2; }), "keyframe 2 stands where keyframe 1 should");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = 3; }), "keyframe 1 has the impossible parent 3");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].parent = -2; }), "keyframe 1 has the impossible parent -2");

@@ -4,18 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
-}
 
 TEST(SlamOptions, DefaultsAreInRange) {
   EXPECT_NO_THROW(SlamOptions().check());
@@ -61,7 +53,7 @@ TEST(SlamOptions, AMisspeltSettingNamesTheNearestOne) {
   SlamOptions options;
   Settings settings;
   bind_settings(settings, options);
-  const std::string message = message_of([&] { settings.set_assignment("featurs.count=5", "--set"); });
+  const std::string message = test::input_error_of([&] { settings.set_assignment("featurs.count=5", "--set"); });
   EXPECT_NE(message.find("featurs.count"), std::string::npos) << message;
   EXPECT_NE(message.find("features.count"), std::string::npos) << message;
 }
@@ -84,7 +76,7 @@ TEST(SlamOptions, ValuesOutOfRangeAreRejectedWhereverTheyStand) {
 
 TEST(Presets, AnUnknownOneIsNamed) {
   EXPECT_NO_THROW(preset("default").check());
-  EXPECT_NE(message_of([] { preset("defalt"); }).find("default"), std::string::npos);
+  EXPECT_NE(test::input_error_of([] { preset("defalt"); }).find("default"), std::string::npos);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -32,15 +33,6 @@ void bind(Settings* s, Options* o) {
   s->bind("filter.flow.gain", &o->gain, "[px]");
   s->bind("filter.name", &o->name, "name");
   s->bind("filter.colour", &o->colour, {{"red", Colour::red}, {"green", Colour::green}}, "colour");
-}
-
-std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 TEST(NearestName, FindsMisspellingsAndRefusesStrangers) {
@@ -77,19 +69,21 @@ TEST(Settings, MessagesNameKeyValueTypeAndNearestKey) {
   Options o;
   Settings s;
   bind(&s, &o);
-  EXPECT_EQ(message([&] { s.set("featurs.count", "5", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("featurs.count", "5", "--set"); }),
             "--set: unknown key \"featurs.count\" (did you mean \"features.count\"?)");
-  EXPECT_EQ(message([&] { s.set("features.count", "5.5", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("features.count", "5.5", "--set"); }),
             "--set: features.count: \"5.5\" is not a whole number");
-  EXPECT_EQ(message([&] { s.set("features.scale", "nan", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("features.scale", "nan", "--set"); }),
             "--set: features.scale: \"nan\" is not a number");
-  EXPECT_EQ(message([&] { s.set("features.scale", "", "--set"); }), "--set: features.scale: \"\" is not a number");
-  EXPECT_EQ(message([&] { s.set("features.count", "99999999999", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("features.scale", "", "--set"); }),
+            "--set: features.scale: \"\" is not a number");
+  EXPECT_EQ(test::input_error_of([&] { s.set("features.count", "99999999999", "--set"); }),
             "--set: features.count: \"99999999999\" is not a whole number");
-  EXPECT_EQ(message([&] { s.set("filter.colour", "blue", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("filter.colour", "blue", "--set"); }),
             "--set: filter.colour: \"blue\" is not one of red, green");
-  EXPECT_EQ(message([&] { s.set("features.on", "1", "--set"); }), "--set: features.on: \"1\" is not true or false");
-  EXPECT_EQ(message([&] { s.set_assignment("features.on", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { s.set("features.on", "1", "--set"); }),
+            "--set: features.on: \"1\" is not true or false");
+  EXPECT_EQ(test::input_error_of([&] { s.set_assignment("features.on", "--set"); }),
             "--set: \"features.on\" has no value; write key=value");
   EXPECT_EQ(o.count, 1000) << "a refused value leaves the field alone";
 }
@@ -105,7 +99,9 @@ TEST(Settings, YamlMayBeNestedOrDottedAndNamesFileAndLine) {
   EXPECT_EQ(s.where("features.count"), "a.yaml:3");
   s.load_yaml_text("", "empty.yaml");
   s.load_yaml_text("features:\n#  count: 3\n", "commented.yaml");
-  const auto load = [&](const std::string& text) { return message([&] { s.load_yaml_text(text, "a.yaml"); }); };
+  const auto load = [&](const std::string& text) {
+    return test::input_error_of([&] { s.load_yaml_text(text, "a.yaml"); });
+  };
   EXPECT_EQ(load("seed: 3\nfeatures:\n  coun: 5\n"),
             "a.yaml:3: unknown key \"features.coun\" (did you mean \"features.count\"?)");
   EXPECT_EQ(load("features: 3"), "a.yaml:1: features: expected lines of the form `key: value`");

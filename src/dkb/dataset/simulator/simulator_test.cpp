@@ -15,6 +15,7 @@
 #include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -35,12 +36,7 @@ double degrees_between(const Rigid3& a, const Rigid3& b) {
 }
 
 std::string error_of(const SimulatorOptions& o) {
-  try {
-    const Simulator s(o);
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
+  return test::input_error_of([&] { const Simulator s(o); });
 }
 
 class SimulatorFiles : public testing::Test {
