@@ -7,6 +7,7 @@
 #include <string>
 
 #include "dkb/solver/ba_layout.h"
+#include "dkb/solver/nielsen_damping.h"
 #include "dkb/solver/relative_pose.h"
 #include "dkb/util/errors.h"
 
@@ -250,14 +251,14 @@ class BundleAdjuster {
   }
 
   double descend(double present, int iterations, int& total) {
-    double damping = options_.initial_damping, growth = 2;
+    solver::NielsenDamping damping(options_.initial_damping, 1e-10);
     bool fresh = false;
     for (int i = 0; i < iterations; ++i) {
       ++total;
       if (!fresh) linearise();
       fresh = true;
       double predicted = 0;
-      const bool solved = solve(damping, predicted);
+      const bool solved = solve(damping.value(), predicted);
       if (solved && predicted <= 1e-3 * options_.relative_tolerance * present) break;
       double next = 0;
       if (solved) {
@@ -270,26 +271,21 @@ class BundleAdjuster {
         for (size_t k = 0; k < 4 * static_cast<size_t>(layout_.points); ++k) candidate_.points[k] += point_step_[k];
         next = cost(candidate_);
       }
-      // Nielsen's rule for the damping (Madsen, Nielsen, Tingleff, "Methods for non-linear least squares problems").
       if (solved && next < present) {
-        const double gain = (present - next) / predicted, z = 2 * gain - 1;
-        damping = std::max(kSmallestDamping, damping * std::max(1.0 / 3.0, 1 - z * z * z));
-        growth = 2;
+        damping.accept(present - next, predicted);
         std::swap(state_, candidate_);
         fresh = false;
         const bool done = present - next <= options_.relative_tolerance * present;
         present = next;
         if (done) break;
-      } else {
-        damping *= growth;
-        growth *= 2;
-        if (damping > kLargestDamping) break;
+      } else if (!damping.reject()) {
+        break;
       }
     }
     return present;
   }
 
-  static constexpr double kSmallestDiagonal = 1e-6, kSmallestDamping = 1e-10, kLargestDamping = 1e10;
+  static constexpr double kSmallestDiagonal = 1e-6;
 
   BaProblem& problem_;
   const BaOptions& options_;

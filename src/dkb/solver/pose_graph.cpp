@@ -6,6 +6,7 @@
 #include <string>
 
 #include "dkb/solver/block_cholesky.h"
+#include "dkb/solver/nielsen_damping.h"
 #include "dkb/solver/relative_pose.h"
 #include "dkb/util/errors.h"
 
@@ -26,14 +27,14 @@ class PoseGraphOptimiser {
     PoseGraphResult result;
     double present = cost(graph_.cam_from_world);
     result.initial_cost = present;
-    double damping = options_.initial_damping, growth = 2;
+    solver::NielsenDamping damping(options_.initial_damping, 1e-12);
     bool moved = true;
     while (result.iterations < options_.iterations && !camera_of_free_.empty()) {
       ++result.iterations;
       if (moved) linearise();
       moved = false;
       double predicted = 0;
-      const bool solved = solve(damping, predicted);
+      const bool solved = solve(damping.value(), predicted);
       if (solved && predicted <= 1e-3 * options_.relative_tolerance * present) break;
       double next = 0;
       if (solved) {
@@ -45,18 +46,14 @@ class PoseGraphOptimiser {
         next = cost(candidate_);
       }
       if (solved && next < present) {
-        const double z = 2 * (present - next) / predicted - 1;
-        damping = std::max(1e-12, damping * std::max(1.0 / 3.0, 1 - z * z * z));
-        growth = 2;
+        damping.accept(present - next, predicted);
         std::swap(graph_.cam_from_world, candidate_);
         moved = true;
         const bool done = present - next <= options_.relative_tolerance * present;
         present = next;
         if (done) break;
-      } else {
-        damping *= growth;
-        growth *= 2;
-        if (damping > 1e10) break;
+      } else if (!damping.reject()) {
+        break;
       }
     }
     result.final_cost = present;
