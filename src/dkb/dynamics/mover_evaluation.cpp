@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <utility>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"

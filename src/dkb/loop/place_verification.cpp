@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/loop/place_verification.h"
 
-#include <algorithm>
-
 #include "dkb/features/matching.h"
 #include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
