@@ -51,6 +51,10 @@ DetectorSet make_detectors(const DetectorArguments& arguments, const CameraModel
     set.schedule.realtime = realtime;
     set.slow = std::move(detector);
   }
+  if (!arguments.boxes.empty() && !has("file"))
+    throw InputError(
+        "--boxes: --detector " + arguments.detector + " does not read boxes; add --detector file" +
+        (kinds.empty() || arguments.detector == "auto" ? "" : ", or join it: " + arguments.detector + "+file"));
   if (has("file")) {
     if (arguments.boxes.empty()) throw InputError("--detector file: no boxes; name their file with --boxes");
     set.prompt.push_back(std::make_unique<FileDetector>(arguments.boxes, camera.width, camera.height));

@@ -136,7 +136,10 @@ int run(const RunArguments& args) {
   const DisabledParts disabled = parse_disabled(args.disable);
   disable_parts(options, disabled);
   if (options.dynamics.filter == FilterKind::none && (disabled.dynamic_removal || args.preset == "orb")) detection = {};
-  if (options.dynamics.filter == FilterKind::none) detection.detector = "none";
+  if (options.dynamics.filter == FilterKind::none) {
+    detection.detector = "none";
+    detection.boxes.clear();
+  }
   if (args.has_seed) options.seed = args.seed;
   options.pipeline.threaded = args.threads != 1;
   options.pipeline.realtime = args.realtime;
@@ -272,7 +275,7 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)");
   command->add_option("--detect-latency", detection.latency,
                       "[frames] until a detection is used (default: by the model's size)");
-  command->add_option("--boxes", detection.boxes, "Boxes of the file detector: stamp class x y w h [score] per line");
+  command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");

@@ -2,6 +2,8 @@
 #include "dkb/dynamics/mover_mask.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 namespace dkb {
 
@@ -15,6 +17,35 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height) {
       const float centre_y = (static_cast<float>(y) + 0.5f) * static_cast<float>(into.cell);
       if (other.at(centre_x, centre_y)) into.cells(x, y) = 255;
     }
+}
+
+MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, double reach, double focal) {
+  MoverMask spread = mask;
+  if (mask.empty()) return spread;
+  const int cell = mask.cell, width = mask.cells.width(), height = mask.cells.height();
+  const auto depth_of = [&](int x, int y) {
+    return depth(std::min(depth.width() - 1, x * cell + cell / 2), std::min(depth.height() - 1, y * cell + cell / 2));
+  };
+  struct Step {
+    int x, y;
+    float left;  // [cells]
+  };
+  std::vector<Step> front;
+  const auto per_metre = static_cast<float>(focal / cell);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      if (const float z = depth_of(x, y); mask.cells(x, y) != 0 && z > 0)
+        front.push_back({x, y, static_cast<float>(reach) * per_metre / z});
+  for (size_t k = 0; k < front.size(); ++k) {
+    const auto [x, y, left] = front[k];
+    if (left < 1) continue;
+    for (const auto& [u, v] : {std::pair(x - 1, y), std::pair(x + 1, y), std::pair(x, y - 1), std::pair(x, y + 1)}) {
+      if (!spread.cells.contains(u, v) || spread.cells(u, v) != 0 || depth_of(u, v) > 0) continue;
+      spread.cells(u, v) = 255;
+      front.push_back({u, v, left - 1});
+    }
+  }
+  return spread;
 }
 
 void dilate(MoverMask& mask, int radius) {

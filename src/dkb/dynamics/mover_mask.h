@@ -14,7 +14,8 @@ struct MoverMask {
 
   bool empty() const { return cells.empty(); }
   bool at(float image_x, float image_y) const {
-    if (cells.empty()) return false;
+    // Not by the cell alone: -3 / 4 is 0.
+    if (cells.empty() || !(image_x >= 0 && image_y >= 0)) return false;
     const int x = static_cast<int>(image_x) / cell, y = static_cast<int>(image_y) / cell;
     return cells.contains(x, y) && cells(x, y) != 0;
   }
@@ -27,5 +28,9 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height);
 void dilate(MoverMask& mask, int radius);
 // Shrinks it likewise; what lies outside the image counts as marked.
 void erode(MoverMask& mask, int radius);
+
+// `mask`, spread from where it has depth into what lacks depth and hangs together with it, over `reach` [m] of image at
+// that depth; `focal` [px]. Black parts of movers have no depth, nor has the background right beside a mover.
+MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, double reach, double focal);
 
 }  // namespace dkb

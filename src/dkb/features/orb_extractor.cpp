@@ -2,6 +2,7 @@
 #include "dkb/features/orb_extractor.h"
 
 #include <algorithm>
+#include <functional>
 #include <string>
 
 #include "dkb/features/orientation.h"
@@ -47,19 +48,19 @@ void OrbExtractor::find_corners() {
   }
 }
 
-std::vector<int> OrbExtractor::quotas() const {
-  std::vector<int> quotas(corners_.size(), 0);
-  int left = options_.count;
+std::vector<int> OrbExtractor::quotas(const std::vector<std::vector<PixelCorner>>& corners, int count) const {
+  std::vector<int> quotas(corners.size(), 0);
+  int left = count;
   for (bool full = false; left > 0 && !full;) {
     // Share what is left among the levels that still have corners, in proportion to their area.
     double area = 0;
-    for (size_t i = 0; i < corners_.size(); ++i)
-      if (quotas[i] < static_cast<int>(corners_[i].size()))
+    for (size_t i = 0; i < corners.size(); ++i)
+      if (quotas[i] < static_cast<int>(corners[i].size()))
         area += static_cast<double>(pyramid_.level(static_cast<int>(i)).size());
     full = true;
     const int shared = left;
-    for (size_t i = 0; i < corners_.size() && left > 0; ++i) {
-      const int room = static_cast<int>(corners_[i].size()) - quotas[i];
+    for (size_t i = 0; i < corners.size() && left > 0; ++i) {
+      const int room = static_cast<int>(corners[i].size()) - quotas[i];
       if (room <= 0) continue;
       const double share = shared * static_cast<double>(pyramid_.level(static_cast<int>(i)).size()) / area;
       const int given = std::min({room, left, std::max(1, static_cast<int>(share + 0.5))});
@@ -71,21 +72,58 @@ std::vector<int> OrbExtractor::quotas() const {
   return quotas;
 }
 
-OrbFeatures OrbExtractor::extract(const GreyImage& image) {
+void OrbExtractor::split_corners(const Image<uint8_t>& poor, int cell) {
+  poor_corners_.resize(corners_.size());
+  for (size_t i = 0; i < corners_.size(); ++i) {
+    const int level = static_cast<int>(i);
+    const auto on_poor = [&](const PixelCorner& c) {
+      const int x = static_cast<int>(pyramid_.full_x(level, c.x)) / cell,
+                y = static_cast<int>(pyramid_.full_y(level, c.y)) / cell;
+      return poor.contains(x, y) && poor(x, y) != 0;
+    };
+    const auto middle = std::stable_partition(corners_[i].begin(), corners_[i].end(), std::not_fn(on_poor));
+    poor_corners_[i].assign(middle, corners_[i].end());
+    corners_[i].erase(middle, corners_[i].end());
+  }
+}
+
+// Keeps `count` of all levels' corners and returns how many there are now.
+int OrbExtractor::keep(std::vector<std::vector<PixelCorner>>& corners, int count) {
+  const std::vector<int> quota = quotas(corners, count);
+  int kept = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    if (!corners[i].empty()) spread_.keep(region(static_cast<int>(i)), quota[i], corners[i]);
+    kept += static_cast<int>(corners[i].size());
+  }
+  return kept;
+}
+
+OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& poor, int cell) {
   if (image.width() > 65535 || image.height() > 65535)
     throw InputError("feature extraction: the image is " + std::to_string(image.width()) + " x " +
                      std::to_string(image.height()) + " pixels; at most 65535 per side are possible");
   pyramid_.build(image);
   find_corners();
-  const std::vector<int> quota = quotas();
+  if (poor.empty()) {
+    keep(corners_, options_.count);
+  } else {
+    split_corners(poor, cell);
+    size_t rich = 0;
+    for (const auto& corners : corners_) rich += corners.size();
+    // The poor place keeps what it has when the others cannot use their half.
+    const int half = static_cast<int>(std::min(rich, static_cast<size_t>(options_.count + 1) / 2));
+    const int kept = keep(poor_corners_, options_.count - half);
+    keep(corners_, options_.count - kept);
+    for (size_t i = 0; i < corners_.size(); ++i)
+      corners_[i].insert(corners_[i].end(), poor_corners_[i].begin(), poor_corners_[i].end());
+  }
   OrbFeatures features;
   features.corners.reserve(static_cast<size_t>(options_.count));
   features.descriptors.reserve(static_cast<size_t>(options_.count));
   for (size_t i = 0; i < corners_.size(); ++i) {
     const int level = static_cast<int>(i);
-    std::vector<PixelCorner>& corners = corners_[i];
+    const std::vector<PixelCorner>& corners = corners_[i];
     if (corners.empty()) continue;
-    spread_.keep(region(level), quota[i], corners);
     const GreyImage& pixels = pyramid_.level(level);
     blur_.apply(pixels, blurred_);
     for (const PixelCorner& pixel : corners) {

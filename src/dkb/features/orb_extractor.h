@@ -35,7 +35,9 @@ class OrbExtractor {
   explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd());
 
   // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 65535.
-  OrbFeatures extract(const GreyImage& image);
+  // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
+  // image; these get half of the features at most where there are enough others. Empty: no such place.
+  OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1);
   // Pyramid of the last image given to extract().
   const ImagePyramid& pyramid() const { return pyramid_; }
   const OrbOptions& options() const { return options_; }
@@ -43,8 +45,10 @@ class OrbExtractor {
  private:
   CornerRegion region(int level) const;
   void find_corners();
-  // How many of each level's corners to keep: by area, what a level lacks goes to the others.
-  std::vector<int> quotas() const;
+  // How many of each level's corners to keep, `count` in all: by area, what a level lacks goes to the others.
+  std::vector<int> quotas(const std::vector<std::vector<PixelCorner>>& corners, int count) const;
+  void split_corners(const Image<uint8_t>& poor, int cell);
+  int keep(std::vector<std::vector<PixelCorner>>& corners, int count);
 
   OrbOptions options_;
   Simd simd_;
@@ -53,7 +57,7 @@ class OrbExtractor {
   CornerSpread spread_;
   GaussianBlur blur_;
   SteeredBrief brief_;
-  std::vector<std::vector<PixelCorner>> corners_;  // per level
+  std::vector<std::vector<PixelCorner>> corners_, poor_corners_;  // per level
   GreyImage blurred_;
 };
 

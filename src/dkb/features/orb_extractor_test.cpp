@@ -308,5 +308,22 @@ TEST(OrbExtractor, DescriptorsMatchAtLeastAsWellAsOpenCvsOnTheSameCorners) {
 }
 #endif
 
+TEST(OrbExtractor, APoorPlaceGetsHalfOfTheFeaturesAtMost) {
+  const SquareWorld world = test_world(5);
+  const GreyImage image = world.render({});
+  Image<uint8_t> poor(160, 120);  // cells of 4 px: all but a strip of a fifth
+  for (int y = 0; y < 120; ++y)
+    for (int x = 32; x < 160; ++x) poor(x, y) = 255;
+  const auto rich = [](const OrbFeatures& features) {
+    return std::count_if(features.corners.begin(), features.corners.end(), [](const Corner& c) { return c.x < 128; });
+  };
+  OrbExtractor extractor({.count = 400});
+  const OrbFeatures even = extractor.extract(image), other = extractor.extract(image, poor, 4);
+  EXPECT_LT(rich(even), 120);
+  EXPECT_GT(rich(other), 180);
+  EXPECT_EQ(other.corners.size(), even.corners.size());
+  expect_equal(extractor.extract(image, Image<uint8_t>(160, 120), 4), even);
+}
+
 }  // namespace
 }  // namespace dkb

@@ -19,7 +19,8 @@ struct Keypoint {
   float angle = 0;              // [rad]
   float response = 0;
   uint8_t octave = 0;
-  bool suspect = false;  // lies where a mover is seen: only well-established map points may be matched here
+  bool suspect = false;   // lies where a mover is seen: only well-established map points may be matched here
+  bool by_mover = false;  // hangs together with a mover: where depth is missing, it may be a mover's
   Rgb colour;
 };
 

@@ -255,6 +255,22 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
   s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
   s.bind("dynamics.motion.views_per_frame", &d.motion.views_per_frame, "past views compared with each frame");
+  s.bind("dynamics.motion.settle", &d.motion.settle,
+         "[s] a past view of the same surface says in proportion to its age, up to this, that it stands still");
+  s.bind("dynamics.motion.memory", &d.motion.memory,
+         "[s] time constant in which a mover that stands still is forgotten");
+  s.bind("dynamics.motion.interior", &d.motion.interior,
+         "weight of a surface being where a view had it, beside that of one in space seen empty, which is 1");
+  s.bind("dynamics.motion.contour", &d.motion.contour, "the same of an outline");
+  s.bind("dynamics.motion.smoothing.reach", &d.motion.smoothing.reach,
+         "[m] along a surface over which cells of one object speak for each other");
+  s.bind("dynamics.motion.smoothing.step_base", &d.motion.smoothing.step_base,
+         "[m] depth step between neighbouring cells of one surface: this ...");
+  s.bind("dynamics.motion.smoothing.step_slope", &d.motion.smoothing.step_slope, "... and this share of their depth");
+  s.bind("dynamics.motion.smoothing.crease", &d.motion.smoothing.crease,
+         "[1/m] second difference of inverse depth in a fold between object and support");
+  s.bind("dynamics.motion.smoothing.crease_link", &d.motion.smoothing.crease_link,
+         "share of what is said that crosses such a fold");
   s.bind("dynamics.motion.threshold", &d.motion.threshold, "score from which a cell moves");
   s.bind("dynamics.motion.rim", &d.motion.rim, "[cells] by which its mask is widened");
   s.bind("dynamics.motion.lone_hole", &d.motion.lone_hole,

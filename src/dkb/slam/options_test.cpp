@@ -43,10 +43,14 @@ TEST(SlamOptions, SettingsReachTheirFields) {
   settings.set_assignment("tracking.close_depth=2.5", "--set");
   settings.set_assignment("mapping.ba.weighted=false", "--set");
   settings.set_assignment("pipeline.mapper_latency=3", "--set");
+  settings.set_assignment("dynamics.motion.settle=0.75", "--set");
+  settings.set_assignment("dynamics.motion.smoothing.reach=0.3", "--set");
   EXPECT_EQ(options.features.count, 777);
   EXPECT_EQ(options.tracking.close_depth, 2.5);
   EXPECT_FALSE(options.mapping.ba.weighted);
   EXPECT_EQ(options.pipeline.mapper_latency, 3);
+  EXPECT_EQ(options.dynamics.motion.settle, 0.75);
+  EXPECT_EQ(options.dynamics.motion.smoothing.reach, 0.3);
 }
 
 TEST(SlamOptions, AMisspeltSettingNamesTheNearestOne) {

@@ -69,7 +69,11 @@ void SlamSystem::Impl::take_view(const MapView& view) {
 
 void SlamSystem::Impl::extract(const RgbdImage& image) {
   const Stopwatch watch;
-  orb_ = extractor_.extract(image.grey);
+  // When movers took most of the last frame's features, the rest of the image gets its half now.
+  const auto& last = scene_.dynamic;
+  const bool crowded = 2 * std::count(last.begin(), last.end(), uint8_t{1}) > static_cast<std::ptrdiff_t>(last.size());
+  orb_ = crowded && !scene_.mask.empty() ? extractor_.extract(image.grey, scene_.mask.cells, scene_.mask.cell)
+                                         : extractor_.extract(image.grey);
   times_.add("features", watch.ms());
 }
 
@@ -106,12 +110,16 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
   feature_reports_.resize(orb_.corners.size());
   OrbFeatures kept;
   suspect_.clear();
+  by_mover_.clear();
+  const MoverMask around =
+      spread_into_holes(scene_.mask, image_->depth, options_.dynamics.motion.smoothing.reach, camera_.fx);
   for (size_t i = 0; i < orb_.corners.size(); ++i) {
     feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y,
                            scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};
     if (scene_.dynamic[i] && !suspects) continue;
     kept_.push_back(i);
     suspect_.push_back(scene_.dynamic[i]);
+    by_mover_.push_back(around.at(orb_.corners[i].x, orb_.corners[i].y) ? 1 : 0);
     kept.corners.push_back(orb_.corners[i]);
     kept.descriptors.push_back(orb_.descriptors[i]);
   }
@@ -268,7 +276,10 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
   camera.readout = readout_->readout();
   const auto features_at = [&](const Vector6d& velocity) {
     RgbdFeatures features = make_rgbd_features(orb_, image, camera, undistort_, velocity, options_.depth);
-    for (size_t f = 0; f < features.size(); ++f) features.keypoints[f].suspect = suspect_[f];
+    for (size_t f = 0; f < features.size(); ++f) {
+      features.keypoints[f].suspect = suspect_[f];
+      features.keypoints[f].by_mover = by_mover_[f];
+    }
     return std::make_shared<const RgbdFeatures>(std::move(features));
   };
   TrackOutcome outcome = tracker_->track(next_frame_, image.timestamp, features_at, !localise_only_,

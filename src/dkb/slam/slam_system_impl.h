@@ -67,6 +67,7 @@ class SlamSystem::Impl {
   Rigid3 world_from_odom_, odom_from_cam_;
   bool localise_only_ = false;
   std::vector<size_t> kept_;                    // features given to tracking, as indices of all
+  std::vector<uint8_t> by_mover_;               // of these, which hang together with a mover (Keypoint::by_mover)
   std::vector<uint8_t> suspect_;                // of these, which may move
   std::vector<FeatureReport> feature_reports_;  // all features of the last frame
   struct RecentKeyframe {

@@ -70,7 +70,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
       if (k.octave < level - 1 || k.octave > level + 1) return;
       if (k.suspect &&
-          (!c.established || !(k.depth > 0) || std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z()))
+          (!c.established || (k.depth > 0 && std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z())))
         return;
       if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;
       const int d = hamming_distance(c.descriptor, features.descriptors[static_cast<size_t>(f)]);

@@ -83,6 +83,21 @@ TEST_F(CandidateMatching, ProjectsWithThePose) {
   EXPECT_TRUE(match({at(300, 100)}).empty());
 }
 
+TEST_F(CandidateMatching, WhereAMoverIsSuspectedOnlyEstablishedPointsAreFoundAndOnlyAtTheirDepth) {
+  add_feature(100, 100, bits_set(0));
+  Keypoint& k = features.keypoints[0];
+  k.suspect = true;
+  Candidate c = at(100, 100);  // 2 m away
+  k.depth = 2.0f;
+  EXPECT_TRUE(match({c}).empty());
+  c.established = true;
+  EXPECT_EQ(match({c}).size(), 1U);
+  k.depth = 1.9f;
+  EXPECT_TRUE(match({c}).empty());
+  k.depth = 0;  // beside somebody near the sensor often has none
+  EXPECT_EQ(match({c}).size(), 1U);
+}
+
 TEST_F(CandidateMatching, AFeatureGoesToTheNearerCandidateWhateverTheirOrder) {
   add_feature(100, 100, bits_set(10));
   const Candidate near = at(101, 100, bits_set(12)), far = at(99, 100, bits_set(20));

@@ -13,6 +13,7 @@ namespace dkb {
 namespace {
 
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
+constexpr double kChi2TwoDof = 5.991;        // 95%
 constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
 
 }  // namespace
@@ -252,6 +253,14 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   for (size_t i = 0; i < candidates.size(); ++i)
     if (visible[i]) ++sightings_[candidates[i].id].visible;
   for (PointId id : matched) ++sightings_[id].visible;
+  // A guessed depth is let pass more; not where a mover may be.
+  const auto strays = [&](const Pair& pair) {
+    const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
+    if (pair.use_depth || !k.by_mover) return false;
+    const double sigma = pose_observation(k, pair.point_in_world, noise_, scale_factor_).pixel_sigma;
+    const Eigen::Vector2d seen = camera_.project(pose.cam_from_world * pair.point_in_world);
+    return (seen - k.pixel.cast<double>()).squaredNorm() > kChi2TwoDof * sigma * sigma;
+  };
   frame.points.assign(points.size(), kNoPoint);
   frame.outlier.assign(points.size(), 0);
   frame.odometry.assign(points.size(), std::nullopt);
@@ -262,6 +271,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
     } else if (i < in_map) {
       frame.points[f] = points[f];
       ++sightings_[points[f]].found;
+    } else if (strays(pairs[i])) {
+      frame.outlier[f] = 1;
     } else {
       frame.odometry[f] = OdometryMatch{pairs[i].point_in_world, !pairs[i].use_depth};
     }
