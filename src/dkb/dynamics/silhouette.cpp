@@ -2,6 +2,7 @@
 #include "dkb/dynamics/silhouette.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -76,6 +77,68 @@ float object_depth(const Image<float>& grid, const CellRange& core, const Silhou
   return best_depth;
 }
 
+struct Cell {
+  int x, y;
+};
+
+// What hangs together in depth within a range of cells. Each cell is given out once.
+class Surfaces {
+ public:
+  Surfaces(const Image<float>& depth, const CellRange& cells, float step)
+      : range(cells), depth_(depth), step_(step), seen_(depth.width(), depth.height()) {}
+
+  // The seeds and all that hangs together with them and is `wanted`.
+  std::vector<Cell> grow(std::vector<Cell> cells, const auto& wanted) {
+    for (const Cell& c : cells) seen_(c.x, c.y) = 1;
+    for (size_t i = 0; i < cells.size(); ++i) {
+      const auto [x, y] = cells[i];
+      const float d = depth_(x, y);
+      for (const auto& [dx, dy] : kBeside) {
+        const Cell n{x + dx, y + dy};
+        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || std::fabs(depth_(n.x, n.y) - d) > step_ * d) continue;
+        seen_(n.x, n.y) = 1;
+        cells.push_back(n);
+      }
+    }
+    return cells;
+  }
+  bool inside(const Cell& c) const { return c.x >= range.x0 && c.y >= range.y0 && c.x < range.x1 && c.y < range.y1; }
+  bool seen(int x, int y) const { return seen_(x, y) != 0; }
+
+  static constexpr std::array<Cell, 4> kBeside{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  const CellRange range;
+
+ private:
+  const Image<float>& depth_;
+  float step_;
+  Image<uint8_t> seen_;
+};
+
+// A limb stands before or behind the rest, so that depth steps between them. Unlike the background it ends within the
+// box: surfaces in reach that lie beside the object and do not go on beyond the box are part of it.
+void add_limbs(Surfaces& surfaces, const auto& in_reach, Image<uint8_t>& mine) {
+  const CellRange& r = surfaces.range;
+  const auto at_side = [&](const Cell& c) {
+    return (c.x == r.x0 && c.x > 0) || (c.y == r.y0 && c.y > 0) || (c.x == r.x1 - 1 && c.x < mine.width() - 1) ||
+           (c.y == r.y1 - 1 && c.y < mine.height() - 1);
+  };
+  std::vector<Cell> limbs;
+  for (int y = r.y0; y < r.y1; ++y)
+    for (int x = r.x0; x < r.x1; ++x) {
+      if (surfaces.seen(x, y) || !in_reach(x, y)) continue;
+      const std::vector<Cell> surface = surfaces.grow({{x, y}}, in_reach);
+      if (std::any_of(surface.begin(), surface.end(), at_side)) continue;
+      const bool beside = std::any_of(surface.begin(), surface.end(), [&](const Cell& c) {
+        return std::any_of(Surfaces::kBeside.begin(), Surfaces::kBeside.end(), [&](const Cell& d) {
+          const Cell n{c.x + d.x, c.y + d.y};
+          return surfaces.inside(n) && mine(n.x, n.y);
+        });
+      });
+      if (beside) limbs.insert(limbs.end(), surface.begin(), surface.end());
+    }
+  for (const Cell& c : limbs) mine(c.x, c.y) = 255;
+}
+
 }  // namespace
 
 void SilhouetteOptions::check() const {
@@ -110,30 +173,17 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
       continue;
     }
     Image<uint8_t> mine(columns, rows);
-    std::vector<std::pair<int, int>> front;
-    const auto near_layer = [&](float d, double tolerance) {
-      return std::fabs(d - layer) <= static_cast<float>(tolerance);
+    Surfaces surfaces{grid, range, static_cast<float>(options.step)};
+    const auto near_layer = [&](int x, int y, double tolerance) {
+      return grid(x, y) > 0 && std::fabs(grid(x, y) - layer) <= static_cast<float>(tolerance);
     };
+    const auto in_reach = [&](int x, int y) { return near_layer(x, y, options.reach); };
+    std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (grid(x, y) > 0 && near_layer(grid(x, y), options.layer * layer)) {
-          mine(x, y) = 255;
-          front.emplace_back(x, y);
-        }
-    while (!front.empty()) {
-      const auto [x, y] = front.back();
-      front.pop_back();
-      const float d = grid(x, y);
-      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-        const int nx = x + dx, ny = y + dy;
-        if (nx < range.x0 || ny < range.y0 || nx >= range.x1 || ny >= range.y1 || mine(nx, ny)) continue;
-        const float nd = grid(nx, ny);
-        if (!(nd > 0) || std::fabs(nd - d) > static_cast<float>(options.step) * d || !near_layer(nd, options.reach))
-          continue;
-        mine(nx, ny) = 255;
-        front.emplace_back(nx, ny);
-      }
-    }
+        if (near_layer(x, y, options.layer * layer)) seeds.push_back({x, y});
+    for (const Cell& c : surfaces.grow(std::move(seeds), in_reach)) mine(c.x, c.y) = 255;
+    add_limbs(surfaces, in_reach, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.
     for (int y = range.y0; y < range.y1; ++y)

@@ -50,6 +50,33 @@ TEST(Silhouette, AnArmReachingForwardHangsTogetherWithTheBody) {
   EXPECT_TRUE(silhouette_in(depth, {40, 10, 80, 100}).at(112, 46));
 }
 
+TEST(Silhouette, AnArmFarBehindTheBodyEndsWithinTheBoxAndIsPartOfThePerson) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 100, 30, 112, 70, 2.05f);  // 55 cm behind the chest, no depths between
+  const MoverMask mask = silhouette_in(depth, {40, 10, 80, 100});
+  EXPECT_TRUE(mask.at(108, 50));
+  EXPECT_FALSE(mask.at(118, 50)) << "the wall beside the arm";
+}
+
+TEST(Silhouette, WhatGoesOnBeyondTheBoxIsNoLimb) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 100, 70, 150, 90, 2.05f);  // a table as far away as that arm
+  EXPECT_FALSE(silhouette_in(depth, {40, 10, 80, 100}).at(108, 80));
+}
+
+TEST(Silhouette, WhatStandsApartFromTheBodyIsNoLimb) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 108, 50, 116, 70, 2.05f);  // a vase, some wall between
+  EXPECT_FALSE(silhouette_in(depth, {40, 10, 80, 100}).at(112, 60));
+}
+
+TEST(Silhouette, ALimbMayBeCutByTheBorderOfTheImage) {
+  DepthImage depth(160, 120, 3.0f);
+  fill(&depth, 110, 20, 150, 100, 1.5f);
+  fill(&depth, 150, 30, 160, 70, 2.05f);
+  EXPECT_TRUE(silhouette_in(depth, {90, 10, 70, 100}).at(156, 50));
+}
+
 TEST(Silhouette, WhatLiesBeyondTheReachIsNotPartOfThePerson) {
   DepthImage depth = person_before_wall();
   // A ramp behind the person's side: its steps are as small as those of one surface, but it leads away.
