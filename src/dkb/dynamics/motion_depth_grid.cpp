@@ -97,7 +97,6 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
 void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays) {
   const int width = rays.width(), height = rays.height(), cell = rays.cell();
   for (Image<float>* i : {&depth, &nearest, &farthest, &score, &low_, &high_}) resize(*i, width, height);
-  if (settled.width() != width || settled.height() != height) settled = Image<uint8_t>(width, height);
   // Four pixels of each cell, in a rotated square so that every row and column of it counts once.
   const std::array<int, 4> dx{cell / 4, cell * 3 / 4, 0, cell / 2}, dy{0, cell / 4, cell / 2, cell * 3 / 4};
   for (int y = 0; y < height; ++y) {

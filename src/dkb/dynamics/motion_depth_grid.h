@@ -43,7 +43,6 @@ struct MotionDepthGrid {
   Image<float> depth;              // [m] of the cell's middle, 0 = none
   Image<float> nearest, farthest;  // [m] over the cell and its eight neighbours; infinity and 0 where there is no depth
   Image<float> score;              // evidence for motion of what is seen in each cell
-  Image<uint8_t> settled;          // 255: an earlier view saw the same there
 
   // Sets the three depth maps. Buffers are kept.
   void set_depth(const DepthImage& image, const MotionRays& rays);

@@ -15,8 +15,6 @@ constexpr float kTooNear = 0.45f;                  // [m] taken for the depth of
 constexpr float kMotionPerFrame = 0.03f;           // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kHighest = 3.0f, kLowest = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
-constexpr float kClaimed = 0.45f;  // given to what may move: above kUnmarked, below any threshold of motion
-constexpr float kStill = -0.3f;    // score below which a cell stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
 constexpr int kHoleRadius = 2;     // [cells] half the width up to which missing depth is a strip
@@ -134,7 +132,6 @@ MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_fro
 // Each cell takes over the score of the same surface in the frame before.
 void MotionSegmenter::carry_scores() {
   clear(current_->score);
-  std::fill(current_->settled.data(), current_->settled.data() + current_->settled.size(), uint8_t{0});
   std::fill(known_.data(), known_.data() + known_.size(), uint8_t{0});
   if (!previous_) return;
   rays_.project(current_->depth, kTooNear, previous_->cam_from_world * current_->cam_from_world.inverse(), projection_);
@@ -158,7 +155,6 @@ void MotionSegmenter::carry_scores() {
     float bound = tolerance_.data()[i] + kMotionPerFrame;
     if (before.data()[at] > 0 && std::abs(before.data()[at] - depth_there) < bound) {
       current_->score.data()[i] = keep * previous_->score.data()[at];
-      current_->settled.data()[i] = previous_->settled.data()[at];
       known_.data()[i] = 1;
       continue;
     }
@@ -170,7 +166,6 @@ void MotionSegmenter::carry_scores() {
         if (!(before(u, v) > 0) || difference >= bound) continue;
         bound = difference;
         current_->score.data()[i] = keep * previous_->score(u, v);
-        current_->settled.data()[i] = previous_->settled(u, v);
         known_.data()[i] = 1;
       }
   }
@@ -206,7 +201,6 @@ void MotionSegmenter::compare(MotionDepthGrid& view) {
       score_then += revision * (current_->score.data()[i] - score_then);
       if (score_then >= kUnmarked) continue;
       agreements_.data()[i] += trust;
-      current_->settled.data()[i] = 255;
       const bool outline = current_->farthest.data()[i] > beyond(z, tolerance);
       if (!outline)
         still_.data()[i] += interior_weight;
@@ -321,30 +315,6 @@ MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) {
   clear_lone_holes(result.cells);
   dilate(result, options_.rim);
   return result;
-}
-
-Image<uint8_t> MotionSegmenter::still() const {
-  const MotionDepthGrid* grid = current_ ? current_.get() : previous_.get();
-  if (grid == nullptr) return {};
-  Image<uint8_t> still(rays_.width(), rays_.height());
-  for (size_t i = 0; i < still.size(); ++i)
-    still.data()[i] = grid->score.data()[i] < kStill ? grid->settled.data()[i] : uint8_t{0};
-  return still;
-}
-
-void MotionSegmenter::claim(const MoverMask& movable) {
-  if (!current_ || movable.empty()) return;
-  const int cell = options_.cell, width = rays_.width();
-  for (size_t i = 0; i < projection_.cell.size(); ++i) {
-    const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
-    const int at = projection_.cell[i];  // in the depth image, as mask() left it
-    if (at < 0 || !movable.at((static_cast<float>(x) + 0.5f) * static_cast<float>(cell),
-                              (static_cast<float>(y) + 0.5f) * static_cast<float>(cell)))
-      continue;
-    if (current_->settled.data()[at] != 0) continue;
-    float& score = current_->score.data()[at];
-    score = std::max(score, kClaimed);
-  }
 }
 
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {

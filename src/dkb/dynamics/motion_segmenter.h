@@ -56,12 +56,6 @@ class MotionSegmenter {
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
   MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected);
-  // 255 where an earlier view saw the same surface in the same place and nothing had claimed it; of the frame last
-  // segmented, empty before the first. A low score alone may only mean that nothing is known.
-  Image<uint8_t> still() const;
-  // Where a detector sees something that may move in the image last given, between segment() and commit(): that it
-  // stands still there makes it no part of the room. What was seen to stand still before stays what it is.
-  void claim(const MoverMask& movable);
   // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
   void commit(const std::optional<Rigid3>& cam_from_world);
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.

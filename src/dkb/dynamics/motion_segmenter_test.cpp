@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -222,42 +221,6 @@ TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
 }
 
 // Missing depth beside a mover, as at the edges of screens: a strip that touches it, and a patch that does not.
-// Share of the box's cells that are said to stand still, of a box that has stood there from the beginning,
-// before a still camera.
-double still_share(bool claim) {
-  World world;
-  world.still_camera = true;
-  MotionSegmenter segmenter(world.camera);
-  double share = 0;
-  for (int f = 0; f < 60; ++f) {
-    const Picture p = world.render(f, {box_at(0.2)});
-    segmenter.segment(p.image, world.cam_from_world(f));
-    const Image<uint8_t> still = segmenter.still();
-    if (f == 0) {
-      EXPECT_EQ(std::count(still.data(), still.data() + still.size(), uint8_t{255}), 0);
-    }
-    MoverMask box;
-    box.cells = Image<uint8_t>(still.width(), still.height());
-    int inside = 0, marked = 0;
-    for (int y = 0; y < still.height(); ++y)
-      for (int x = 0; x < still.width(); ++x) {
-        if (p.truth(4 * x + 2, 4 * y + 2) == 0) continue;
-        box.cells(x, y) = 255;
-        ++inside;
-        marked += still(x, y) != 0;
-      }
-    share = static_cast<double>(marked) / inside;
-    if (claim) segmenter.claim(box);
-    segmenter.commit(world.cam_from_world(f));
-  }
-  return share;
-}
-
-TEST(MotionSegmenter, WhatStandsFromTheBeginningIsStillUnlessADetectorClaimsIt) {
-  EXPECT_GT(still_share(false), 0.9);
-  EXPECT_LT(still_share(true), 0.05);
-}
-
 TEST(MotionSegmenter, MissingDepthAloneIsNoMover) {
   const World world;
   MotionSegmenter segmenter(world.camera);

@@ -19,12 +19,15 @@ std::vector<Detection> detections_of(const auto& carried) {
   return boxes;
 }
 
+// Score of the motion segmentation below which a cell was seen to stand still; it runs from -1 to 3.
+constexpr float kStill = -0.3f;
+
 // What was seen to stand still before the object came is no part of it.
-void clear_still(MoverMask& mask, const Image<uint8_t>& still, int still_cell) {
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
   for (int y = 0; y < mask.cells.height(); ++y)
     for (int x = 0; x < mask.cells.width(); ++x) {
-      const int sx = (x * mask.cell + mask.cell / 2) / still_cell, sy = (y * mask.cell + mask.cell / 2) / still_cell;
-      if (still.contains(sx, sy) && still(sx, sy) != 0) mask.cells(x, y) = 0;
+      const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;
+      if (score.contains(sx, sy) && score(sx, sy) < kStill) mask.cells(x, y) = 0;
     }
 }
 
@@ -75,7 +78,7 @@ void DynamicStage::move_world(const Rigid3& new_world_from_old_world) {
 void DynamicStage::note_keyframe() {
   if (past_.empty()) return;
   past_.back().keyframe = true;
-  if (motion_) past_.back().still = motion_->still();
+  if (motion_) past_.back().score = motion_->score();
 }
 
 std::vector<PointMotion> DynamicStage::follow(const PastFrame& from, const ImagePyramid& to,
@@ -108,7 +111,7 @@ void DynamicStage::mark_keyframes(const PastFrame& source, const Detections& det
       there = carry(detections, follow(source, *p.pyramid, detections.boxes), std::abs(p.frame - source.frame),
                     camera_.width, camera_.height, options_.carry);
     late_.push_back({p.frame, silhouettes(p.image->depth, there.boxes, options_.silhouette)});
-    if (!p.still.empty()) clear_still(late_.back().mask, p.still, options_.motion.cell);
+    if (!p.score.empty()) clear_still(late_.back().mask, p.score, options_.motion.cell);
   }
 }
 
@@ -263,7 +266,7 @@ void DynamicStage::filter(const Context& context, const std::vector<FilterFeatur
       break;
     case FilterKind::standard:
       scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
-      if (motion_) clear_still(scene.mask, motion_->still(), moving.cell);
+      if (motion_) clear_still(scene.mask, motion_->score(), moving.cell);
       unite(scene.mask, given, camera_.width, camera_.height);
       if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
       scene.dynamic = mask_filter(features, scene.mask);
@@ -308,8 +311,6 @@ DynamicScene DynamicStage::process(const Context& context) {
 
   watch = Stopwatch();
   filter(context, features, given, moving, scene);
-  // People who stand about from the beginning are no furniture.
-  if (motion_ && (!scene.boxes.empty() || !given.empty())) motion_->claim(scene.mask);
   times_.add("filter", watch.ms());
   if (pyramid) remember(context, std::move(pyramid));
   return scene;

@@ -106,7 +106,7 @@ class DynamicStage {
     std::shared_ptr<const RgbdImage> image;
     std::shared_ptr<const ImagePyramid> pyramid;
     std::vector<Eigen::Vector2f> corners;  // image pixels
-    Image<uint8_t> still;                  // by the motion segmentation; keyframes only, and empty without it
+    Image<float> score;                    // of the motion segmentation; keyframes only, and empty without it
     bool keyframe = false;
   };
   std::vector<PointMotion> follow(const PastFrame& from, const ImagePyramid& to,
