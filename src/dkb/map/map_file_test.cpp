@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -31,6 +33,12 @@ MapFileContext fr1_context() {
 // What decode_map() complains of.
 std::string complaint(std::string_view bytes) {
   return test::input_error_of([&] { decode_map(bytes, "a.dkb"); });
+}
+
+// How many damaged files to try: $DKB_MUTATIONS, for a long run under the sanitizers.
+int mutations(int usual) {
+  const char* wanted = std::getenv("DKB_MUTATIONS");
+  return wanted != nullptr ? std::max(1, std::atoi(wanted)) : usual;
 }
 
 // The file of these sections, with right checksums.
@@ -197,7 +205,7 @@ TEST(MapFile, NoMutationCrashesEvenWithRightChecksums) {
   const MapSections sections = write_sections(map, fr1_context());
   Random random(11);
   int refused = 0;
-  const int rounds = 6000;
+  const int rounds = mutations(6000);
   for (int round = 0; round < rounds; ++round) {
     auto contents = sections.bytes;
     std::string& target = contents[random.below(5)];
@@ -238,7 +246,7 @@ TEST(MapFile, NoMutationCrashesEvenWithRightChecksums) {
 TEST(MapFile, MutationsOfTheWholeFileAreRefused) {
   const std::string bytes = encode_map(test::random_map(9, 5, 10, 10), fr1_context());
   Random random(12);
-  for (int round = 0; round < 5000; ++round) {
+  for (int round = 0, rounds = mutations(5000); round < rounds; ++round) {
     std::string damaged = bytes;
     const size_t at = random.below(static_cast<uint32_t>(bytes.size()));
     const size_t length = 1 + random.below(64);
