@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 
 #include "dkb/dataset/simulator/noise.h"
@@ -28,9 +29,9 @@ constexpr int kBandRows = 16;           // rows read at the same time, as far as
 constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth
 
 std::string stamp_text(int64_t microseconds) {
+  const long long size = std::abs(static_cast<long long>(microseconds));
   std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%lld.%06lld", static_cast<long long>(microseconds / 1000000),
-                static_cast<long long>(microseconds % 1000000));
+  std::snprintf(text.data(), text.size(), "%s%lld.%06lld", microseconds < 0 ? "-" : "", size / 1000000, size % 1000000);
   return text.data();
 }
 

@@ -349,6 +349,10 @@ TEST_F(SimulatorFiles, CameraFollowsAGivenPath) {
                               Rigid3(Eigen::Quaterniond(0.7071068, -0.7071068, 0, 0), Eigen::Vector3d::Zero())),
               1e-3);
   }
+  // The first depth image is older than the path, which starts at 0.
+  const SimulatedFrame first = s.render(0);
+  EXPECT_LT(first.image.depth_timestamp, 0);
+  EXPECT_DOUBLE_EQ(std::stod(first.depth_stamp), first.image.depth_timestamp);
   o.frames = 1000;
   const Simulator longer(o);
   EXPECT_EQ(longer.frames(), 121);
