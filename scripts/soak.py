@@ -84,8 +84,8 @@ def panel(rows, columns, title, top, height=150, left=60, width=640):
         points = " ".join(f"{x(m):.1f},{y(float(r[name])):.1f}" for m, r in zip(minutes, rows))
         out.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
         if legend:
-            at = left + width - 220 * (len(columns) - i)
-            out.append(f'<text x="{at + 220}" y="{top - 8}" text-anchor="end" fill="{colour}">{legend}</text>')
+            at = left + width - 150 * (len(columns) - i)
+            out.append(f'<text x="{at + 150}" y="{top - 8}" text-anchor="end" fill="{colour}">{legend}</text>')
     return out
 
 
@@ -97,8 +97,8 @@ def plot(table, picture):
            '<rect width="730" height="810" fill="white"/>']
     out += panel(rows, [("keyframes", "", blue)], "Keyframes in the map", 30)
     out += panel(rows, [("points", "", blue)], "Points in the map", 220)
-    out += panel(rows, [("rss_mb", "", blue)], "Resident memory [MB]", 410)
-    out += panel(rows, [("tracking_p95_ms", "by the clock", orange), ("cpu_p95_ms", "CPU of the caller", blue)],
+    out += panel(rows, [("rss_mb", "resident", orange), ("in_use_mb", "in use", blue)], "Memory [MB]", 410)
+    out += panel(rows, [("tracking_p95_ms", "by the clock", orange), ("cpu_p95_ms", "CPU of its thread", blue)],
                  "95% of tracking time [ms]", 600)
     out.append('<text x="380" y="798" text-anchor="middle">minutes (a line each time the path starts anew)</text></svg>')
     pathlib.Path(picture).write_text("\n".join(out) + "\n")
