@@ -22,8 +22,8 @@ struct SilhouetteOptions {
 
 // What in each box belongs to the detected object rather than to what is seen beside it: the nearest depth layer that
 // fills a good part of the box's core, all that hangs together with it in depth within the box, and limbs: surfaces in
-// reach beside it that end within the box. Cells without depth follow their neighbours. A box whose core has no depth at
-// all is taken whole.
+// reach beside it that end within the box. Cells without depth follow their neighbours. A box whose core has no depth
+// at all is taken whole.
 MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const SilhouetteOptions& options);
 
 }  // namespace dkb

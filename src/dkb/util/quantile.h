@@ -7,8 +7,8 @@
 
 namespace dkb {
 
-// The element that would stand at `share` (0 ... 1) of the values if they were sorted: one of them, never a mean of two.
-// Puts `values`, of which there must be some, into another order.
+// The element that would stand at `share` (0 ... 1) of the values if they were sorted: one of them, never a mean of
+// two. Puts `values`, of which there must be some, into another order.
 template <class T>
 T quantile(std::vector<T>& values, double share) {
   const size_t k = std::min(values.size() - 1, static_cast<size_t>(share * static_cast<double>(values.size())));
