@@ -10,7 +10,6 @@
 // scene only the picture is made.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>
@@ -22,6 +21,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/dense/surface_mesh.h"
 #include "dkb/util/files.h"
+#include "figures.h"
 
 namespace dkb {
 namespace {
@@ -85,37 +85,20 @@ class ThinnedPoints {
   std::unordered_set<uint64_t> taken_;
 };
 
-double share(const std::vector<double>& sorted, double q) {
-  return sorted.empty()
-             ? 0
-             : sorted[std::min(sorted.size() - 1, static_cast<size_t>(q * static_cast<double>(sorted.size())))];
-}
-
-// Places the run's world in the simulator's: mean rotation, then mean translation. (Positions alone say little about
-// the rotation when the path is short.)
-Rigid3 registration(const Trajectory& estimated, const Simulator& simulator) {
+Rigid3 truth_from_run(const Trajectory& estimated, const Simulator& simulator) {
   std::vector<std::pair<Rigid3, Rigid3>> pairs;  // world_from_cam of the run, of the truth
   for (const StampedPose& p : estimated)
     for (int i = 0; i < simulator.frames(); ++i)
       if (std::abs(simulator.stamp(i) - p.timestamp) < 1e-4)
         pairs.emplace_back(p.world_from_cam, simulator.world_from_cam(simulator.stamp(i) - simulator.stamp(0)));
-  Eigen::Matrix4d quaternions = Eigen::Matrix4d::Zero();
-  for (const auto& [run, truth] : pairs) {
-    const Eigen::Vector4d q = (truth.rotation * run.rotation.conjugate()).coeffs();
-    quaternions += q * q.transpose();
-  }
-  Rigid3 result;
-  result.rotation.coeffs() = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(quaternions).eigenvectors().col(3);
-  for (const auto& [run, truth] : pairs)
-    result.translation += (truth.translation - result.rotation * run.translation) / static_cast<double>(pairs.size());
-  return result;
+  return registration(pairs);
 }
 
 void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::string& scene) {
   SimulatorOptions options;
   options.scene = scene;
   const Simulator simulator(options);
-  const Rigid3 truth_from_world = registration(estimated, simulator);
+  const Rigid3 truth_from_world = truth_from_run(estimated, simulator);
   ThinnedPoints still(0.006F), people(0.02F);
   for (int i = 0; i < simulator.frames(); i += kFrameStep) {
     const SimulatedFrame f = simulator.render(i);
@@ -146,10 +129,9 @@ void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::st
     ++ghosts;
     person += distance_to(people_tree, p) < kPersonReach ? 1 : 0;
   }
-  std::sort(errors.begin(), errors.end());
   const double count = std::max<double>(1, static_cast<double>(errors.size()));
   fmt::print("{} occupied voxels; surface error median {:.1f} mm, 90% {:.1f} mm, 99% {:.1f} mm\n", errors.size(),
-             1e3 * share(errors, 0.5), 1e3 * share(errors, 0.9), 1e3 * share(errors, 0.99));
+             1e3 * percentile(errors, 0.5), 1e3 * percentile(errors, 0.9), 1e3 * percentile(errors, 0.99));
   fmt::print("{:.3f}% more than {:.0f} cm from any still surface; {:.3f}% people\n",
              100 * static_cast<double>(ghosts) / count, 100 * kGhost, 100 * static_cast<double>(person) / count);
 }

@@ -3,10 +3,11 @@
 
 #include <ctime>
 
-#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "dkb/slam/slam_system.h"
+#include "figures.h"
 
 namespace dkb {
 
@@ -26,13 +27,6 @@ inline FrameTime timed_frame(SlamSystem& slam, const std::shared_ptr<const RgbdI
   const double before = thread_cpu_ms();
   *result = slam.process(image);
   return {result->tracking_ms, thread_cpu_ms() - before};
-}
-
-// The value that the share `p` of them does not exceed; 0 of none.
-inline double percentile(std::vector<double> values, double p) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<size_t>(p * static_cast<double>(values.size())))];
 }
 
 inline double p95(const std::vector<FrameTime>& times, double FrameTime::*which) {

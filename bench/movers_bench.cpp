@@ -6,12 +6,12 @@
 //   movers_bench crowd run [RUN ...]
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <filesystem>
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/dynamics/mover_evaluation.h"
 #include "dkb/util/errors.h"
+#include "figures.h"
 
 namespace dkb {
 namespace {
@@ -24,28 +24,17 @@ const StampedPose* pose_at(const Trajectory& poses, double time) {
   return nullptr;
 }
 
-// Mean rotation, then mean translation: positions alone say little about the rotation when the path is short.
-Rigid3 registration(const Trajectory& truth, const Trajectory& run) {
-  Eigen::Matrix4d quaternions = Eigen::Matrix4d::Zero();
+Rigid3 truth_from_run(const Trajectory& truth, const Trajectory& run) {
   std::vector<std::pair<Rigid3, Rigid3>> pairs;
   for (const StampedPose& p : run)
     if (const StampedPose* t = pose_at(truth, p.timestamp)) pairs.emplace_back(p.world_from_cam, t->world_from_cam);
   if (pairs.empty()) throw InputError("no pose of the run has a stamp of the truth");
-  for (const auto& [estimated, true_pose] : pairs) {
-    const Eigen::Vector4d q = (true_pose.rotation * estimated.rotation.conjugate()).coeffs();
-    quaternions += q * q.transpose();
-  }
-  Rigid3 result;
-  result.rotation.coeffs() = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(quaternions).eigenvectors().col(3);
-  for (const auto& [estimated, true_pose] : pairs)
-    result.translation +=
-        (true_pose.translation - result.rotation * estimated.translation) / static_cast<double>(pairs.size());
-  return result;
+  return registration(pairs);
 }
 
 void measure(const fs::path& sequence, const fs::path& run) {
   const Trajectory truth = read_trajectory((sequence / "groundtruth.txt").string());
-  const Rigid3 truth_from_world = registration(truth, read_trajectory((run / "trajectory_online.txt").string()));
+  const Rigid3 truth_from_world = truth_from_run(truth, read_trajectory((run / "trajectory_online.txt").string()));
   const auto camera = [&](double time) {
     const StampedPose* p = pose_at(truth, time);
     return p != nullptr ? p->world_from_cam.translation : Eigen::Vector3d(1e9, 0, 0);

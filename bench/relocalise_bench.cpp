@@ -24,6 +24,7 @@
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/slam/slam_system.h"
 #include "dkb/util/random.h"
+#include "figures.h"
 
 namespace {
 
@@ -96,12 +97,6 @@ std::shared_ptr<const RgbdImage> darkness(const CameraModel& camera, double seco
   image->grey = GreyImage(camera.width, camera.height);
   image->depth = DepthImage(camera.width, camera.height);
   return image;
-}
-
-double percentile(std::vector<double> values, double p) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<size_t>(p * static_cast<double>(values.size())))];
 }
 
 void measure(const fs::path& folder, const Arguments& arguments) {

@@ -13,7 +13,6 @@ namespace dkb {
 namespace {
 
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
-constexpr double kChi2TwoDof = 5.991;        // 95%
 constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
 
 }  // namespace
@@ -259,7 +258,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
     if (pair.use_depth || !k.by_mover) return false;
     const double sigma = pose_observation(k, pair.point_in_world, noise_, scale_factor_).pixel_sigma;
     const Eigen::Vector2d seen = camera_.project(pose.cam_from_world * pair.point_in_world);
-    return (seen - k.pixel.cast<double>()).squaredNorm() > kChi2TwoDof * sigma * sigma;
+    return (seen - k.pixel.cast<double>()).squaredNorm() > PoseOptions().chi2_pixel * sigma * sigma;
   };
   frame.points.assign(points.size(), kNoPoint);
   frame.outlier.assign(points.size(), 0);
