@@ -46,7 +46,8 @@ struct RunArguments {
   std::string filter, disable;
   std::string load_map;
   bool localise = false;
-  bool realtime = false, dense = false, final_ba = false, dump_features = false, cv_orb = false, quiet = false;
+  bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
+       quiet = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -94,6 +95,12 @@ fs::path default_output(const fs::path& dataset) {
 void append_features(std::string& csv, const std::string& stamp, const SlamSystem& slam) {
   for (const FeatureReport& f : slam.features())
     csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
+}
+
+void append_frame(std::string& log, const std::string& stamp, const FrameResult& result) {
+  log += fmt::format("{} frame {} {}", stamp, result.frame, name_of(result.state));
+  if (result.tracked()) log += fmt::format(", {} points; {}", result.inliers, result.keyframe_explanation);
+  log += '\n';
 }
 
 // What --load-map says of the camera and the pyramid has to fit what the run says of them.
@@ -178,6 +185,7 @@ int run(const RunArguments& args) {
   RunFacts facts;
   facts.writes_map = !args.localise;
   facts.offered = static_cast<int>(dataset.pairs.size());
+  slam.explain_keyframes(args.debug_log);
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
   if (args.realtime) paced.emplace(reader);
@@ -201,6 +209,7 @@ int run(const RunArguments& args) {
     if (const auto warning = slam.take_warning())
       warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
     if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
+    if (args.debug_log) append_frame(facts.debug_log, frame->stamp, result);
     progress.frame(frame->index + 1, &result);
   }
   if (paced) {
@@ -290,6 +299,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
+  command->add_flag("--debug-log", args->debug_log,
+                    "Write debug.log: each frame's state, and why it became a keyframe or did not");
   command->add_flag("--cv-orb", args->cv_orb,
                     "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");

@@ -91,6 +91,11 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
     const auto it = s.keyframe_rules.find(rule);
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
+  const KeyframeTestCounts& tests = s.keyframe_tests;
+  j["keyframe_tests"] = {
+      {"decisions", tests.decisions},       {"parallax", tests.parallax},  {"votes_asked", tests.votes_asked},
+      {"visibility", tests.visibility},     {"spread", tests.spread},      {"few_points", tests.few_points},
+      {"close_points", tests.close_points}, {"view_left", tests.view_left}};
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.mapping.points_retracted}};
   j["detector"] = {
       {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
@@ -130,6 +135,7 @@ void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, 
   write_file_atomically(folder / "config.yaml", facts.config_yaml);
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
+  if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
   write_file_atomically(folder / "stats.json", stats_json(slam.statistics(), facts));
 }
 

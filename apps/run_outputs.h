@@ -18,6 +18,7 @@ struct RunFacts {
   double startup_s = 0, wall_s = 0;
   std::string config_yaml;
   std::string features_csv;  // empty = not asked for
+  std::string debug_log;     // likewise
   MoverRows movers;
   StageTimes times;  // decoding
   bool writes_map = true;

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::vector<std::string> kSameBytes = {"trajectory.txt", "trajectory_online.txt", "keyframes.txt", "map.dkb",
-                                             "map.ply",        "config.yaml",           "features.csv"};
+                                             "map.ply",        "config.yaml",           "features.csv",  "debug.log"};
 
 // Images of one's own making in place of the sequence's.
 std::string black_jpeg() {
@@ -75,6 +75,8 @@ TEST(RunCommand, WritesEveryFileOfTheContract) {
     by_rule += s.at("keyframe_rules").at(rule).get<int>();
   EXPECT_GE(by_rule, s.at("keyframes"));
   EXPECT_EQ(s.at("keyframe_rules").at("first"), 1);
+  EXPECT_EQ(s.at("keyframe_tests").at("decisions"), kSequenceFrames - 1);
+  EXPECT_GE(s.at("keyframe_tests").at("visibility"), s.at("keyframe_rules").at("adaptive"));
   EXPECT_TRUE(s.at("dynamic").contains("features_removed"));
   EXPECT_TRUE(s.at("detector").contains("kind"));
 
@@ -87,10 +89,32 @@ TEST(RunCommand, WritesEveryFileOfTheContract) {
   EXPECT_EQ(csv.find(",dynamic\n"), std::string::npos);
 }
 
+TEST(RunCommand, TheDebugLogExplainsEveryDecision) {
+  const TempFolder temp;
+  const SlamRun run(sequence(), temp / "out", {"--debug-log"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  std::istringstream log(read_text(run.out / "debug.log"));
+  int lines = 0, adaptive = 0, floor = 0, gate_open = 0;
+  for (std::string line; std::getline(log, line); ++lines) {
+    EXPECT_NE(line.find(" frame " + std::to_string(lines) + " tracking, "), std::string::npos) << line;
+    if (lines == 0)
+      EXPECT_NE(line.find("; keyframe (first): the map starts here"), std::string::npos) << line;
+    else
+      EXPECT_NE(line.find("parallax "), std::string::npos) << line;
+    adaptive += line.find("; keyframe (adaptive): ") != std::string::npos;
+    floor += line.find("; keyframe (floor): ") != std::string::npos;
+    gate_open += line.find("): yes; ") != std::string::npos;
+  }
+  EXPECT_EQ(lines, kSequenceFrames);
+  EXPECT_EQ(adaptive, run.stats.at("keyframe_rules").at("adaptive"));
+  EXPECT_EQ(floor, run.stats.at("keyframe_rules").at("floor"));
+  EXPECT_EQ(gate_open, run.stats.at("keyframe_tests").at("parallax"));
+}
+
 TEST(RunCommand, OneThreadAndManyGiveTheSameBytes) {
   const TempFolder temp;
-  const SlamRun many(sequence(), temp / "many", {"--dump-features"}),
-      one(sequence(), temp / "one", {"--dump-features", "--threads", "1"});
+  const SlamRun many(sequence(), temp / "many", {"--dump-features", "--debug-log"}),
+      one(sequence(), temp / "one", {"--dump-features", "--debug-log", "--threads", "1"});
   ASSERT_EQ(many.finished.exit_code, 0) << many.finished.err;
   ASSERT_EQ(one.finished.exit_code, 0) << one.finished.err;
   for (const std::string& name : kSameBytes) EXPECT_EQ(read_text(many.out / name), read_text(one.out / name)) << name;

@@ -11,10 +11,6 @@
 namespace dkb {
 namespace {
 
-const char* yes_or_no(bool yes) {
-  return yes ? "yes" : "no";
-}
-
 // Median depth [m] of the features that show a map point; 0 when none has a depth.
 double median_depth(const KeyframeQuery& q) {
   std::vector<float> depths;
@@ -133,7 +129,8 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   MatchCounts counts;
   VisibilityVote visibility;
   SpreadVote spread;
-  if (tests.parallax && waited && map.keyframe(q.last_keyframe) != nullptr) {
+  tests.votes_asked = tests.parallax && waited && map.keyframe(q.last_keyframe) != nullptr;
+  if (tests.votes_asked) {
     if (studied_ != q.last_keyframe) study_keyframe(q.last_keyframe, map);
     const Matches matches = match(q, cam_from_keyframe);
     counts = {matches.matches,    matches.changed,    q.tracked_points,
@@ -155,17 +152,26 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
     decision.rule = KeyframeRule::floor;
   decision.insert = decision.rule != KeyframeRule::none;
   if (!q.explain) return decision;
-  decision.explanation = fmt::format(
-      "parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): {}; changed {} of {} matches (reference {} of {}, "
-      "points {} / {}), "
-      "S {:.2f}, theta {:.3f}, alpha {:.3f}, beta {:.3f}, against {:.2f}: {}; ECOG {:.3f} against {:.3f}: {}; "
-      "tracked {} of the reference's {}, close {} (+{}): {}",
-      parallax.rotation_deg, parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax),
-      counts.changed, counts.matches, counts.reference_changed, counts.reference_matches, counts.points,
-      counts.reference_points, visibility.s, visibility.theta, visibility.alpha, visibility.beta, visibility.threshold,
-      yes_or_no(tests.visibility), spread.ecog, spread.threshold, yes_or_no(tests.spread), q.tracked_points,
-      q.reference_points, q.tracked_close_points, q.creatable_close_points,
-      yes_or_no(tests.few_points || tests.close_points || tests.view_left));
+  decision.explanation =
+      fmt::format("parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): {}; ", parallax.rotation_deg,
+                  parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax));
+  if (tests.votes_asked)
+    decision.explanation += fmt::format(
+        "changed {} of {} matches (reference {} of {}, points {} / {}), S {:.2f}, theta {:.3f}, alpha {:.3f}, beta "
+        "{:.3f}, against {:.2f}: {}; ECOG {:.3f} against {:.3f}: {}; ",
+        counts.changed, counts.matches, counts.reference_changed, counts.reference_matches, counts.points,
+        counts.reference_points, visibility.s, visibility.theta, visibility.alpha, visibility.beta,
+        visibility.threshold, yes_or_no(tests.visibility), spread.ecog, spread.threshold, yes_or_no(tests.spread));
+  else
+    decision.explanation +=
+        tests.parallax ? "no votes before the pause is over and the last keyframe in the map; " : "votes not asked; ";
+  decision.explanation += fmt::format(
+      "tracked {} (at least {}: {}), of the reference's {} and of {} after the last keyframe, enough: {}; close {} "
+      "(+{}), "
+      "enough: {}",
+      q.tracked_points, options_.floor_least_tracked, yes_or_no(!tests.few_points), q.reference_points,
+      reference_.tracked_points, yes_or_no(!tests.view_left), q.tracked_close_points, q.creatable_close_points,
+      yes_or_no(!tests.close_points));
   return decision;
 }
 

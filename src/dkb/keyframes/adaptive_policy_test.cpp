@@ -266,6 +266,11 @@ TEST(AdaptiveKeyframes, ExplainThemselvesWhenAsked) {
   KeyframeQuery q = wall.query(1, {});
   EXPECT_NE(policy.decide(q, wall.map()).explanation.find("parallax 0.00 deg + 0.00 against T 30.00 (F 0.000): no"),
             std::string::npos);
+  EXPECT_NE(policy.decide(q, wall.map()).explanation.find("; votes not asked; tracked 400 (at least 50: yes)"),
+            std::string::npos);
+  q = wall.query(5, moved_by(0.6));
+  EXPECT_NE(policy.decide(q, wall.map()).explanation.find("matches (reference"), std::string::npos);
+  EXPECT_TRUE(policy.decide(q, wall.map()).tests.votes_asked);
   q.explain = false;
   EXPECT_TRUE(policy.decide(q, wall.map()).explanation.empty());
 }

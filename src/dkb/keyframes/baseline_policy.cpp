@@ -1,24 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
-
-const char* name_of(KeyframeRule rule) {
-  switch (rule) {
-    case KeyframeRule::first:
-      return "first";
-    case KeyframeRule::baseline:
-      return "baseline";
-    case KeyframeRule::adaptive:
-      return "adaptive";
-    case KeyframeRule::floor:
-      return "floor";
-    case KeyframeRule::none:
-      break;
-  }
-  return "none";
-}
 
 void BaselineKeyframeOptions::check() const {
   require_option(frames_between >= 1, "frames_between", frames_between, "at least 1 frame");
@@ -36,16 +22,20 @@ KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   const bool settled = q.frame - q.last_relocalisation_frame > options_.frames_between;
   const bool waited = q.mapper_idle || q.frame - q.last_keyframe_frame > options_.frames_between;
   const bool enough = q.tracked_points >= options_.least_tracked;
-  const bool view_left = q.tracked_points < options_.reference_ratio * q.reference_points;
-  const bool close_call =
-      q.tracked_close_points < options_.few_close && q.creatable_close_points >= options_.many_creatable;
   KeyframeDecision decision;
-  decision.insert = settled && waited && enough && (view_left || close_call);
+  KeyframeTests& tests = decision.tests;
+  tests.view_left = q.tracked_points < options_.reference_ratio * q.reference_points;
+  tests.close_points =
+      q.tracked_close_points < options_.few_close && q.creatable_close_points >= options_.many_creatable;
+  decision.insert = settled && waited && enough && (tests.view_left || tests.close_points);
   decision.rule = decision.insert ? KeyframeRule::baseline : KeyframeRule::none;
-  decision.explanation = "tracked " + std::to_string(q.tracked_points) + " against the reference's " +
-                         std::to_string(q.reference_points) + ", close " + std::to_string(q.tracked_close_points) +
-                         " (+" + std::to_string(q.creatable_close_points) + "), mapper " +
-                         (q.mapper_idle ? "idle" : "busy");
+  if (!q.explain) return decision;
+  decision.explanation = fmt::format(
+      "tracked {} (at least {}: {}) against {} of the reference's {}: {}; close {} (+{}): {}; {} frames since the last "
+      "keyframe, mapper {}: {}; settled since a relocalisation: {}",
+      q.tracked_points, options_.least_tracked, yes_or_no(enough), options_.reference_ratio, q.reference_points,
+      yes_or_no(tests.view_left), q.tracked_close_points, q.creatable_close_points, yes_or_no(tests.close_points),
+      q.frame - q.last_keyframe_frame, q.mapper_idle ? "idle" : "busy", yes_or_no(waited), yes_or_no(settled));
   return decision;
 }
 

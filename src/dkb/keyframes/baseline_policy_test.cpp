@@ -36,6 +36,18 @@ TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
   EXPECT_EQ(decide(q).rule, KeyframeRule::none);
 }
 
+TEST(BaselineKeyframes, SayWhichTestSpokeAndExplainItWhenAsked) {
+  KeyframeQuery q = due();
+  EXPECT_TRUE(decide(q).tests.view_left);
+  EXPECT_FALSE(decide(q).tests.close_points);
+  EXPECT_TRUE(decide(q).explanation.empty());
+  q.explain = true;
+  EXPECT_EQ(
+      decide(q).explanation,
+      "tracked 169 (at least 50: yes) against 0.85 of the reference's 200: yes; close 150 (+0): no; 10 frames since "
+      "the last keyframe, mapper idle: yes; settled since a relocalisation: yes");
+}
+
 TEST(BaselineKeyframes, AreMadeWhenCloseDepthsAreWasted) {
   KeyframeQuery q = due();
   q.tracked_points = 200;  // the view has not been left

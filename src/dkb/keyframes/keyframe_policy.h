@@ -31,11 +31,21 @@ struct KeyframeQuery {
 
 enum class KeyframeRule { none, first, baseline, adaptive, floor };
 const char* name_of(KeyframeRule rule);
+const char* yes_or_no(bool yes);  // for explanations
 
-// Which tests of the adaptive policy spoke for a keyframe; those behind a closed gate were not asked.
+// Which tests spoke for a keyframe. The baseline rule has the last two only.
 struct KeyframeTests {
-  bool parallax = false, visibility = false, spread = false;         // the gate, the two votes (DKB section 3.2)
+  bool parallax = false;     // the gate                                           (DKB section 3.2)
+  bool votes_asked = false;  // it was open, the pause was over, and the last keyframe was in the map
+  bool visibility = false, spread = false;
   bool few_points = false, close_points = false, view_left = false;  // the safety floor
+};
+
+// How often each test spoke for a keyframe.
+struct KeyframeTestCounts {
+  int decisions = 0;
+  int parallax = 0, votes_asked = 0, visibility = 0, spread = 0, few_points = 0, close_points = 0, view_left = 0;
+  void add(const KeyframeTests& tests);
 };
 
 struct KeyframeDecision {
@@ -44,6 +54,9 @@ struct KeyframeDecision {
   std::string explanation;  // every test with its numbers, for logs; empty unless asked for
   KeyframeTests tests = {};
 };
+
+// One line: the decision and its explanation.
+std::string explained(const KeyframeDecision& decision);
 
 // Decides whether a tracked frame becomes a keyframe.
 // Deterministic: the same frames in the same order give the same decisions.

@@ -195,12 +195,12 @@ std::vector<LateMask> SlamSystem::Impl::retract_late() {
   return masks;
 }
 
-KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
+KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) {
   const TrackedFrame& frame = outcome.frame;
-  if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, ""};
-  if (localise_only_) return {};
+  if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, "the map starts here"};
+  if (localise_only_) return {false, KeyframeRule::none, "the map is not changed"};
   if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue)
-    return {};
+    return {false, KeyframeRule::none, "mapping has enough to do"};
   KeyframeQuery q;
   q.frame = frame.index;
   q.last_keyframe_frame = last_keyframe_frame_;
@@ -221,7 +221,10 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) const {
   q.last_keyframe_cam_from_world = tracker_->keyframe_pose(q.last_keyframe);
   q.points = &frame.points;
   q.features = frame.features.get();
-  return policy_->decide(q, tracker_->view());
+  q.explain = explain_keyframes_;
+  KeyframeDecision decision = policy_->decide(q, tracker_->view());
+  statistics_.keyframe_tests.add(decision.tests);
+  return decision;
 }
 
 void SlamSystem::Impl::insert_keyframe(TrackedFrame& frame) {
@@ -308,6 +311,7 @@ FrameResult SlamSystem::Impl::process(std::shared_ptr<const RgbdImage> image_poi
       ++statistics_.keyframe_rules[name_of(decision.rule)];
       insert_keyframe(frame);
     }
+    if (explain_keyframes_) result.keyframe_explanation = explained(decision);
     result.keyframe = decision.insert;
     result.world_from_cam = frame.cam_from_world.inverse();
     result.world_from_odom = world_from_odom_;

@@ -68,6 +68,10 @@ void SlamSystem::reset() {
 void SlamSystem::load(Map map) {
   impl_->start(std::move(map));
 }
+void SlamSystem::explain_keyframes(bool on) {
+  impl_->explain_keyframes_ = on;
+}
+
 void SlamSystem::set_localise_only(bool on) {
   impl_->localise_only_ = on;
 }

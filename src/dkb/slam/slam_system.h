@@ -10,6 +10,7 @@
 #include "dkb/dynamics/mover.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/image/rgbd_image.h"
+#include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/map/map.h"
 #include "dkb/slam/dynamic_stage.h"
 #include "dkb/slam/options.h"
@@ -30,6 +31,7 @@ struct FrameResult {
   int inliers = 0;                         // map points that the pose rests on
   KeyframeId reference = kNoKeyframe;      // keyframe that shows most of them
   bool keyframe = false;                   // the frame became a keyframe
+  std::string keyframe_explanation;        // why, or why not; empty unless explain_keyframes(true)
   std::vector<Mover> movers;               // obstacles that move by themselves, seen in this frame
   std::vector<LateMask> late_masks;        // where movers were in earlier keyframes, as detections have shown since
   double tracking_ms = 0, wait_ms = 0;     // steady clock: own work, waiting for mapping
@@ -61,7 +63,8 @@ struct SlamStatistics {
   int loops = 0, merges = 0;
   size_t map_points = 0;
   MappingReport mapping;
-  std::map<std::string, int> keyframe_rules;
+  std::map<std::string, int> keyframe_rules;  // keyframes by the rule that made them
+  KeyframeTestCounts keyframe_tests;
   long features_removed = 0;  // features that the filter kept from tracking
   std::string detector = "none";
   double detector_rate_hz = 0;
@@ -100,6 +103,8 @@ class SlamSystem {
   // While localise-only, the map is not changed: no keyframes are made, no new map is started, and what tracking learns
   // of points (sightings, retractions) stays with it.
   void set_localise_only(bool on);
+  // Every frame's result then says which of the keyframe tests said what, with their numbers.
+  void explain_keyframes(bool on);
 
   // Poses of all tracked frames by the map as it is now; complete after finish(). Frames of a map that was not joined
   // with the first (yet) are in a world of their own.

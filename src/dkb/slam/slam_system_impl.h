@@ -66,6 +66,7 @@ class SlamSystem::Impl {
   FrameIndex last_keyframe_frame_ = 0, last_relocalisation_frame_ = -1000000;
   Rigid3 world_from_odom_, odom_from_cam_;
   bool localise_only_ = false;
+  bool explain_keyframes_ = false;
   std::vector<size_t> kept_;                    // features given to tracking, as indices of all
   std::vector<uint8_t> by_mover_;               // of these, which hang together with a mover (Keypoint::by_mover)
   std::vector<uint8_t> suspect_;                // of these, which may move
@@ -98,7 +99,7 @@ class SlamSystem::Impl {
   std::vector<Eigen::Vector3d> keyframe_points_in_camera(const Rigid3& cam_from_world) const;
   std::optional<bool> looks_the_same(const Eigen::Vector2d& pixel, double depth, int octave,
                                      const Descriptor& descriptor);
-  KeyframeDecision decide(const TrackOutcome& outcome) const;
+  KeyframeDecision decide(const TrackOutcome& outcome);
   void insert_keyframe(TrackedFrame& frame);
   void keep_odometry_smooth(const TrackOutcome& outcome);
 };

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/keyframes/keyframe_policy.h"
+
+#include <fmt/format.h>
+
+namespace dkb {
+
+const char* name_of(KeyframeRule rule) {
+  switch (rule) {
+    case KeyframeRule::first:
+      return "first";
+    case KeyframeRule::baseline:
+      return "baseline";
+    case KeyframeRule::adaptive:
+      return "adaptive";
+    case KeyframeRule::floor:
+      return "floor";
+    case KeyframeRule::none:
+      break;
+  }
+  return "none";
+}
+
+const char* yes_or_no(bool yes) {
+  return yes ? "yes" : "no";
+}
+
+std::string explained(const KeyframeDecision& decision) {
+  const std::string result = decision.insert ? fmt::format("keyframe ({})", name_of(decision.rule)) : "no keyframe";
+  return result + ": " + decision.explanation;
+}
+
+void KeyframeTestCounts::add(const KeyframeTests& tests) {
+  ++decisions;
+  parallax += tests.parallax;
+  votes_asked += tests.votes_asked;
+  visibility += tests.visibility;
+  spread += tests.spread;
+  few_points += tests.few_points;
+  close_points += tests.close_points;
+  view_left += tests.view_left;
+}
+
+}  // namespace dkb

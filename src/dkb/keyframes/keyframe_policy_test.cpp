@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/keyframes/keyframe_policy.h"
+
+#include <gtest/gtest.h>
+
+namespace dkb {
+namespace {
+
+TEST(KeyframeTestCounts, CountEachTestThatSpokeForAKeyframe) {
+  KeyframeTestCounts counts;
+  counts.add({});
+  KeyframeTests votes;
+  votes.parallax = votes.votes_asked = votes.visibility = votes.spread = true;
+  counts.add(votes);
+  KeyframeTests halves;
+  halves.parallax = halves.votes_asked = halves.spread = true;
+  counts.add(halves);
+  KeyframeTests floor;
+  floor.few_points = floor.close_points = floor.view_left = true;
+  counts.add(floor);
+  counts.add(floor);
+  EXPECT_EQ(counts.decisions, 5);
+  EXPECT_EQ(counts.parallax, 2);
+  EXPECT_EQ(counts.votes_asked, 2);
+  EXPECT_EQ(counts.visibility, 1);
+  EXPECT_EQ(counts.spread, 2);
+  EXPECT_EQ(counts.few_points, 2);
+  EXPECT_EQ(counts.close_points, 2);
+  EXPECT_EQ(counts.view_left, 2);
+}
+
+TEST(KeyframeDecision, IsExplainedInOneLine) {
+  EXPECT_EQ(explained({true, KeyframeRule::floor, "tracked 40"}), "keyframe (floor): tracked 40");
+  EXPECT_EQ(explained({false, KeyframeRule::none, "tracked 400"}), "no keyframe: tracked 400");
+}
+
+}  // namespace
+}  // namespace dkb
