@@ -167,8 +167,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
         tests.parallax ? "no votes before the pause is over and the last keyframe in the map; " : "votes not asked; ";
   decision.explanation += fmt::format(
       "tracked {} (at least {}: {}), of the reference's {} and of {} after the last keyframe, enough: {}; close {} "
-      "(+{}), "
-      "enough: {}",
+      "(+{}), enough: {}",
       q.tracked_points, options_.floor_least_tracked, yes_or_no(!tests.few_points), q.reference_points,
       reference_.tracked_points, yes_or_no(!tests.view_left), q.tracked_close_points, q.creatable_close_points,
       yes_or_no(!tests.close_points));

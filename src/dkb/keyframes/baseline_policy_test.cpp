@@ -120,13 +120,5 @@ TEST(BaselineKeyframes, AnOptionOutOfRangeIsNamed) {
   EXPECT_NE(message([](auto& o) { o.many_creatable = -1; }).find("many_creatable"), std::string::npos);
 }
 
-TEST(BaselineKeyframes, RulesHaveTheNamesOfTheStatistics) {
-  EXPECT_STREQ(name_of(KeyframeRule::first), "first");
-  EXPECT_STREQ(name_of(KeyframeRule::baseline), "baseline");
-  EXPECT_STREQ(name_of(KeyframeRule::adaptive), "adaptive");
-  EXPECT_STREQ(name_of(KeyframeRule::floor), "floor");
-  EXPECT_STREQ(name_of(KeyframeRule::none), "none");
-}
-
 }  // namespace
 }  // namespace dkb

@@ -34,5 +34,13 @@ TEST(KeyframeDecision, IsExplainedInOneLine) {
   EXPECT_EQ(explained({false, KeyframeRule::none, "tracked 400"}), "no keyframe: tracked 400");
 }
 
+TEST(KeyframeRule, RulesHaveTheNamesOfTheStatistics) {
+  EXPECT_STREQ(name_of(KeyframeRule::first), "first");
+  EXPECT_STREQ(name_of(KeyframeRule::baseline), "baseline");
+  EXPECT_STREQ(name_of(KeyframeRule::adaptive), "adaptive");
+  EXPECT_STREQ(name_of(KeyframeRule::floor), "floor");
+  EXPECT_STREQ(name_of(KeyframeRule::none), "none");
+}
+
 }  // namespace
 }  // namespace dkb

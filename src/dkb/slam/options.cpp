@@ -40,6 +40,7 @@ SlamOptions preset(const std::string& name) {
   o.dynamics.filter = FilterKind::paper;
   o.keyframe_policy = KeyframePolicyKind::adaptive;
   o.adaptive_keyframes = paper_keyframe_options();
+  o.mapping.ba.weights.adaptive = false;
   if (name == "orb") disable_parts(o, {.dynamic_removal = true, .keyframes = true, .weighted_ba = true});
   return o;
 }
@@ -176,8 +177,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("mapping.ba.iterations_first", &m.ba.iterations_first, "[steps] before outliers are told apart");
   s.bind("mapping.ba.iterations_second", &m.ba.iterations_second, "[steps] after");
   s.bind("mapping.ba.weighted", &m.ba.weighted, "geometric weights of points (DKB section 3.3)");
-  s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points (DKB Table 1)");
-  s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals instead");
+  s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points where it is fixed (DKB Table 1)");
+  s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals");
 
   s.bind("mapping.seam_tolerance", &m.seam_tolerance, "factor on fusion's limits where a loop was just closed");
 

@@ -78,6 +78,14 @@ TEST(SlamOptions, ValuesOutOfRangeAreRejectedWhereverTheyStand) {
   rejects([](auto& o) { o.pipeline.mapper_queue = 0; });
 }
 
+TEST(Presets, OnlyThePapersWeightIsFixed) {
+  EXPECT_TRUE(preset("default").mapping.ba.weights.adaptive);
+  EXPECT_FALSE(preset("paper").mapping.ba.weights.adaptive);
+  EXPECT_EQ(preset("paper").mapping.ba.weights.edge_weight, 1.5);
+  EXPECT_TRUE(preset("paper").mapping.ba.weighted);
+  EXPECT_FALSE(preset("orb").mapping.ba.weighted);
+}
+
 TEST(Presets, AnUnknownOneIsNamed) {
   EXPECT_NO_THROW(preset("default").check());
   EXPECT_NE(test::input_error_of([] { preset("defalt"); }).find("default"), std::string::npos);

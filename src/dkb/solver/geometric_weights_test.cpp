@@ -58,7 +58,7 @@ TEST(GeometricWeights, AreWrittenToAllObservationsOfAPoint) {  // DKB eq. 48
   TestWorld world({.cameras = 10, .points = 300, .visibility = 0.6, .seed = 3});
   // A second observation by the same keyframe is no second observer.
   world.problem.observations.push_back(world.problem.observations.front());
-  const GeometricWeights w = set_geometric_weights(world.problem);
+  const GeometricWeights w = set_geometric_weights(world.problem, {.adaptive = false});
   EXPECT_GT(w.edges, 0);
   EXPECT_LT(w.edges, 150);
   for (const BaObservation& o : world.problem.observations) {
@@ -75,7 +75,7 @@ TEST(GeometricWeights, AdaptiveWeightIsTheRatioOfTheVariances) {
                    .pose_error = 0,
                    .point_error = 0,
                    .seed = 3});
-  GeometricWeightOptions options{.adaptive = true, .adaptive_max = 4};
+  GeometricWeightOptions options{.adaptive_max = 4};
   const GeometricWeights shapes = set_geometric_weights(world.problem, options);
   ASSERT_GT(shapes.edges, 100);
   Random random(5);
