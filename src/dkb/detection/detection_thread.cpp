@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/thread_priority.h"
 
 namespace dkb {
 
@@ -107,6 +108,7 @@ StageTimes DetectionThread::times() const {
 }
 
 void DetectionThread::work() {
+  set_thread_priority(ThreadPriority::background);
   for (;;) {
     Job job;
     {

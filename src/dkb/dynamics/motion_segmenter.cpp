@@ -104,7 +104,7 @@ float MotionSegmenter::tolerance_at(float depth) const {
   return base + static_cast<float>(options_.tolerance_sigmas * noise.depth_sigma_quadratic) * x * x;
 }
 
-MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
+void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
   if (image.depth.width() != camera_.width || image.depth.height() != camera_.height)
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
                      std::to_string(image.depth.height()) + ", the camera " + std::to_string(camera_.width) + " x " +
@@ -113,8 +113,8 @@ MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_fro
   image_time_ = image.timestamp;
   current_->set_depth(image.depth, rays_);
   current_->time = image.depth_timestamp;
-  const Rigid3 depth_from_colour = depth_cam_from_cam(cam_from_world_expected);
-  current_->cam_from_world = depth_from_colour * cam_from_world_expected;
+  depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
+  current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   for (size_t i = 0; i < tolerance_.size(); ++i) tolerance_.data()[i] = tolerance_at(current_->depth.data()[i]);
   carry_scores();
   for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
@@ -126,7 +126,11 @@ MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_fro
   weigh();
   smoothing_.smooth(weighted_, weights_);
   update_scores();
-  return mask(depth_from_colour);
+}
+
+MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
+  observe(image, cam_from_world_expected);
+  return mask();
 }
 
 // Each cell takes over the score of the same surface in the frame before.
@@ -301,12 +305,12 @@ void MotionSegmenter::clear_lone_holes(Image<uint8_t>& marked) {
 }
 
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
-MoverMask MotionSegmenter::mask(const Rigid3& depth_from_colour) {
+MoverMask MotionSegmenter::mask() {
   MoverMask result;
   result.cell = options_.cell;
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
   const auto threshold = static_cast<float>(options_.threshold);
-  rays_.project(current_->depth, kTooNear, depth_from_colour, projection_);
+  rays_.project(current_->depth, kTooNear, depth_from_colour_, projection_);
   for (size_t i = 0; i < result.cells.size(); ++i) {
     const int at = projection_.cell[i];
     if (at >= 0 && current_->score.data()[at] > threshold) result.cells.data()[i] = 255;

@@ -48,7 +48,7 @@ struct MotionOptions {
 // from the first frame is found once his outline has moved by some cells, large things later than small ones.
 //
 // Works on depth alone, on a coarse grid. Deterministic. Keeps its buffers from frame to frame; one object per thread.
-// Calls alternate: segment() with the expected pose, then commit() with the one that tracking found.
+// Calls alternate: segment() or observe() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
   explicit MotionSegmenter(const CameraModel& camera, const MotionOptions& options = {});
@@ -56,6 +56,8 @@ class MotionSegmenter {
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
   MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected);
+  // The same for those who want score() alone.
+  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected);
   // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
   void commit(const std::optional<Rigid3>& cam_from_world);
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
@@ -80,7 +82,7 @@ class MotionSegmenter {
   void update_scores();
   void clear_thin_holes(MoverMask& mask) const;
   void clear_lone_holes(Image<uint8_t>& marked);
-  MoverMask mask(const Rigid3& depth_from_colour);
+  MoverMask mask();
   void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
   std::unique_ptr<MotionDepthGrid> take_spare();
 
@@ -91,6 +93,7 @@ class MotionSegmenter {
   std::unique_ptr<MotionDepthGrid> current_, previous_;
   std::vector<std::unique_ptr<MotionDepthGrid>> views_;  // oldest first
   std::vector<std::unique_ptr<MotionDepthGrid>> spare_;
+  Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
   size_t turn_ = 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <vector>
 
 #include "dkb/util/errors.h"
 
@@ -9,6 +10,8 @@ namespace dkb {
 
 // How far corners and depths may be off.
 struct SensorNoise {
+  static constexpr int kMostLevels = 32;  // of an image pyramid
+
   double pixel_sigma = 1.0;          // [px] of a corner on the finest pyramid level, > 0
   double scale_exponent = 0.5;       // how it grows with the scale of the level: sigma ~ scale^exponent, 0 ... 1
   double depth_sigma_base = 0.0012;  // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
@@ -26,6 +29,13 @@ struct SensorNoise {
   // Standard deviation [px, full resolution] of a corner found on a pyramid level.
   double corner_sigma(int octave, double scale_factor) const {
     return pixel_sigma * std::pow(scale_factor, scale_exponent * octave);
+  }
+  // The same for every level that a pyramid may have.
+  std::vector<double> corner_sigmas(double scale_factor) const {
+    std::vector<double> sigmas(kMostLevels);
+    for (int octave = 0; octave < kMostLevels; ++octave)
+      sigmas[static_cast<size_t>(octave)] = corner_sigma(octave, scale_factor);
+    return sigmas;
   }
   // Standard deviation [m] of a depth z [m].
   double depth_sigma(double z) const {

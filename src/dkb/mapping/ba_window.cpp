@@ -17,8 +17,8 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
     problem.cam_from_world.push_back(map.keyframe(window.keyframes[c])->cam_from_world);
   }
 
-  std::vector<double> inv_sigma(32);
-  for (int l = 0; l < 32; ++l) inv_sigma[static_cast<size_t>(l)] = 1.0 / noise.corner_sigma(l, scale_factor);
+  std::vector<double> inv_sigma = noise.corner_sigmas(scale_factor);
+  for (double& s : inv_sigma) s = 1.0 / s;
   window.points = std::move(points);
   for (size_t p = 0; p < window.points.size(); ++p) {
     const MapPoint& point = *map.point(window.points[p]);

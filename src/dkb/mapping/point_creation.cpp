@@ -24,6 +24,43 @@ std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen
   return 0.5 * (centre_a + s * ray_a + centre_b + t * ray_b);
 }
 
+// A feature without a map point, and how far from an epipolar line it may lie.
+struct FreeFeature {
+  int feature = 0;
+  double x = 0, y = 0;  // [px]
+  double limit = 0;     // [px^2]
+};
+
+std::vector<FreeFeature> free_features(const Keyframe& keyframe, double chi2, const std::vector<double>& sigmas) {
+  std::vector<FreeFeature> free;
+  for (size_t f = 0; f < keyframe.points.size(); ++f) {
+    if (keyframe.points[f] != kNoPoint) continue;
+    const Keypoint& k = keyframe.features->keypoints[f];
+    const double sigma = sigmas[static_cast<size_t>(k.octave)];
+    free.push_back({static_cast<int>(f), k.pixel.x(), k.pixel.y(), chi2 * sigma * sigma});
+  }
+  return free;
+}
+
+struct DescriptorMatch {
+  int feature = -1, distance = 0;
+};
+
+// The most alike of the free features near a line [px], of those within `max_distance` bits.
+DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& descriptor,
+                             const std::vector<FreeFeature>& free, const RgbdFeatures& features, int max_distance) {
+  DescriptorMatch best{-1, max_distance + 1};
+  const double norm2 = line.head<2>().squaredNorm();
+  if (norm2 < 1e-18) return best;
+  for (const FreeFeature& f : free) {
+    const double e = line.x() * f.x + line.y() * f.y + line.z();
+    if (e * e > f.limit * norm2) continue;
+    const int d = hamming_distance(descriptor, features.descriptors[static_cast<size_t>(f.feature)]);
+    if (d < best.distance) best = {f.feature, d};
+  }
+  return best;
+}
+
 }  // namespace
 
 void PointCreationOptions::check() const {
@@ -40,6 +77,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
   std::vector<PointId> made;
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
   const double most_cosine = std::cos(options.least_parallax_deg * M_PI / 180);
+  const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
   for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
     const Keyframe& a = *map.keyframe(newest);
     const Keyframe& b = *map.keyframe(neighbours[n].keyframe);
@@ -48,6 +86,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
     if (b_from_a.translation.norm() < 0.02) continue;  // [m] nothing can be triangulated over so short a base
     const Eigen::Matrix3d rotation_b_from_a = b_from_a.matrix3();
     const Eigen::Matrix3d essential = skew(b_from_a.translation) * rotation_b_from_a;
+    const std::vector<FreeFeature> free_b = free_features(b, options.chi2_epipolar, sigmas);
     struct Found {
       int feature_a, feature_b, distance;
       Eigen::Vector3d point;
@@ -61,23 +100,10 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const Eigen::Vector3d line = essential * ray_a;  // in normalised coordinates of b
       const Eigen::Vector3d line_px(line.x() / camera.fx, line.y() / camera.fy,
                                     line.z() - line.x() * camera.cx / camera.fx - line.y() * camera.cy / camera.fy);
-      const double norm2 = line_px.head<2>().squaredNorm();
-      if (norm2 < 1e-18) continue;
-      int best = options.max_distance + 1, best_b = -1;
-      for (size_t fb = 0; fb < b.points.size(); ++fb) {
-        if (b.points[fb] != kNoPoint) continue;
-        const Keypoint& kb = b.features->keypoints[fb];
-        const double sigma = noise.corner_sigma(kb.octave, scale_factor);
-        const double e = line_px.x() * kb.pixel.x() + line_px.y() * kb.pixel.y() + line_px.z();
-        if (e * e > options.chi2_epipolar * sigma * sigma * norm2) continue;
-        const int d = hamming_distance(a.features->descriptors[fa], b.features->descriptors[fb]);
-        if (d < best) {
-          best = d;
-          best_b = static_cast<int>(fb);
-        }
-      }
-      if (best_b < 0) continue;
-      const Keypoint& kb = b.features->keypoints[static_cast<size_t>(best_b)];
+      const DescriptorMatch best =
+          best_on_line(line_px, a.features->descriptors[fa], free_b, *b.features, options.max_distance);
+      if (best.feature < 0) continue;
+      const Keypoint& kb = b.features->keypoints[static_cast<size_t>(best.feature)];
       const Eigen::Vector3d world_ray_a = (world_from_a.rotation * ray_a).normalized();
       const Eigen::Vector3d world_ray_b =
           (world_from_b.rotation * camera.unproject(kb.pixel.cast<double>(), 1.0)).normalized();
@@ -87,13 +113,13 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
-        const double sigma = noise.corner_sigma(k.octave, scale_factor);
+        const double sigma = sigmas[static_cast<size_t>(k.octave)];
         if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma)
           return false;
         return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < 3 * noise.depth_sigma(k.depth);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;
-      found.push_back({static_cast<int>(fa), best_b, best, *point});
+      found.push_back({static_cast<int>(fa), best.feature, best.distance, *point});
     }
     // One new point per feature of b: the best match takes it.
     std::stable_sort(found.begin(), found.end(),

@@ -10,6 +10,7 @@
 
 #include "dkb/map/ids.h"
 #include "dkb/util/bounded_queue.h"
+#include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -21,9 +22,11 @@ class DueStage {
  public:
   using Work = std::function<Result(const Task&)>;
 
-  DueStage(Work work, bool threaded) : work_(std::move(work)), tasks_(kSlots), results_(kSlots) {
+  DueStage(Work work, bool threaded, ThreadPriority priority = ThreadPriority::normal)
+      : work_(std::move(work)), tasks_(kSlots), results_(kSlots) {
     if (threaded)
-      thread_ = std::thread([this] {
+      thread_ = std::thread([this, priority] {
+        set_thread_priority(priority);
         while (const auto task = tasks_.pop()) results_.push(work_(*task));
       });
   }

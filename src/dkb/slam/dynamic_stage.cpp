@@ -234,10 +234,14 @@ MoverMask DynamicStage::ask_prompt_detectors(const RgbdImage& image, std::vector
 MoverMask DynamicStage::segment_motion(const Context& context, std::vector<Detection>& boxes) {
   if (!motion_) return {};
   const Stopwatch watch;
-  MoverMask moving = motion_->segment(*context.image, context.cam_from_world);
+  MoverMask moving;
+  if (segments_motion_)
+    moving = motion_->segment(*context.image, context.cam_from_world);
+  else
+    motion_->observe(*context.image, context.cam_from_world);
   times_.add("motion", watch.ms());
   // The other filters know boxes only.
-  if (options_.filter != FilterKind::standard && segments_motion_ && !moving.empty())
+  if (options_.filter != FilterKind::standard && !moving.empty())
     for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
       const float c = static_cast<float>(moving.cell);
       boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
@@ -266,7 +270,7 @@ void DynamicStage::filter(const Context& context, const std::vector<FilterFeatur
       break;
     case FilterKind::standard:
       scene.mask = given.empty() ? silhouettes(context.image->depth, scene.boxes, options_.silhouette) : MoverMask{};
-      if (motion_) clear_still(scene.mask, motion_->score(), moving.cell);
+      if (motion_) clear_still(scene.mask, motion_->score(), options_.motion.cell);
       unite(scene.mask, given, camera_.width, camera_.height);
       if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
       scene.dynamic = mask_filter(features, scene.mask);

@@ -3,25 +3,12 @@
 
 #include <cmath>
 
-#if defined(__linux__)
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-#endif
-
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
 constexpr size_t kMostLate = 4;  // searches outstanding in a real-time run
-
-// Tracking and mapping go first where cores are few. Results do not depend on it.
-void step_back() {
-#if defined(__linux__)
-  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 10);
-#endif
-}
 
 }  // namespace
 
@@ -43,8 +30,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
     : options_(options),
       closer_(optics, options.loop, seed),
       search_(
-          [this, threaded](const Task& task) {
-            if (threaded) step_back();
+          [this](const Task& task) {
             Result result;
             result.generation = task.generation;
             if (task.generation == closed_generation_) return result;  // the map is about to move
@@ -56,10 +42,9 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             result.ms = watch.ms();
             return result;
           },
-          threaded),
+          threaded, ThreadPriority::background),
       adjustment_(
-          [optics, local_ba, ba = options.global_ba, threaded](const Task& task) {
-            if (threaded) step_back();
+          [optics, local_ba, ba = options.global_ba](const Task& task) {
             const Stopwatch watch;
             Result result;
             result.generation = task.generation;
@@ -68,7 +53,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             result.ms = watch.ms();
             return result;
           },
-          threaded) {
+          threaded, ThreadPriority::background) {
   options_.check();
 }
 

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <thread>
 #include <vector>
@@ -13,6 +16,7 @@
 #include "dkb/util/one_line.h"
 #include "dkb/util/quantile.h"
 #include "dkb/util/random.h"
+#include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -132,6 +136,23 @@ TEST(WarningLog, MergesRepeatedWarnings) {
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0], "warning: frame 3 is bad");
   EXPECT_EQ(lines[2], "warning: bad image: 2 times in all");
+}
+
+TEST(ThreadPriority, ABackgroundThreadStepsBackAlone) {
+  const auto nice = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid))); };
+  const int here = nice();
+  int background = here, normal = here;
+  std::thread([&] {
+    set_thread_priority(ThreadPriority::background);
+    background = nice();
+  }).join();
+  std::thread([&] {
+    set_thread_priority(ThreadPriority::normal);
+    normal = nice();
+  }).join();
+  EXPECT_EQ(background, std::max(here, 10));
+  EXPECT_EQ(normal, here);
+  EXPECT_EQ(nice(), here);
 }
 
 }  // namespace
