@@ -5,7 +5,9 @@
 # runs from a temporary folder, with an authentication key of its own, and is stopped at the end.
 #
 #   apt-get install --no-install-recommends slurm-wlm munge         # Debian 12, Ubuntu 22.04 or newer; then, as root:
-#   bench/slurm/one_node_cluster.sh [DKB_SLAM [SUITE [TASKS]]]      # build/apps/dkb-slam, simulated_quick.yaml, 4
+#   bench/slurm/one_node_cluster.sh [DKB_SLAM [SUITE [TASKS [LOCAL]]]]    # build/apps/dkb-slam, simulated_quick.yaml, 4
+#
+# LOCAL is the results folder of a local run by the same program, to be compared with; without it one is made.
 #
 # Works in containers: no systemd, no cgroups.
 set -euo pipefail
@@ -13,6 +15,7 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 program=$(realpath "${1:-$here/../../build/apps/dkb-slam}")
 suite=$(realpath "${2:-$here/../suites/simulated_quick.yaml}")
 tasks=${3:-4}
+local_run=${4:+$(realpath "$4")}
 
 fail() {
   echo "error: $*" >&2
@@ -134,6 +137,7 @@ done
 
 echo "== merge, and compare with a local run"
 "$program" bench --merge "$work/cluster" --no-times
+[[ -z $local_run ]] || cp -r "$local_run" "$work/local" # what it has is not run again
 "$program" bench "$suite" --out "$work/local" --no-times --quiet
 for file in results.md results.html results.json; do
   cmp "$work/cluster/$file" "$work/local/$file" || fail "$file differs"

@@ -178,6 +178,31 @@ TEST(SolverKernels, HuberCostIsLinearInTheErrorBeyondTheCorner) {
   EXPECT_NEAR(chi2[0], 100, 1e-9);
 }
 
+TEST(SolverKernels, WhatAnObservationCostsDoesNotDependOnItsNeighbours) {
+  // Observation 0 is within the corner of pixel and depth together but beyond the one of pixels alone; observation 1
+  // is beyond both.
+  const auto cost = [](double weight_0, double weight_1) {
+    Data d(1, 4, true);
+    d.weight = {weight_0, weight_1, 0, 0};
+    d.inv_depth_sigma.assign(4, 0.0);
+    for (int i = 0; i < 2; ++i) {
+      d.inv_sigma[i] = 1;
+      const Eigen::Vector3d p = d.pose * Eigen::Vector3d(d.x[i], d.y[i], d.z[i]);
+      d.u[i] = d.camera.fx * p.x() / p.z() + d.camera.cx - (i == 0 ? std::sqrt(7.0) : 20.0);
+      d.v[i] = d.camera.fy * p.y() / p.z() + d.camera.cy;
+      d.depth[i] = p.z() - std::sqrt(0.5) / 50;
+      if (d.weight[i] > 0) d.inv_depth_sigma[i] = 50;
+    }
+    double sums[kPoseSums];
+    baseline_kernels().pose_sums(d.pose_input(true), sums);
+    return sums[kPoseCost];
+  };
+  EXPECT_NEAR(cost(1.5, 1) - cost(0, 1), cost(1.5, 0), 1e-9);
+  // The common part 7 + 0.5 is whole; half of the pixel part is beyond its corner.
+  EXPECT_NEAR(cost(1.5, 0), 7.5 + 0.5 * (2 * std::sqrt(5.991 * 7) - 5.991), 1e-9);
+  EXPECT_NEAR(cost(0.5, 1) - cost(0, 1), cost(0.5, 0), 1e-9);
+}
+
 TEST(SolverKernels, TheFastestEqualsTheBaselineBitForBit) {
   const SolverKernels &slow = baseline_kernels(), &fast = solver_kernels();
   const auto equal = [](const std::vector<double>& a, const std::vector<double>& b) {
