@@ -58,6 +58,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& words, const std::fil
     _exit(127);
   }
   const std::string reason = std::strerror(errno);
+  if (pid_ > 0) setpgid(pid_, pid_);  // as the child does: whoever comes first
   if (err >= 0) close(err);
   if (null >= 0) close(null);
   if (pid_ < 0) throw OutputError(error_output.string() + ": a run cannot be started (" + reason + ")");
@@ -87,7 +88,7 @@ bool ChildProcess::ended(Ended* how) {
 
 void ChildProcess::kill() {
   if (pid_ < 0) return;
-  ::kill(pid_, SIGKILL);
+  ::kill(-pid_, SIGKILL);  // with whatever it started
   while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
   }
   pid_ = -1;

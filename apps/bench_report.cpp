@@ -120,12 +120,14 @@ Section comparison(const Results& r) {
   section.paragraphs.push_back(
       "Geometric mean over the sequences of the ratio of median APEs, below 1 = better than " + r.suite->reference +
       ", with its 95% bootstrap interval (runs of the same seed are drawn together). A sequence counts as better or "
-      "worse when the interval of its own ratio leaves out 1.");
+      "worse when the interval of its own ratio leaves out 1. Runs left out failed, or the reference's did: look at "
+      "their rows, and at the tracked share, before believing a ratio.");
   TextTable table;
-  table.header = {"variant", "sequences", "ratio of APEs", "95% interval", "better on", "worse on"};
+  table.header = {"variant", "sequences", "runs left out", "ratio of APEs", "95% interval", "better on", "worse on"};
   for (const Comparison& c : r.comparisons) {
     const auto ratio = [](double x) { return fmt::format("{:.3f}", x); };
-    table.rows.push_back({c.variant, std::to_string(c.sequences), c.sequences > 0 ? ratio(c.ratio.median) : kNone,
+    table.rows.push_back({c.variant, std::to_string(c.sequences), std::to_string(c.left_out),
+                          c.sequences > 0 ? ratio(c.ratio.median) : kNone,
                           c.ratio.known ? interval_text(c.ratio, ratio) : kNone, joined(c.better), joined(c.worse)});
   }
   section.tables.push_back(table);
@@ -338,7 +340,10 @@ std::string json(const Results& r, const ReportOptions& options) {
   }
   j["comparisons"] = Json::array();
   for (const Comparison& c : r.comparisons) {
-    Json row = {{"variant", c.variant}, {"reference", r.suite->reference}, {"sequences", c.sequences}};
+    Json row = {{"variant", c.variant},
+                {"reference", r.suite->reference},
+                {"sequences", c.sequences},
+                {"runs_left_out", c.left_out}};
     row["ratio"] = interval_json(c.ratio);
     row["better"] = c.better;
     row["worse"] = c.worse;

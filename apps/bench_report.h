@@ -33,6 +33,7 @@ struct Cell {
 struct Comparison {
   std::string variant;
   int sequences = 0;
+  int left_out = 0;                        // runs on them that failed or that the reference has no partner for
   MedianInterval ratio;                    // geometric mean over sequences of the ratio of median APEs
   std::vector<std::string> better, worse;  // sequences where the interval of the ratio leaves out 1
 };

@@ -45,7 +45,7 @@ bool is_free(const fs::path& path) {
 
 void copy_atomically(const fs::path& from, const fs::path& to) {
   std::error_code ignored;
-  if (!fs::exists(from, ignored) || fs::exists(to, ignored)) return;
+  if (!fs::exists(from, ignored)) return;
   make_output_folder(to.parent_path());
   write_file_atomically(to, read_file(from));
 }
@@ -197,10 +197,13 @@ void merge_into(const ResultsFolder& to, const ResultsFolder& from) {
                      to.suite().name + "); merge one suite at a time");
   std::error_code ignored;
   if (fs::equivalent(to.path(), from.path(), ignored)) return;
-  for (size_t s = 0; s < to.suite().sequences.size(); ++s) copy_atomically(from.truth_path(s), to.truth_path(s));
+  for (size_t s = 0; s < to.suite().sequences.size(); ++s)
+    if (!fs::exists(to.truth_path(s), ignored)) copy_atomically(from.truth_path(s), to.truth_path(s));
   for (const Job& job : jobs_of(to.suite())) {
+    const auto theirs = from.record(job), ours = to.record(job);
+    if (!theirs || (ours && (ours->ok() || !theirs->ok()))) continue;  // a run that failed here may have finished there
     copy_atomically(from.trajectory_path(job), to.trajectory_path(job));
-    if (from.record(job)) copy_atomically(from.record_path(job), to.record_path(job));
+    copy_atomically(from.record_path(job), to.record_path(job));
   }
 }
 

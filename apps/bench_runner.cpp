@@ -144,6 +144,10 @@ fs::path simulated_sequence(const ResultsFolder& folder, const SuiteSequence& s,
   }
   std::error_code ignored;
   if (fs::exists(path / "associations.txt", ignored)) return path;
+  if (lock >= 0)  // nobody else draws it now: what others were killed over goes
+    for (const auto& entry : fs::directory_iterator(all, ignored))
+      if (entry.is_directory(ignored) && entry.path().filename().string().starts_with("." + s.name + "."))
+        fs::remove_all(entry.path(), ignored);
   const fs::path mine = all / ("." + s.name + "." + own_name());
   const Simulator simulator(*s.simulated);
   progress.say(fmt::format("drawing {} ({} frames of scene {})", s.name, simulator.frames(), s.simulated->scene));
@@ -352,6 +356,7 @@ class Runner {
       r.failure = failure;
       if (failure.empty() && how.exit_code != 0) r.failure = how.failure(read_file(run.out / "stderr"));
       std::error_code ignored;
+      if (r.ok() && !fs::exists(run.out / "trajectory.txt", ignored)) r.failure = "it left no trajectory.txt";
       if (r.ok() || fs::exists(run.out / "stats.json", ignored)) read_stats(run.out, &r);
       if (r.ok())
         read_errors(run.out, sequence_folder_.at(run.job.sequence) / suite_.sequences[run.job.sequence].truth, &r);
@@ -399,7 +404,7 @@ class Runner {
           it->child.kill();
           failure = fmt::format("hung: no end after {:g} s", suite_.timeout);
         }
-        if (stop_ || how.exit_code == 130) throw Interrupted();  // no result: it will be repeated
+        if (stop_) throw Interrupted();  // no result: it will be repeated
         const RunRecord r = finish(*it, how, failure);
         it = running.erase(it);
         any = true;

@@ -41,7 +41,10 @@ std::vector<Comparison> compare(const Suite& suite, const std::vector<Cell>& cel
     c.variant = suite.variants[v].name;
     std::vector<PairedRuns> all;
     for (size_t s = 0; s < suite.sequences.size(); ++s) {
-      PairedRuns pairs = paired(cells[s * n + v], cells[s * n + reference]);
+      const Cell &ours = cells[s * n + v], &theirs = cells[s * n + reference];
+      PairedRuns pairs = paired(ours, theirs);
+      if (ours.finished.empty() && ours.failed.empty() && theirs.finished.empty() && theirs.failed.empty()) continue;
+      c.left_out += suite.seeds - static_cast<int>(pairs.ours.size());
       if (pairs.ours.empty()) continue;
       const MedianInterval here = mean_ratio({pairs}, {.seed = kSeed});
       if (here.known && here.interval.high < 1) c.better.push_back(suite.sequences[s].name);

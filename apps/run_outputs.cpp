@@ -92,10 +92,11 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
   const KeyframeTestCounts& tests = s.keyframe_tests;
-  j["keyframe_tests"] = {
-      {"decisions", tests.decisions},       {"parallax", tests.parallax},  {"votes_asked", tests.votes_asked},
-      {"visibility", tests.visibility},     {"spread", tests.spread},      {"few_points", tests.few_points},
-      {"close_points", tests.close_points}, {"view_left", tests.view_left}};
+  j["keyframe_tests"] = {{"decisions", tests.decisions},   {"waited", tests.waited},
+                         {"parallax", tests.parallax},     {"votes_asked", tests.votes_asked},
+                         {"visibility", tests.visibility}, {"spread", tests.spread},
+                         {"few_points", tests.few_points}, {"close_points", tests.close_points},
+                         {"view_left", tests.view_left}};
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.mapping.points_retracted}};
   j["detector"] = {
       {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};

@@ -137,7 +137,10 @@ done
 
 echo "== merge, and compare with a local run"
 "$program" bench --merge "$work/cluster" --no-times
-[[ -z $local_run ]] || cp -r "$local_run" "$work/local" # what it has is not run again
+if [[ -n $local_run ]]; then # what it has is not run again
+  mkdir "$work/local"
+  cp -r "$local_run/suite.json" "$local_run/runs" "$local_run/truth" "$work/local/"
+fi
 "$program" bench "$suite" --out "$work/local" --no-times --quiet
 for file in results.md results.html results.json; do
   cmp "$work/cluster/$file" "$work/local/$file" || fail "$file differs"

@@ -115,13 +115,14 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   const Rigid3 cam_from_keyframe = q.cam_from_world * q.last_keyframe_cam_from_world.inverse();
   if (q.last_keyframe != reference_.keyframe) {
     reference_ = {q.last_keyframe, {}, cam_from_keyframe, q.tracked_points};
+    studied_ = kNoKeyframe;
     for (PointId id : *q.points)
       if (id != kNoPoint) reference_.points.push_back(id);
   }
 
   KeyframeDecision decision;
   KeyframeTests& tests = decision.tests;
-  const bool waited = q.frame - q.last_keyframe_frame >= options_.least_frames_between;
+  tests.waited = q.frame - q.last_keyframe_frame >= options_.least_frames_between;
   const Parallax parallax = parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world,
                                              units_per_metre(options_.parallax.translation_unit, median_depth(q)));
   tests.parallax = gate_.passes(parallax);
@@ -129,7 +130,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   MatchCounts counts;
   VisibilityVote visibility;
   SpreadVote spread;
-  tests.votes_asked = tests.parallax && waited && map.keyframe(q.last_keyframe) != nullptr;
+  tests.votes_asked = tests.parallax && tests.waited && map.keyframe(q.last_keyframe) != nullptr;
   if (tests.votes_asked) {
     if (studied_ != q.last_keyframe) study_keyframe(q.last_keyframe, map);
     const Matches matches = match(q, cam_from_keyframe);
@@ -148,28 +149,33 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
 
   if (tests.visibility && tests.spread)
     decision.rule = KeyframeRule::adaptive;
-  else if (waited && (tests.few_points || tests.close_points || tests.view_left))
+  else if (tests.waited && (tests.few_points || tests.close_points || tests.view_left))
     decision.rule = KeyframeRule::floor;
   decision.insert = decision.rule != KeyframeRule::none;
   if (!q.explain) return decision;
-  decision.explanation =
-      fmt::format("parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): {}; ", parallax.rotation_deg,
-                  parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax));
-  if (tests.votes_asked)
+  decision.explanation = fmt::format(
+      "{} frames since the last keyframe (at least {}: {}); parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): "
+      "{}; ",
+      q.frame - q.last_keyframe_frame, options_.least_frames_between, yes_or_no(tests.waited), parallax.rotation_deg,
+      parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax));
+  if (!tests.votes_asked)
+    decision.explanation +=
+        tests.parallax && tests.waited ? "no votes before the last keyframe is in the map; " : "votes not asked; ";
+  else if (counts.matches == 0 || counts.reference_matches == 0 || counts.reference_points == 0)
+    decision.explanation += "no votes without matches; ";
+  else
     decision.explanation += fmt::format(
         "changed {} of {} matches (reference {} of {}, points {} / {}), S {:.2f}, theta {:.3f}, alpha {:.3f}, beta "
         "{:.3f}, against {:.2f}: {}; ECOG {:.3f} against {:.3f}: {}; ",
         counts.changed, counts.matches, counts.reference_changed, counts.reference_matches, counts.points,
         counts.reference_points, visibility.s, visibility.theta, visibility.alpha, visibility.beta,
         visibility.threshold, yes_or_no(tests.visibility), spread.ecog, spread.threshold, yes_or_no(tests.spread));
-  else
-    decision.explanation +=
-        tests.parallax ? "no votes before the pause is over and the last keyframe in the map; " : "votes not asked; ";
   decision.explanation += fmt::format(
-      "tracked {} (at least {}: {}), of the reference's {} and of {} after the last keyframe, enough: {}; close {} "
-      "(+{}), enough: {}",
-      q.tracked_points, options_.floor_least_tracked, yes_or_no(!tests.few_points), q.reference_points,
-      reference_.tracked_points, yes_or_no(!tests.view_left), q.tracked_close_points, q.creatable_close_points,
+      "tracked {} (at least {}: {}), at least {} of the reference's {} and {} of {} after the last keyframe: {}; close "
+      "{} (+{}), not below {} with +{}: {}",
+      q.tracked_points, options_.floor_least_tracked, yes_or_no(!tests.few_points), options_.floor_reference_ratio,
+      q.reference_points, options_.floor_kept_ratio, reference_.tracked_points, yes_or_no(!tests.view_left),
+      q.tracked_close_points, q.creatable_close_points, options_.floor_few_close, options_.floor_many_creatable,
       yes_or_no(!tests.close_points));
   return decision;
 }

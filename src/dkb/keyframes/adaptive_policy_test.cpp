@@ -221,6 +221,9 @@ TEST(AdaptiveKeyframes, ThePapersNumbersStayAsPrinted) {
   EXPECT_EQ(paper.parallax.translation_unit, TranslationUnit::centimetre);
   EXPECT_EQ(paper.similarity, Similarity::printed);
   EXPECT_EQ(paper.visibility_levels, 4);
+  EXPECT_EQ(paper.normals, NormalSum::plain);
+  EXPECT_EQ(paper.floor_reference_ratio, 0.25);
+  EXPECT_EQ(paper.floor_kept_ratio, 0);
 }
 
 TEST(AdaptiveKeyframes, MayMeasureTheWayByTheDepth) {
@@ -266,8 +269,10 @@ TEST(AdaptiveKeyframes, ExplainThemselvesWhenAsked) {
   KeyframeQuery q = wall.query(1, {});
   EXPECT_NE(policy.decide(q, wall.map()).explanation.find("parallax 0.00 deg + 0.00 against T 30.00 (F 0.000): no"),
             std::string::npos);
-  EXPECT_NE(policy.decide(q, wall.map()).explanation.find("; votes not asked; tracked 400 (at least 50: yes)"),
-            std::string::npos);
+  EXPECT_NE(
+      policy.decide(q, wall.map())
+          .explanation.find("; votes not asked; tracked 400 (at least 50: yes), at least 0.25 of the reference's 400"),
+      std::string::npos);
   q = wall.query(5, moved_by(0.6));
   EXPECT_NE(policy.decide(q, wall.map()).explanation.find("matches (reference"), std::string::npos);
   EXPECT_TRUE(policy.decide(q, wall.map()).tests.votes_asked);

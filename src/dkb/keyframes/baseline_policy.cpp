@@ -20,22 +20,23 @@ BaselineKeyframePolicy::BaselineKeyframePolicy(BaselineKeyframeOptions options) 
 
 KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeQuery& q, const Map&) {
   const bool settled = q.frame - q.last_relocalisation_frame > options_.frames_between;
-  const bool waited = q.mapper_idle || q.frame - q.last_keyframe_frame > options_.frames_between;
-  const bool enough = q.tracked_points >= options_.least_tracked;
   KeyframeDecision decision;
   KeyframeTests& tests = decision.tests;
+  tests.waited = q.mapper_idle || q.frame - q.last_keyframe_frame > options_.frames_between;
+  tests.few_points = q.tracked_points < options_.least_tracked;
   tests.view_left = q.tracked_points < options_.reference_ratio * q.reference_points;
   tests.close_points =
       q.tracked_close_points < options_.few_close && q.creatable_close_points >= options_.many_creatable;
-  decision.insert = settled && waited && enough && (tests.view_left || tests.close_points);
+  decision.insert = settled && tests.waited && !tests.few_points && (tests.view_left || tests.close_points);
   decision.rule = decision.insert ? KeyframeRule::baseline : KeyframeRule::none;
   if (!q.explain) return decision;
   decision.explanation = fmt::format(
       "tracked {} (at least {}: {}) against {} of the reference's {}: {}; close {} (+{}): {}; {} frames since the last "
       "keyframe, mapper {}: {}; settled since a relocalisation: {}",
-      q.tracked_points, options_.least_tracked, yes_or_no(enough), options_.reference_ratio, q.reference_points,
-      yes_or_no(tests.view_left), q.tracked_close_points, q.creatable_close_points, yes_or_no(tests.close_points),
-      q.frame - q.last_keyframe_frame, q.mapper_idle ? "idle" : "busy", yes_or_no(waited), yes_or_no(settled));
+      q.tracked_points, options_.least_tracked, yes_or_no(!tests.few_points), options_.reference_ratio,
+      q.reference_points, yes_or_no(tests.view_left), q.tracked_close_points, q.creatable_close_points,
+      yes_or_no(tests.close_points), q.frame - q.last_keyframe_frame, q.mapper_idle ? "idle" : "busy",
+      yes_or_no(tests.waited), yes_or_no(settled));
   return decision;
 }
 

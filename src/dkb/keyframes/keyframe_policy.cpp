@@ -32,6 +32,7 @@ std::string explained(const KeyframeDecision& decision) {
 
 void KeyframeTestCounts::add(const KeyframeTests& tests) {
   ++decisions;
+  waited += tests.waited;
   parallax += tests.parallax;
   votes_asked += tests.votes_asked;
   visibility += tests.visibility;

@@ -33,8 +33,9 @@ enum class KeyframeRule { none, first, baseline, adaptive, floor };
 const char* name_of(KeyframeRule rule);
 const char* yes_or_no(bool yes);  // for explanations
 
-// Which tests spoke for a keyframe. The baseline rule has the last two only.
+// Which tests spoke for a keyframe. The baseline rule has no gate and no votes, and its few_points speaks against one.
 struct KeyframeTests {
+  bool waited = false;       // long enough since the last keyframe
   bool parallax = false;     // the gate                                           (DKB section 3.2)
   bool votes_asked = false;  // it was open, the pause was over, and the last keyframe was in the map
   bool visibility = false, spread = false;
@@ -44,7 +45,8 @@ struct KeyframeTests {
 // How often each test spoke for a keyframe.
 struct KeyframeTestCounts {
   int decisions = 0;
-  int parallax = 0, votes_asked = 0, visibility = 0, spread = 0, few_points = 0, close_points = 0, view_left = 0;
+  int waited = 0, parallax = 0, votes_asked = 0, visibility = 0, spread = 0, few_points = 0, close_points = 0,
+      view_left = 0;
   void add(const KeyframeTests& tests);
 };
 

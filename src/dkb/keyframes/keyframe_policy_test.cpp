@@ -10,7 +10,7 @@ TEST(KeyframeTestCounts, CountEachTestThatSpokeForAKeyframe) {
   KeyframeTestCounts counts;
   counts.add({});
   KeyframeTests votes;
-  votes.parallax = votes.votes_asked = votes.visibility = votes.spread = true;
+  votes.waited = votes.parallax = votes.votes_asked = votes.visibility = votes.spread = true;
   counts.add(votes);
   KeyframeTests halves;
   halves.parallax = halves.votes_asked = halves.spread = true;
@@ -20,6 +20,7 @@ TEST(KeyframeTestCounts, CountEachTestThatSpokeForAKeyframe) {
   counts.add(floor);
   counts.add(floor);
   EXPECT_EQ(counts.decisions, 5);
+  EXPECT_EQ(counts.waited, 1);
   EXPECT_EQ(counts.parallax, 2);
   EXPECT_EQ(counts.votes_asked, 2);
   EXPECT_EQ(counts.visibility, 1);

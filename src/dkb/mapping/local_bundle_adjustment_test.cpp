@@ -175,6 +175,24 @@ TEST_F(LocalBa, TheSameMapGivesTheSameBits) {
   EXPECT_EQ(first.live_points(), map.live_points());
 }
 
+TEST_F(LocalBa, WeightsAreAtWorkOnlyWhenAskedFor) {
+  build(8, {.pixel_noise = 1}, 0.005, 0.01);
+  const Map before = map;
+  const auto adjusted = [&](bool weighted, double edge_weight) {
+    map = before;
+    LocalBaOptions options;
+    options.weighted = weighted;
+    options.weights.adaptive = false;
+    options.weights.edge_weight = edge_weight;
+    adjust(7, options);
+    return Eigen::Vector3d(map.keyframe(7)->cam_from_world.translation);
+  };
+  const Eigen::Vector3d plain = adjusted(false, 1.5), light = adjusted(true, 1.5), heavy = adjusted(true, 5);
+  EXPECT_EQ(plain, adjusted(false, 5));
+  EXPECT_NE(plain, light);
+  EXPECT_NE(light, heavy);
+}
+
 TEST(LocalBaOptions, AreChecked) {
   const auto rejects = [](auto change) {
     LocalBaOptions options;

@@ -177,8 +177,13 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("mapping.ba.iterations_first", &m.ba.iterations_first, "[steps] before outliers are told apart");
   s.bind("mapping.ba.iterations_second", &m.ba.iterations_second, "[steps] after");
   s.bind("mapping.ba.weighted", &m.ba.weighted, "geometric weights of points (DKB section 3.3)");
-  s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight, "weight of edge points where it is fixed (DKB Table 1)");
+  s.bind("mapping.ba.edge_weight", &m.ba.weights.edge_weight,
+         "weight of edge points where adaptive_weight is false (DKB Table 1)");
   s.bind("mapping.ba.adaptive_weight", &m.ba.weights.adaptive, "estimate the weight from the residuals");
+  s.bind("mapping.ba.adaptive_min", &m.ba.weights.adaptive_min, "least such weight, 0 ... 1");
+  s.bind("mapping.ba.adaptive_max", &m.ba.weights.adaptive_max, "largest such weight, at least 1");
+  s.bind("mapping.ba.adaptive_redundancy", &m.ba.weights.adaptive_redundancy,
+         "redundant measurements at which that estimate counts half");
 
   s.bind("mapping.seam_tolerance", &m.seam_tolerance, "factor on fusion's limits where a loop was just closed");
 

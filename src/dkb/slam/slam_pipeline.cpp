@@ -199,8 +199,6 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) {
   const TrackedFrame& frame = outcome.frame;
   if (outcome.wants_first_keyframe) return {true, KeyframeRule::first, "the map starts here"};
   if (localise_only_) return {false, KeyframeRule::none, "the map is not changed"};
-  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue)
-    return {false, KeyframeRule::none, "mapping has enough to do"};
   KeyframeQuery q;
   q.frame = frame.index;
   q.last_keyframe_frame = last_keyframe_frame_;
@@ -224,6 +222,8 @@ KeyframeDecision SlamSystem::Impl::decide(const TrackOutcome& outcome) {
   q.explain = explain_keyframes_;
   KeyframeDecision decision = policy_->decide(q, tracker_->view());
   statistics_.keyframe_tests.add(decision.tests);
+  if (options_.pipeline.realtime && static_cast<int>(mapping_->outstanding()) >= options_.pipeline.mapper_queue)
+    return {false, KeyframeRule::none, "mapping has enough to do; " + decision.explanation, decision.tests};
   return decision;
 }
 

@@ -36,8 +36,21 @@ TEST(GeometricWeights, ThresholdIsMeanPlusDeviationAndEdgesAreBeyondIt) {  // DK
 }
 
 TEST(GeometricWeights, DegenerateClassesArePlanar) {
-  // Fewer than four observers, and a threshold below 1e-8 m^2.
-  EXPECT_EQ(classify_points(kOctahedron, std::vector<int>{0, 2, 4}, std::vector<int>{0, 3}).edges, 0);
+  // One point seen from all around, ones seen by three keyframes and by one: lambda3 is 0 for these.
+  std::vector<int> seen_by = {0, 1, 2, 3, 4, 5}, begin = {0, 6};
+  for (int k = 0; k < 4; ++k) {
+    seen_by.insert(seen_by.end(), {0, 2, 4});
+    begin.push_back(static_cast<int>(seen_by.size()));
+    seen_by.push_back(k);
+    begin.push_back(static_cast<int>(seen_by.size()));
+  }
+  const GeometricWeights few = classify_points(kOctahedron, seen_by, begin);
+  EXPECT_EQ(few.edges, 1);
+  for (size_t p = 1; p < few.shape.size(); ++p) {
+    EXPECT_NEAR(few.lambda3[p], 0, 1e-15) << p;
+    EXPECT_EQ(few.shape[p], PointShape::planar) << p;
+  }
+  // A threshold below 1e-8 m^2.
   std::vector<Eigen::Vector3d> tight = kOctahedron;
   for (Eigen::Vector3d& c : tight) c *= 1e-4;
   std::vector<int> observers = {0, 1, 2, 3, 4, 5}, first = {0, 6, 6, 6, 6};

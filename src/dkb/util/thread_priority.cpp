@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/util/thread_priority.h"
 
+#include <algorithm>
+
 #if defined(__linux__)
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -11,10 +13,11 @@ namespace dkb {
 
 void set_thread_priority([[maybe_unused]] ThreadPriority priority) {
 #if defined(__linux__)
-  constexpr int kBackground = 10;  // of 0 ... 19
+  constexpr int kStep = 10, kLowest = 19;
   // On Linux a thread has a priority of its own, named by its number. Where it is refused nothing is lost but time.
+  const auto self = static_cast<id_t>(syscall(SYS_gettid));
   if (priority == ThreadPriority::background)
-    setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kBackground);
+    setpriority(PRIO_PROCESS, self, std::min(getpriority(PRIO_PROCESS, self) + kStep, kLowest));
 #endif
 }
 
