@@ -127,7 +127,6 @@ int bench_main(BenchArguments& args) {
   args.report.times = !args.no_times;
   if (args.suite.empty() == args.merge.empty())
     throw InputError("bench: give either a suite (YAML) or --merge FOLDER; see dkb-slam bench --help");
-  if (!args.merge.empty() && !args.shard.empty()) throw InputError("--merge and --shard exclude each other");
   if (args.seeds < 0 || args.seeds > 1000) throw InvalidOption("--seeds", std::to_string(args.seeds), "from 1 to 1000");
   if (args.max_frames < 0) throw InvalidOption("--max-frames", std::to_string(args.max_frames), "at least 1");
   return args.merge.empty() ? measure(args) : merge(args);
@@ -146,8 +145,8 @@ void register_bench(CLI::App& app, int& exit_code) {
   command->add_option("--jobs", args->runner.parallel, "Runs at a time; each keeps two threads busy")
       ->capture_default_str();
   command->add_option("--shard", args->shard, "I/N: only the I-th of N parts, without a report");
-  command->add_option("--merge", args->merge,
-                      "Report on this results folder, or on several in this folder (with --out)");
+  CLI::Option* merging = command->add_option(
+      "--merge", args->merge, "Report on this results folder, or on several in this folder (with --out)");
   command->add_option("--data", args->runner.data, "Folder of the sequences, instead of the suite's root");
   command->add_option("--sequence", args->sequences, "Only this sequence; may be repeated");
   command->add_option("--variant", args->variants, "Only this variant; may be repeated");
@@ -157,6 +156,9 @@ void register_bench(CLI::App& app, int& exit_code) {
   command->add_flag("--retry", args->runner.retry, "Repeat runs that failed");
   command->add_flag("--no-times", args->no_times, "Leave times and memory out of the report, so that reports compare");
   command->add_flag("--quiet", args->runner.quiet, "No progress");
+  for (const char* of_runs :
+       {"--jobs", "--shard", "--data", "--sequence", "--variant", "--seeds", "--max-frames", "--program", "--retry"})
+    merging->excludes(command->get_option(of_runs));
   command->callback([args, &exit_code] { exit_code = bench_main(*args); });
 }
 

@@ -195,6 +195,8 @@ TEST_F(Bench, BadInputIsOneLineAndExitCodeTwo) {
       {{good, "--out", out(), "--jobs", "0"}, "jobs"},
       {{good, "--out", out(), "--program", "/nowhere/dkb-slam"}, "/nowhere/dkb-slam"},
       {{good, "--merge", out()}, "either"},
+      {{"--merge", out(), "--seeds", "3"}, "--seeds"},
+      {{"--merge", out(), "--shard", "1/2"}, "--shard"},
       {{"--merge", out("empty")}, "suite.json"},
       {{"--merge", out("nowhere")}, "suite.json"},
   };

@@ -12,7 +12,7 @@
 
 namespace dkb {
 
-// The defaults are those that measured best; paper_keyframe_options() has the paper's.
+// paper_keyframe_options() has the paper's numbers; docs/benchmarks.md compares both with the baseline rule.
 struct AdaptiveKeyframeOptions {
   ParallaxGateOptions parallax;
   Similarity similarity = Similarity::pks;  // in the visibility vote                              (DKB eq. 34)
