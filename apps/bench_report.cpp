@@ -52,16 +52,13 @@ const SuiteSequence& sequence_of(const Results& r, const Cell& c) {
 const SuiteVariant& variant_of(const Results& r, const Cell& c) {
   return r.suite->variants[c.variant];
 }
-bool any_run(const Cell& c) {
-  return !c.finished.empty() || !c.failed.empty();
-}
 bool any_run(const Results& r, size_t sequence) {
   return std::any_of(r.cells.begin(), r.cells.end(),
-                     [&](const Cell& c) { return c.sequence == sequence && any_run(c); });
+                     [&](const Cell& c) { return c.sequence == sequence && c.any_run(); });
 }
 
 std::string ape_cell(const Cell& c) {
-  if (!any_run(c)) return "not run";
+  if (!c.any_run()) return "not run";
   const std::vector<double> ape = c.ape();
   std::string text;
   if (!ape.empty()) {
@@ -146,7 +143,7 @@ Section details(const Results& r) {
                   "95% interval", "worst",     "APE [deg]",  "online [m]", "tracked [%]",
                   "worst [%]",    "keyframes", "map points", "map [kB]",   "published [m]"};
   for (const Cell& c : r.cells) {
-    if (!any_run(c)) continue;
+    if (!c.any_run()) continue;
     const std::vector<double> ape = c.ape();
     const MedianInterval m = median_interval(ape);
     const auto of = [&](auto&& get) {
@@ -192,7 +189,7 @@ Section failures(const Results& r) {
     if (!any_run(r, s))
       missing.rows.push_back({"sequence " + r.suite->sequences[s].name, "all", r.suite->sequences[s].get});
   for (size_t v = 0; v < r.suite->variants.size(); ++v)
-    if (std::none_of(r.cells.begin(), r.cells.end(), [&](const Cell& c) { return c.variant == v && any_run(c); }))
+    if (std::none_of(r.cells.begin(), r.cells.end(), [&](const Cell& c) { return c.variant == v && c.any_run(); }))
       missing.rows.push_back({"variant " + r.suite->variants[v].name, "all", r.suite->variants[v].get});
   if (!missing.rows.empty()) section.tables.push_back(missing);
   if (section.tables.empty()) section.paragraphs.push_back("None.");

@@ -18,6 +18,7 @@ struct Cell {
   int not_run = 0;
   std::optional<double> published;  // [m]
 
+  bool any_run() const { return !finished.empty() || !failed.empty(); }
   // One figure of every finished run that has it, by seed.
   template <class Get>
   std::vector<double> values(const Get& get) const {

@@ -43,7 +43,7 @@ std::vector<Comparison> compare(const Suite& suite, const std::vector<Cell>& cel
     for (size_t s = 0; s < suite.sequences.size(); ++s) {
       const Cell &ours = cells[s * n + v], &theirs = cells[s * n + reference];
       PairedRuns pairs = paired(ours, theirs);
-      if (ours.finished.empty() && ours.failed.empty() && theirs.finished.empty() && theirs.failed.empty()) continue;
+      if (!ours.any_run() && !theirs.any_run()) continue;
       c.left_out += suite.seeds - static_cast<int>(pairs.ours.size());
       if (pairs.ours.empty()) continue;
       const MedianInterval here = mean_ratio({pairs}, {.seed = kSeed});
