@@ -18,8 +18,8 @@
 #include <thread>
 
 #include "bench_process.h"
-#include "dkb/dataset/simulator/sequence_writer.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/simulator/sequence_writer.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/timing.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/simulator.h"
 
 namespace dkb::bench {
 

@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "dkb/dataset/simulator/sequence_writer.h"
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/sequence_writer.h"
+#include "dkb/simulator/simulator.h"
 
 namespace dkb {
 namespace {

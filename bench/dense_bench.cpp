@@ -17,9 +17,9 @@
 #include <unordered_set>
 
 #include "dkb/dataset/image_codecs.h"
-#include "dkb/dataset/simulator/simulator.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/dense/surface_mesh.h"
+#include "dkb/simulator/simulator.h"
 #include "dkb/util/files.h"
 #include "figures.h"
 

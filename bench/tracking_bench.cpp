@@ -26,9 +26,9 @@
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/dataset/rgbd_reader.h"
-#include "dkb/dataset/simulator/sequence_writer.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/evaluation/trajectory_error.h"
+#include "dkb/simulator/sequence_writer.h"
 #include "dkb/slam/slam_system.h"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/simulator.h"
 #include "dkb/slam/slam_system.h"
 
 int main() {

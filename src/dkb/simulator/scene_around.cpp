@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/dataset/simulator/noise.h"
-#include "dkb/dataset/simulator/scene.h"
+#include "dkb/simulator/noise.h"
+#include "dkb/simulator/scene.h"
 #include "dkb/util/quantile.h"
 
 namespace dkb::sim {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/rasteriser.h"
+#include "dkb/simulator/rasteriser.h"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "dkb/dataset/simulator/raster_kernels.h"
+#include "dkb/simulator/raster_kernels.h"
 
 namespace dkb::sim {
 namespace {

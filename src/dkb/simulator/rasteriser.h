@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "dkb/dataset/simulator/materials.h"
-#include "dkb/dataset/simulator/surfaces.h"
 #include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
+#include "dkb/simulator/materials.h"
+#include "dkb/simulator/surfaces.h"
 
 namespace dkb::sim {
 

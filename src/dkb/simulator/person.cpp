@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/dataset/simulator/movers.h"
-#include "dkb/dataset/simulator/noise.h"
+#include "dkb/simulator/movers.h"
+#include "dkb/simulator/noise.h"
 
 namespace dkb::sim {
 namespace {

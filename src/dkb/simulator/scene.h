@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/simulator/camera_path.h"
-#include "dkb/dataset/simulator/furniture.h"
-#include "dkb/dataset/simulator/movers.h"
+#include "dkb/simulator/camera_path.h"
+#include "dkb/simulator/furniture.h"
+#include "dkb/simulator/movers.h"
 
 namespace dkb::sim {
 

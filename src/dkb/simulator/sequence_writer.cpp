@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/sequence_writer.h"
+#include "dkb/simulator/sequence_writer.h"
 
 #include <fmt/format.h>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/camera_path.h"
+#include "dkb/simulator/camera_path.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
-#include "dkb/dataset/simulator/noise.h"
+#include "dkb/simulator/noise.h"
 
 namespace dkb::sim {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/simulator.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <map>
 
 #include "dkb/dataset/camera_file.h"
-#include "dkb/dataset/simulator/sequence_writer.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/simulator/sequence_writer.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_errors.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "dkb/dataset/simulator/noise.h"
-#include "dkb/dataset/simulator/scene.h"
+#include "dkb/simulator/noise.h"
+#include "dkb/simulator/scene.h"
 
 namespace dkb::sim {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/materials.h"
+#include "dkb/simulator/materials.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "dkb/dataset/simulator/noise.h"
+#include "dkb/simulator/noise.h"
 #include "dkb/util/random.h"
 
 namespace dkb::sim {

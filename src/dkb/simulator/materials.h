@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "dkb/dataset/simulator/texture.h"
+#include "dkb/simulator/texture.h"
 
 namespace dkb::sim {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/simulator.h"
 
 namespace dkb {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/movers.h"
+#include "dkb/simulator/movers.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/dataset/simulator/noise.h"
+#include "dkb/simulator/noise.h"
 
 namespace dkb::sim {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/furniture.h"
+#include "dkb/simulator/furniture.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "dkb/dataset/simulator/noise.h"
+#include "dkb/simulator/noise.h"
 
 namespace dkb::sim {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/surfaces.h"
+#include "dkb/simulator/surfaces.h"
 
 #include <algorithm>
 #include <array>

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "dkb/dataset/simulator/materials.h"
-#include "dkb/dataset/simulator/surfaces.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/simulator/materials.h"
+#include "dkb/simulator/surfaces.h"
 #include "dkb/util/random.h"
 
 namespace dkb::sim {

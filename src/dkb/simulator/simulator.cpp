@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/simulator.h"
+#include "dkb/simulator/simulator.h"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +8,11 @@
 #include <cstdlib>
 #include <limits>
 
-#include "dkb/dataset/simulator/noise.h"
-#include "dkb/dataset/simulator/rasteriser.h"
-#include "dkb/dataset/simulator/scene.h"
-#include "dkb/dataset/simulator/sensor.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/simulator/noise.h"
+#include "dkb/simulator/rasteriser.h"
+#include "dkb/simulator/scene.h"
+#include "dkb/simulator/sensor.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 #include "dkb/util/settings.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "dkb/dataset/simulator/noise.h"
-#include "dkb/dataset/simulator/scene.h"
+#include "dkb/simulator/noise.h"
+#include "dkb/simulator/scene.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"

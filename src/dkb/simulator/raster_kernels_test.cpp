@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/simulator/raster_kernels.h"
+#include "dkb/simulator/raster_kernels.h"
 
 #include <gtest/gtest.h>
 

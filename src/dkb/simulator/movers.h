@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/simulator/furniture.h"
-#include "dkb/dataset/simulator/materials.h"
-#include "dkb/dataset/simulator/surfaces.h"
+#include "dkb/simulator/furniture.h"
+#include "dkb/simulator/materials.h"
+#include "dkb/simulator/surfaces.h"
 
 namespace dkb::sim {
 

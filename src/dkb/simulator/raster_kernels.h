@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "dkb/dataset/simulator/texture.h"
 #include "dkb/features/simd.h"
+#include "dkb/simulator/texture.h"
 
 namespace dkb::sim {
 
