@@ -63,6 +63,15 @@ TEST(Architecture, IncludesPointDown) {
   EXPECT_GT(seen, 0);
 }
 
+// Mapping and loop search work beside tracking and talk to it in packets; the simulator is for tests and benches.
+TEST(Architecture, MappingAndLoopsKnowNothingOfTrackingAndTheLibraryNothingOfTheSimulator) {
+  for_each_include([](const std::string& file, const std::string& where, const std::string& name, bool) {
+    const std::string from = room_of(file), to = room_of(name);
+    if (from == "mapping" || from == "loop") EXPECT_NE(to, "tracking") << where << " includes " << name;
+    if (from != "simulator") EXPECT_NE(to, "simulator") << where << " includes " << name;
+  });
+}
+
 // OpenCV serves tests as a reference, and a detector that the build can leave out.
 TEST(Architecture, TheLibraryDoesNotIncludeOpenCv) {
   for_each_include([](const std::string& file, const std::string& where, const std::string& name, bool) {

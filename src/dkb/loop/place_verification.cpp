@@ -2,10 +2,9 @@
 #include "dkb/loop/place_verification.h"
 
 #include "dkb/features/matching.h"
+#include "dkb/matching/pose_observation.h"
 #include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
-#include "dkb/tracking/local_map.h"
-#include "dkb/tracking/pose_observation.h"
 
 namespace dkb {
 namespace {

@@ -9,7 +9,7 @@
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/loop/loop_options.h"
 #include "dkb/map/map.h"
-#include "dkb/tracking/candidates.h"
+#include "dkb/matching/candidates.h"
 
 namespace dkb {
 

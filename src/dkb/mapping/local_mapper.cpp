@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/tracking/candidates.h"
-#include "dkb/tracking/local_map.h"
+#include "dkb/matching/candidates.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 

@@ -5,11 +5,11 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
 #include "dkb/mapping/point_creation.h"
-#include "dkb/tracking/frame.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {

@@ -3,9 +3,9 @@
 
 #include <vector>
 
+#include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
-#include "dkb/tracking/frame.h"
-#include "dkb/tracking/test_scene.h"
+#include "dkb/matching/test_scene.h"
 
 namespace dkb {
 

@@ -2,7 +2,7 @@
 #include "dkb/tracking/descriptor_pose.h"
 
 #include "dkb/features/matching.h"
-#include "dkb/tracking/pose_observation.h"
+#include "dkb/matching/pose_observation.h"
 
 namespace dkb {
 

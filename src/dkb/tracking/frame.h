@@ -34,34 +34,4 @@ struct TrackedFrame {
   int inliers = 0;                             // among `points`
 };
 
-// A point made from depth at a keyframe which mapping has not published yet.
-struct ProvisionalPoint {
-  PointId id = kNoPoint;
-  KeyframeId keyframe = kNoKeyframe;
-  int feature = 0;
-  Eigen::Vector3d point_in_keyframe;  // [m] in that keyframe's camera
-  float scale = 1;                    // pyramid scale of the feature
-  Descriptor descriptor{};
-};
-
-// How often a map point was in view and was matched since the last report to mapping.
-struct PointSighting {
-  PointId point = kNoPoint;
-  int visible = 0, found = 0;
-};
-
-// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of sightings and retractions.
-struct KeyframePacket {
-  KeyframeId id = kNoKeyframe;
-  FrameIndex frame = 0;
-  double timestamp = 0;
-  std::shared_ptr<const RgbdFeatures> features;
-  KeyframeId reference = kNoKeyframe;  // none for the first keyframe of a map
-  Rigid3 cam_from_reference;           // cam_from_world for the first keyframe of a map
-  std::vector<PointId> points;         // per feature
-  std::vector<ProvisionalPoint> new_points;
-  std::vector<PointSighting> sightings;  // by increasing point id
-  std::vector<PointId> retracted;        // points that turned out to move
-};
-
 }  // namespace dkb

@@ -34,11 +34,6 @@ KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& 
   return ranked.empty() ? kNoKeyframe : ranked.front().keyframe;
 }
 
-Candidate candidate_of(const MapPoint& point) {
-  return {point.id, point.position,   point.normal, point.reference_distance, point.reference_scale,
-          -1.0f,    point.descriptor, false};
-}
-
 std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map,
                                             const LocalMapOptions& options) {
   const auto ranked = votes_of(points, map);

@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "dkb/map/map.h"
-#include "dkb/tracking/candidates.h"
-#include "dkb/tracking/frame.h"
+#include "dkb/matching/candidates.h"
 
 namespace dkb {
 
@@ -23,7 +22,5 @@ KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& 
 // by increasing id.
 std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map,
                                             const LocalMapOptions& options);
-
-Candidate candidate_of(const MapPoint& point);
 
 }  // namespace dkb

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dkb/geometry/camera.h"
-#include "dkb/tracking/candidates.h"
+#include "dkb/matching/candidates.h"
 #include "dkb/tracking/frame.h"
 
 namespace dkb {

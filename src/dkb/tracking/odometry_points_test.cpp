@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dkb/tracking/test_scene.h"
+#include "dkb/matching/test_scene.h"
 
 namespace dkb {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/matching/pose_observation.h"
 #include "dkb/tracking/descriptor_pose.h"
-#include "dkb/tracking/pose_observation.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {

@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "dkb/tracking/pose_observation.h"
+#include "dkb/matching/pose_observation.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {

@@ -9,9 +9,10 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/candidates.h"
 #include "dkb/solver/pose_optimiser.h"
-#include "dkb/tracking/candidates.h"
 #include "dkb/tracking/frame.h"
 #include "dkb/tracking/local_map.h"
 #include "dkb/tracking/odometry_points.h"

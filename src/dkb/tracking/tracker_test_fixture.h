@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "dkb/tracking/test_scene.h"
+#include "dkb/matching/test_scene.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {

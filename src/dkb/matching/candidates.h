@@ -7,7 +7,7 @@
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
-#include "dkb/map/ids.h"
+#include "dkb/map/map.h"
 
 namespace dkb {
 
@@ -22,6 +22,8 @@ struct Candidate {
   Descriptor descriptor;
   bool established = false;  // known still for long enough that it may be found even where a mover is suspected
 };
+
+Candidate candidate_of(const MapPoint& point);
 
 // What feature `feature` shows, to be found again in another frame: it stands at `position` [m] in the world,
 // `distance` [m] from the camera that saw it.

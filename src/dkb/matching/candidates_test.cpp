@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/tracking/candidates.h"
+#include "dkb/matching/candidates.h"
 
 #include <gtest/gtest.h>
 

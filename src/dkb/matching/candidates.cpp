@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/tracking/candidates.h"
+#include "dkb/matching/candidates.h"
 
 #include <algorithm>
 #include <array>
@@ -16,6 +16,11 @@ float angle_between(float a, float b) {
 }
 
 }  // namespace
+
+Candidate candidate_of(const MapPoint& point) {
+  return {point.id, point.position,   point.normal, point.reference_distance, point.reference_scale,
+          -1.0f,    point.descriptor, false};
+}
 
 Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
                        double scale_factor) {
