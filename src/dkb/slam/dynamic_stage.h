@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "dkb/comparison/dynamic_filter.h"
 #include "dkb/detection/carried_detections.h"
 #include "dkb/detection/detection_thread.h"
-#include "dkb/dynamics/dynamic_filter.h"
 #include "dkb/dynamics/motion_segmenter.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/dynamics/silhouette.h"

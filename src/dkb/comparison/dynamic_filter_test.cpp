@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dynamics/dynamic_filter.h"
+#include "dkb/comparison/dynamic_filter.h"
 
 #include <gtest/gtest.h>
 
@@ -143,14 +143,6 @@ TEST(DynamicFilter, SurfacesAtTheirOldPlaceAndUnknownOnesAreStill) {
   EXPECT_EQ(dynamic({9, 0, 3}), 0);     // outside the image
   depth = DepthImage(640, 480);
   EXPECT_EQ(dynamic({0, 0, 3.2}), 0);  // no depth
-}
-
-TEST(DynamicFilter, TheMaskMarksFeaturesOnItsCells) {
-  MoverMask mask{4, Image<uint8_t>(160, 120)};
-  mask.cells(10, 20) = 255;
-  EXPECT_EQ(mask_filter(std::vector<FilterFeature>{still_at(41, 82, 1), still_at(45, 82, 1)}, mask),
-            (std::vector<uint8_t>{1, 0}));
-  EXPECT_EQ(mask_filter(std::vector<FilterFeature>{still_at(41, 82, 1)}, MoverMask()), (std::vector<uint8_t>{0}));
 }
 
 TEST(DynamicFilter, OptionsAreChecked) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dynamics/paper_filter.h"
+#include "dkb/comparison/paper_filter.h"
 
 #include <cmath>
 #include <limits>

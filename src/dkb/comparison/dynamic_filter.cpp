@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dynamics/dynamic_filter.h"
+#include "dkb/comparison/dynamic_filter.h"
 
 #include <cmath>
 
@@ -108,14 +108,6 @@ std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
       dynamic[i] = 1;
       break;
     }
-  return dynamic;
-}
-
-std::vector<uint8_t> mask_filter(std::span<const FilterFeature> features, const MoverMask& mask) {
-  std::vector<uint8_t> dynamic(features.size(), 0);
-  for (size_t i = 0; i < features.size(); ++i)
-    dynamic[i] =
-        mask.at(static_cast<float>(features[i].image_pixel.x()), static_cast<float>(features[i].image_pixel.y()));
   return dynamic;
 }
 
