@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dynamics/movers_file.h"
+#include "dkb/dataset/movers_file.h"
 #include "dkb/slam/slam_system.h"
 #include "dkb/util/timing.h"
 

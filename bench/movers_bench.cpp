@@ -9,9 +9,9 @@
 #include <filesystem>
 
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/dynamics/mover_evaluation.h"
 #include "dkb/util/errors.h"
 #include "figures.h"
+#include "mover_evaluation.h"
 
 namespace dkb {
 namespace {

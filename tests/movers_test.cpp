@@ -6,10 +6,10 @@
 #include <future>
 #include <iostream>
 
-#include "dkb/dynamics/mover_evaluation.h"
 #include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/silhouette.h"
 #include "dkb/simulator/simulator.h"
+#include "mover_evaluation.h"
 
 namespace dkb {
 namespace {

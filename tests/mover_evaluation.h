@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <functional>
 
-#include "dkb/dynamics/movers_file.h"
+#include "dkb/dataset/movers_file.h"
 #include "dkb/geometry/rigid3.h"
 
 namespace dkb {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dynamics/mover_evaluation.h"
+#include "mover_evaluation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dynamics/movers_file.h"
+#include "dkb/dataset/movers_file.h"
 
 #include <fmt/format.h>
 
