@@ -7,7 +7,7 @@
 
 #include "dkb/loop/global_adjustment.h"
 #include "dkb/loop/loop_closer.h"
-#include "dkb/slam/due_stage.h"
+#include "dkb/util/due_stage.h"
 
 namespace dkb {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "dkb/mapping/local_mapper.h"
-#include "dkb/slam/due_stage.h"
+#include "dkb/util/due_stage.h"
 
 namespace dkb {
 

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "dkb/map/ids.h"
 #include "dkb/util/bounded_queue.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
@@ -16,7 +16,8 @@
 namespace dkb {
 
 // Background work whose results become visible at a fixed later frame (logical time), whatever the speed of the
-// machine. One task after the other, in order. Without a thread the same work is done inside push().
+// machine. Due times are frames by index. One task after the other, in order. Without a thread the same work is done
+// inside push().
 template <class Task, class Result>
 class DueStage {
  public:
@@ -35,7 +36,7 @@ class DueStage {
   DueStage& operator=(const DueStage&) = delete;
 
   // Due times must not fall from one task to the next.
-  void push(Task task, FrameIndex due) {
+  void push(Task task, int64_t due) {
     due_.push_back(due);
     if (thread_.joinable())
       tasks_.push(std::move(task));
@@ -43,7 +44,7 @@ class DueStage {
       results_.push(work_(task));
   }
   // The next result that is due at `now`. Waits for it when `wait`; else takes only what is ready.
-  std::optional<Result> take_due(FrameIndex now, bool wait) {
+  std::optional<Result> take_due(int64_t now, bool wait) {
     if (due_.empty() || due_.front() > now) return std::nullopt;
     std::optional<Result> result = wait ? results_.pop() : results_.try_pop();
     if (result) due_.pop_front();
@@ -63,7 +64,7 @@ class DueStage {
   Work work_;
   BoundedQueue<Task> tasks_;
   BoundedQueue<Result> results_;
-  std::deque<FrameIndex> due_;
+  std::deque<int64_t> due_;
   std::thread thread_;
 };
 
