@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dkb/solver/absolute_pose.h"
-#include "dkb/solver/ceres_oracle.h"
+#include "dkb/solver/ceres_test_oracle.h"
 #include "dkb/solver/geometric_weights.h"
 #include "dkb/solver/pose_graph.h"
 #include "dkb/solver/test_world.h"

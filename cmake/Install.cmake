@@ -43,7 +43,7 @@ endif()
 install(TARGETS dkb_all dkb_compile_options ${rooms} EXPORT dkb_slamTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT dkb_slamTargets NAMESPACE dkb_slam:: DESTINATION ${package_dir})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/dkb DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.h" PATTERN "*.inl" PATTERN "simulator" EXCLUDE PATTERN "*_test*" EXCLUDE PATTERN "test_*" EXCLUDE PATTERN "*oracle*" EXCLUDE)
+  FILES_MATCHING PATTERN "*.h" PATTERN "*.inl" PATTERN "simulator" EXCLUDE PATTERN "*_test*" EXCLUDE PATTERN "test_*" EXCLUDE)
 if(TARGET dkb-slam)
   install(TARGETS dkb-slam RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()

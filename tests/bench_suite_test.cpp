@@ -8,7 +8,7 @@
 #include <set>
 
 #include "bench_report.h"
-#include "dkb/dataset/mutation_testing.h"
+#include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 

@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "dkb/dataset/mutation_testing.h"
+#include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_errors.h"

@@ -27,7 +27,7 @@ BaLayout::BaLayout(const BaProblem& problem)
   }
   sort_observations(problem);
   number_pairs();
-  find_blocks(problem);
+  find_blocks();
 }
 
 void BaLayout::check(const BaProblem& problem) const {
@@ -38,12 +38,6 @@ void BaLayout::check(const BaProblem& problem) const {
   for (const BaObservation& o : problem.observations) {
     require_index(o.camera, cameras, "camera");
     require_index(o.point, points, "point");
-  }
-  for (const BaPosePrior& prior : problem.priors) require_index(prior.camera, cameras, "camera of a prior");
-  for (const BaRelativePose& relative : problem.relative_poses) {
-    require_index(relative.a, cameras, "camera of a relative pose");
-    require_index(relative.b, cameras, "camera of a relative pose");
-    if (relative.a == relative.b) throw InputError("bundle adjustment: a relative pose needs two different cameras");
   }
 }
 
@@ -93,24 +87,14 @@ void BaLayout::number_pairs() {
   });
 }
 
-void BaLayout::find_blocks(const BaProblem& problem) {
+void BaLayout::find_blocks() {
   block_first.assign(points + 1, 0);
   for (int p = 0; p < points; ++p) {
     const long long count = pair_first[p + 1] - pair_first[p];
     block_first[p + 1] = block_first[p] + count * (count + 1) / 2;
   }
   block.resize(block_first.back());
-  relative_block.assign(problem.relative_poses.size(), -1);
   const int n = free_cameras();
-  std::vector<std::vector<int>> relative_of(n);
-  const auto relative_cameras = [&](int index) {
-    const BaRelativePose& r = problem.relative_poses[index];
-    return std::minmax(free_of_camera[r.a], free_of_camera[r.b]);
-  };
-  for (int k = 0; k < static_cast<int>(problem.relative_poses.size()); ++k) {
-    const auto [low, high] = relative_cameras(k);
-    if (low >= 0) relative_of[low].push_back(k);
-  }
 
   pattern.first.assign(1, 0);
   std::vector<int> seen(n, -1), block_of(n), rows;
@@ -135,7 +119,6 @@ void BaLayout::find_blocks(const BaProblem& problem) {
     for_each_pair([&](int point, int pair) {
       for (int other = pair; other < pair_first[point + 1]; ++other) take(pair_camera[other]);
     });
-    for (const int k : relative_of[i]) take(relative_cameras(k).second);
     std::sort(rows.begin(), rows.end());
     for (const int row : rows) {
       block_of[row] = static_cast<int>(pattern.rows.size());
@@ -147,7 +130,6 @@ void BaLayout::find_blocks(const BaProblem& problem) {
       int* target = block.data() + block_first[point] + a * count - a * (a - 1) / 2;
       for (int other = pair; other < pair_first[point + 1]; ++other) *target++ = block_of[pair_camera[other]];
     });
-    for (const int k : relative_of[i]) relative_block[k] = block_of[relative_cameras(k).second];
   }
 }
 

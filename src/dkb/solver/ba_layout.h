@@ -29,7 +29,6 @@ struct BaLayout {
   BlockPattern pattern;
   std::vector<long long> block_first;  // per point, points + 1 entries
   std::vector<int> block;
-  std::vector<int> relative_block;  // per relative pose: its off-diagonal block; -1 = one camera is fixed
 
   int pairs() const { return static_cast<int>(pair_camera.size()); }
   int free_cameras() const { return static_cast<int>(camera_of_free.size()); }
@@ -38,7 +37,7 @@ struct BaLayout {
   void check(const BaProblem& problem) const;
   void sort_observations(const BaProblem& problem);
   void number_pairs();
-  void find_blocks(const BaProblem& problem);
+  void find_blocks();
 };
 
 }  // namespace dkb::solver

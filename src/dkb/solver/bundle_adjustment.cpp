@@ -128,14 +128,6 @@ class BundleAdjuster {
   double cost(const State& state) {
     double total = 0;
     for (int c = 0; c < layout_.cameras; ++c) total += kernels_.ba_cost(input(c, state));
-    for (const BaPosePrior& prior : problem_.priors) {
-      const Vector6d e = solver::relative_pose_error(state.poses[prior.camera], prior.cam_from_world, Rigid3());
-      total += e.dot(prior.information * e);
-    }
-    for (const BaRelativePose& r : problem_.relative_poses) {
-      const Vector6d e = solver::relative_pose_error(state.poses[r.a], state.poses[r.b], r.b_from_a);
-      total += e.dot(r.information * e);
-    }
     return total;
   }
 
@@ -158,36 +150,6 @@ class BundleAdjuster {
       }
       std::copy_n(h, 6, gradient_of(free).data());
     }
-    for (const BaPosePrior& prior : problem_.priors) {
-      const int free = layout_.free_of_camera[prior.camera];
-      if (free < 0) continue;
-      const auto r = solver::relative_pose_residual(state_.poses[prior.camera], prior.cam_from_world, Rigid3());
-      const Matrix6d weighted = r.jacobian_a.transpose() * prior.information;
-      diagonal_block(free) += weighted * r.jacobian_a;
-      gradient_of(free) += weighted * r.error;
-    }
-    for (size_t k = 0; k < problem_.relative_poses.size(); ++k)
-      linearise(problem_.relative_poses[k], layout_.relative_block[k]);
-  }
-
-  void linearise(const BaRelativePose& relative, int block) {
-    const int a = layout_.free_of_camera[relative.a], b = layout_.free_of_camera[relative.b];
-    const auto r =
-        solver::relative_pose_residual(state_.poses[relative.a], state_.poses[relative.b], relative.b_from_a);
-    const Matrix6d weighted_a = r.jacobian_a.transpose() * relative.information;
-    const Matrix6d weighted_b = r.jacobian_b.transpose() * relative.information;
-    if (a >= 0) {
-      diagonal_block(a) += weighted_a * r.jacobian_a;
-      gradient_of(a) += weighted_a * r.error;
-    }
-    if (b >= 0) {
-      diagonal_block(b) += weighted_b * r.jacobian_b;
-      gradient_of(b) += weighted_b * r.error;
-    }
-    if (block < 0) return;
-    // The lower triangle's block: its row is the later camera.
-    Block(camera_blocks_.data() + kBlockSize * static_cast<size_t>(block)) +=
-        a < b ? Matrix6d(weighted_b * r.jacobian_a) : Matrix6d(weighted_a * r.jacobian_b);
   }
 
   // Step of all cameras and points for a damping, and the cost that the quadratic model saves. False: not solvable.

@@ -20,29 +20,12 @@ struct BaObservation {
   double weight = 1.0;           // w of DKB eq. 48, > 0, on the reprojection part; depth has weight 1
 };
 
-// Gaussian knowledge of one pose: world_from_cam = prior.world_from_cam * T(d), d = [m, rad] in camera axes.
-struct BaPosePrior {
-  int camera = 0;
-  Rigid3 cam_from_world;
-  Matrix6d information = Matrix6d::Zero();
-};
-
-// Gaussian knowledge of the motion between two cameras: cam_b_from_world * world_from_cam_a = b_from_a * T(d),
-// d = [m, rad] in the axes of camera a.
-struct BaRelativePose {
-  int a = 0, b = 0;
-  Rigid3 b_from_a;
-  Matrix6d information = Matrix6d::Zero();
-};
-
 struct BaProblem {
   CameraModel camera;  // pinhole part only; observations are undistorted
   std::vector<Rigid3> cam_from_world;
-  std::vector<uint8_t> fixed;               // per camera: 1 = stays where it is. Fix one at least, or give a prior.
+  std::vector<uint8_t> fixed;               // per camera: 1 = stays where it is. Fix one at least.
   std::vector<Eigen::Vector3d> points;      // [m] in the world
   std::vector<BaObservation> observations;  // any order; of one (camera, point) pair there may be several
-  std::vector<BaPosePrior> priors;
-  std::vector<BaRelativePose> relative_poses;
 };
 
 struct BaOptions {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "dkb/solver/ceres_oracle.h"
+#include "dkb/solver/ceres_test_oracle.h"
 #include "dkb/solver/test_world.h"
 #include "dkb/util/errors.h"
 
