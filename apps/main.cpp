@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "bench_command.h"
+#include "bench/bench_command.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
-#include "eval_command.h"
+#include "eval/eval_command.h"
 #include "map_command.h"
 #include "run_command.h"
 #include "simulate_command.h"

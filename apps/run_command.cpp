@@ -15,7 +15,7 @@
 #include <optional>
 #include <sstream>
 
-#include "bench_cv_orb.h"
+#include "bench/bench_cv_orb.h"
 #include "dense_output.h"
 #include "detector_choice.h"
 #include "dkb/dataset/camera_file.h"

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Suites as text: what they mean, and that whatever is wrong with one is said in one line.
-#include "bench_suite.h"
+#include "bench/bench_suite.h"
 
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <set>
 
-#include "bench_report.h"
+#include "bench/bench_report.h"
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "bench_report.h"
+#include "bench/bench_report.h"
 
 namespace dkb::bench {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_plots.h"
+#include "bench/bench_plots.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "bench/bench_charts.h"
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/evaluation/bench_charts.h"
 #include "dkb/util/errors.h"
 
 namespace dkb::bench {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eval_command.h"
+#include "eval/eval_command.h"
 
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/evaluation/evaluation_report.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "eval/evaluation_report.h"
 
 namespace dkb {
 namespace fs = std::filesystem;

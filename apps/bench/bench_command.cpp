@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_command.h"
+#include "bench/bench_command.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <memory>
 #include <thread>
 
-#include "bench_report.h"
-#include "bench_results.h"
-#include "bench_runner.h"
+#include "bench/bench_report.h"
+#include "bench/bench_results.h"
+#include "bench/bench_runner.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 

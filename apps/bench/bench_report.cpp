@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_report.h"
+#include "bench/bench_report.h"
 
 #include <fmt/format.h>
 
@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "bench_plots.h"
+#include "bench/bench_plots.h"
+#include "bench/text_table.h"
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/evaluation/svg_drawing.h"
-#include "dkb/evaluation/text_table.h"
 #include "dkb/util/files.h"
+#include "svg_drawing.h"
 
 namespace dkb::bench {
 namespace {

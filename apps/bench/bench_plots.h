@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "bench_report.h"
+#include "bench/bench_report.h"
 
 namespace dkb::bench {
 

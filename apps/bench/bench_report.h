@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bench_results.h"
-#include "dkb/evaluation/run_statistics.h"
+#include "bench/bench_results.h"
+#include "bench/run_statistics.h"
 
 namespace dkb::bench {
 

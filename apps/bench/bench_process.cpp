@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_process.h"
+#include "bench/bench_process.h"
 
 #include <fcntl.h>
 #include <sys/prctl.h>

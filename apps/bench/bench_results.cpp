@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_results.h"
+#include "bench/bench_results.h"
 
 #include <fmt/format.h>
 

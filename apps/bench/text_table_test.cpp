@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/evaluation/text_table.h"
+#include "bench/text_table.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bench_results.h"
+#include "bench/bench_results.h"
 
 namespace dkb::bench {
 

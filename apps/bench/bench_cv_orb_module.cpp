@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_cv_orb_module.h"
+#include "bench/bench_cv_orb_module.h"
 
 #include <chrono>
 #include <opencv2/core.hpp>

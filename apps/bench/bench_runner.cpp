@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_runner.h"
+#include "bench/bench_runner.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -17,7 +17,7 @@
 #include <set>
 #include <thread>
 
-#include "bench_process.h"
+#include "bench/bench_process.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/util/errors.h"

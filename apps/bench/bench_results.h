@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bench_suite.h"
+#include "bench/bench_suite.h"
 #include "dkb/evaluation/trajectory_error.h"
 
 namespace dkb::bench {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/evaluation/run_statistics.h"
+#include "bench/run_statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_suite.h"
+#include "bench/bench_suite.h"
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>

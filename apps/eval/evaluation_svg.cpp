@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "dkb/evaluation/evaluation_report.h"
-#include "dkb/evaluation/svg_drawing.h"
+#include "eval/evaluation_report.h"
+#include "svg_drawing.h"
 
 namespace dkb {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/evaluation/bench_charts.h"
+#include "bench/bench_charts.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "dkb/evaluation/svg_drawing.h"
+#include "svg_drawing.h"
 
 namespace dkb {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench_cv_orb.h"
+#include "bench/bench_cv_orb.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "bench_cv_orb_module.h"
+#include "bench/bench_cv_orb_module.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"

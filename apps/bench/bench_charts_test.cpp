@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/evaluation/bench_charts.h"
+#include "bench/bench_charts.h"
 
 #include <gtest/gtest.h>
 
