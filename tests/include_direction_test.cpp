@@ -67,8 +67,12 @@ TEST(Architecture, IncludesPointDown) {
 TEST(Architecture, MappingAndLoopsKnowNothingOfTrackingAndTheLibraryNothingOfTheSimulator) {
   for_each_include([](const std::string& file, const std::string& where, const std::string& name, bool) {
     const std::string from = room_of(file), to = room_of(name);
-    if (from == "mapping" || from == "loop") EXPECT_NE(to, "tracking") << where << " includes " << name;
-    if (from != "simulator") EXPECT_NE(to, "simulator") << where << " includes " << name;
+    if (from == "mapping" || from == "loop") {
+      EXPECT_NE(to, "tracking") << where << " includes " << name;
+    }
+    if (from != "simulator") {
+      EXPECT_NE(to, "simulator") << where << " includes " << name;
+    }
   });
 }
 
