@@ -4,30 +4,25 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <atomic>
 #include <csignal>
+#include <cstdlib>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <sstream>
 
 #include "bench/bench_cv_orb.h"
-#include "dense_output.h"
-#include "detector_choice.h"
-#include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/paced_source.h"
-#include "dkb/dataset/rgbd_reader.h"
-#include "dkb/dataset/tum_dataset.h"
 #include "dkb/map/map_file.h"
-#include "dkb/slam/slam_system.h"
+#include "dkb/slam/options.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
-#include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
+#include "dkb_slam/slam.h"
 #include "run_outputs.h"
 
 namespace dkb {
@@ -38,14 +33,14 @@ struct RunArguments {
   std::string dataset, camera, preset = "default", out;
   std::vector<std::string> set;
   std::string config;
-  DatasetSelection selection;
+  FolderOptions folder;
   uint64_t seed = 1;
   bool has_seed = false;
   int threads = 0;
-  DetectorArguments detection;
+  DetectorChoice detection;
   std::string filter, disable;
   std::string load_map;
-  bool localise = false;
+  bool localize = false;
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
        quiet = false;
 };
@@ -92,8 +87,8 @@ fs::path default_output(const fs::path& dataset) {
   return fs::path("dkb-out") / (name.string() + "-" + stamp);
 }
 
-void append_features(std::string& csv, const std::string& stamp, const SlamSystem& slam) {
-  for (const FeatureReport& f : slam.features())
+void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
+  for (const FeatureReport& f : result.features)
     csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
 }
 
@@ -103,167 +98,128 @@ void append_frame(std::string& log, const std::string& stamp, const FrameResult&
   log += '\n';
 }
 
-// What --load-map says of the camera and the pyramid has to fit what the run says of them.
-CameraChoice camera_of_map(const MapFileContext& context, const RunArguments& args, const SlamOptions& options) {
-  const CameraModel& c = context.camera;
-  CameraChoice choice{c, "of " + args.load_map};
-  try {
-    choice = choose_camera(args.camera, args.dataset);
-  } catch (const InputError&) {
-    // A folder that does not tell its camera takes the map's.
-    if (!args.camera.empty() || fs::exists(fs::path(args.dataset) / "camera.yaml")) throw;
-  }
-  const CameraModel& d = choice.camera;
-  const auto numbers = [](const CameraModel& m) {
-    return std::array{m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.p1, m.p2, m.k3};
-  };
-  if (c.width != d.width || c.height != d.height || numbers(c) != numbers(d))
-    throw InputError(fmt::format(
-        "{}: was made with another camera ({}x{} fx {} fy {} cx {} cy {}) than {} ({}x{} fx {} fy {} cx {} cy {}); "
-        "give a map of this camera, or --camera",
-        args.load_map, c.width, c.height, c.fx, c.fy, c.cx, c.cy, choice.origin, d.width, d.height, d.fx, d.fy, d.cx,
-        d.cy));
-  if (context.levels != options.features.levels || context.scale_factor != options.features.scale)
-    throw InputError(
-        fmt::format("{}: was made with {} pyramid levels of {}; add --set features.levels={} --set "
-                    "features.scale={}",
-                    args.load_map, context.levels, context.scale_factor, context.levels, context.scale_factor));
+Options options_of(const RunArguments& args) {
+  Options options(args.preset);
+  if (!args.config.empty()) options.load(args.config);
+  for (const std::string& assignment : args.set) options.assign(assignment, "--set");
+  if (!args.filter.empty()) options.set("dynamics.filter", args.filter, "--filter");
+  options.disable(args.disable);
+  if (args.has_seed) options.set("seed", std::to_string(args.seed), "--seed");
+  if (args.final_ba) options.set("global_ba.final", "true", "--final-ba");
+  options.threaded = args.threads != 1;
+  options.realtime = args.realtime;
+  options.dense_map = args.dense;
+  options.check();
+  return options;
+}
+
+FolderOptions folder_options(const RunArguments& args) {
+  FolderOptions folder = args.folder;
+  folder.camera = args.camera;
+  folder.threaded = args.threads != 1 || args.realtime;
+  // A folder that does not tell its camera takes the map's.
+  if (!args.load_map.empty()) folder.fallback_camera = load_map(args.load_map).context.camera;
+  return folder;
+}
+
+// Without a filter nothing is to be detected.
+DetectorChoice detector_choice(const RunArguments& args, const Options& options, const FolderSource& source) {
+  DetectorChoice choice = args.detection;
+  for (const DatasetPair& pair : source.pairs()) choice.stamps_ns.push_back(pair.stamp_ns);
+  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
+  if (options.internal().dynamics.filter != FilterKind::none) return choice;
+  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || args.preset == "orb";
+  if (asked_for) choice.masks.clear();
+  choice.kinds = "none";
+  choice.boxes.clear();
   return choice;
 }
 
 int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
-  SlamOptions options = preset(args.preset);
-  Settings settings;
-  bind_settings(settings, options);
-  if (!args.config.empty()) settings.load_yaml(args.config);
-  for (const std::string& assignment : args.set) settings.set_assignment(assignment, "--set");
-  if (!args.filter.empty()) settings.set("dynamics.filter", args.filter, "--filter");
-  DetectorArguments detection = args.detection;
-  const DisabledParts disabled = parse_disabled(args.disable);
-  disable_parts(options, disabled);
-  if (options.dynamics.filter == FilterKind::none && (disabled.dynamic_removal || args.preset == "orb")) detection = {};
-  if (options.dynamics.filter == FilterKind::none) {
-    detection.detector = "none";
-    detection.boxes.clear();
-  }
-  if (args.has_seed) options.seed = args.seed;
-  options.pipeline.threaded = args.threads != 1;
-  options.pipeline.realtime = args.realtime;
-  if (args.final_ba) options.final_ba = true;
-  options.check();
-
-  TumDataset dataset = open_tum_dataset(args.dataset);
-  select_pairs(args.selection, &dataset);
-  if (args.localise && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
-  std::optional<MapFile> map;
-  if (!args.load_map.empty()) map = load_map(args.load_map);
-  const CameraChoice camera =
-      map ? camera_of_map(map->context, args, options) : choose_camera(args.camera, args.dataset);
-  RgbdReaderOptions reading;
-  reading.threaded = options.pipeline.threaded || args.realtime;
-  RgbdReader reader(dataset.pairs, camera.camera, reading, &warnings);
-  std::vector<double> stamps;
-  for (const DatasetPair& pair : dataset.pairs) stamps.push_back(pair.timestamp);
+  const Options options = options_of(args);
+  if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  FolderSource folder(args.dataset, folder_options(args));
   const Stopwatch loading;
-  DetectorSet detectors = make_detectors(detection, camera.camera, stamps, options.pipeline.threaded, args.realtime);
+  Detectors detectors = make_detectors(detector_choice(args, options, folder), folder.camera());
   const double loading_s = loading.ms() / 1000;
+  Slam slam(folder.camera(), options, std::move(detectors));
+  if (!args.load_map.empty()) slam.load_map(args.load_map);
+  slam.localize_only(args.localize);
+  slam.explain_keyframes(args.debug_log);
   const fs::path out = args.out.empty() ? default_output(args.dataset) : fs::path(args.out);
   make_output_folder(out);
-  if (!args.quiet)
-    fmt::print("{} pairs by {}, camera {}, results in {}\n", dataset.pairs.size(), dataset.list, camera.origin,
-               out.string());
+  if (!args.quiet) fmt::print("{}, results in {}\n", folder.description(), out.string());
 
   interrupted = false;
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
-  SlamSystem slam(camera.camera, options, std::move(detectors));
-  if (map) slam.load(std::move(map->map));
-  slam.set_localise_only(args.localise);
-  std::optional<DenseOutput> dense;
-  if (args.dense) dense.emplace(slam);
   RunFacts facts;
-  facts.writes_map = !args.localise;
-  facts.offered = static_cast<int>(dataset.pairs.size());
-  slam.explain_keyframes(args.debug_log);
+  facts.writes_map = !args.localize;
+  facts.offered = static_cast<int>(*folder.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
-  if (args.realtime) paced.emplace(reader);
-  Progress progress(dataset.pairs.size(), args.quiet);
+  if (args.realtime) paced.emplace(folder);
+  Source& source = paced ? static_cast<Source&>(*paced) : folder;
+  Progress progress(*folder.size(), args.quiet);
   const Stopwatch wall;
-  bool first = true;
   while (!interrupted) {
-    const std::optional<DatasetFrame> frame = paced ? paced->next() : reader.next();
-    if (!frame) break;
-    if (first) facts.startup_s = seconds_since_process_start() - loading_s;
-    first = false;
-    if (frame->image == nullptr) {
+    SourceFrame next = source.next();
+    if (next.state == SourceState::ended) break;
+    if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
+    if (next.state != SourceState::frame) {
       ++facts.skipped;
-      progress.frame(frame->index + 1, nullptr);
+      warnings.warn("frame skipped, an image cannot be read",
+                    "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
+      progress.frame(next.index + 1, nullptr);
       continue;
     }
-    facts.stamps.push_back(frame->stamp);
-    const FrameResult result = slam.process(frame->image);
-    for (const Mover& mover : result.movers) facts.movers.push_back({frame->timestamp, frame->stamp, mover});
-    if (dense) dense->note(*frame->image, result, slam);
-    if (const auto warning = slam.take_warning())
-      warnings.warn("detector", "frame " + std::to_string(frame->index) + ": " + *warning);
-    if (args.dump_features) append_features(facts.features_csv, frame->stamp, slam);
-    if (args.debug_log) append_frame(facts.debug_log, frame->stamp, result);
-    progress.frame(frame->index + 1, &result);
+    facts.stamps.push_back(next.stamp);
+    const FrameResult result = slam.process(next.frame);
+    for (const Mover& mover : result.movers) facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+    for (const Event& event : slam.take_events())
+      if (event.kind == Event::Kind::warning)
+        warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+    if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
+    if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
+    progress.frame(next.index + 1, &result);
   }
   if (paced) {
     paced->stop();
     facts.skipped += paced->dropped();
   }
-  reader.stop();
+  folder.stop();
   slam.finish();
   facts.wall_s = wall.ms() / 1000;
-  facts.config_yaml = settings.to_yaml();
-  facts.times = reader.times();
-  if (dense) {
-    const std::string line = dense->write(out, slam);
+  facts.config_yaml = options.to_yaml();
+  facts.times = folder.times();
+  if (args.dense) {
+    const Stopwatch building;
+    const DenseMap map = slam.dense_map();
+    facts.times.add("dense_build", building.ms());
+    const std::string line = write_dense_map(out, map, building.ms() / 1000);
     if (!args.quiet) fmt::print("{}\n", line);
-    facts.times.merge(dense->times());
   }
   write_outputs(out, slam, facts);
-  if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(dataset.pairs, camera.camera));
+  if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(folder.pairs(), folder.camera()));
   warnings.finish();
 
-  const SlamStatistics s = slam.statistics();
+  const Statistics s = slam.statistics();
   if (!args.quiet)
     fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked,
                facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (interrupted) return 130;
-  if (s.tracked == 0 && args.localise) {
+  if (s.tracked > 0) return 0;
+  if (args.localize)
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
-    return 1;
-  }
-  if (s.tracked == 0) {
+  else
     fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
-               options.tracking.initial_points);
-    return 1;
-  }
-  return 0;
+               options.internal().tracking.initial_points);
+  return 1;
 }
 
 }  // namespace
-
-DisabledParts parse_disabled(const std::string& list) {
-  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
-  DisabledParts parts;
-  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
-  std::istringstream names(list);
-  for (std::string name; std::getline(names, name, ',');) {
-    const auto at = std::find(known.begin(), known.end(), name);
-    if (at == known.end())
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
-                       "; parts: dr, kf, ba, loop");
-    *switches[at - known.begin()] = true;
-  }
-  return parts;
-}
 
 void register_run(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<RunArguments>();
@@ -277,8 +233,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) {
     args->has_seed = true;
   });
-  DetectorArguments& detection = args->detection;
-  command->add_option("--detector", detection.detector, "auto, yolo, motion, file, none; several joined by +");
+  DetectorChoice& detection = args->detection;
+  command->add_option("--detector", detection.kinds, "auto, yolo, motion, file, none; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)");
@@ -288,13 +244,13 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
-  command->add_option("--skip-pairs", args->selection.skip_pairs, "Pairs left out at the beginning, before all else");
-  command->add_option("--start", args->selection.start, "[s] after the first pair");
-  command->add_option("--end", args->selection.end, "[s] after the first pair");
-  command->add_option("--max-frames", args->selection.max_frames, "Pairs at most, counted from --start");
+  command->add_option("--skip-pairs", args->folder.skip_pairs, "Pairs left out at the beginning, before all else");
+  command->add_option("--start", args->folder.start, "[s] after the first pair");
+  command->add_option("--end", args->folder.end, "[s] after the first pair");
+  command->add_option("--max-frames", args->folder.max_frames, "Pairs at most, counted from --start");
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
-  command->add_flag("--localize", args->localise, "Track in that map without changing it");
+  command->add_flag("--localize", args->localize, "Track in that map without changing it");
   command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_outputs.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
@@ -11,9 +12,9 @@
 #include <sstream>
 
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/map/map_file.h"
 #include "dkb/map/point_cloud.h"
 #include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -42,7 +43,8 @@ std::vector<Trajectory> with_stamps(const std::vector<TrajectoryFrame>& frames,
     const auto map = static_cast<size_t>(f.map);
     if (by_map.size() <= map) by_map.resize(map + 1);
     // Keyframes of a loaded map are of no frame of this run.
-    by_map[map].push_back({f.timestamp, f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "", f.world_from_cam});
+    by_map[map].push_back({seconds_from_ns(f.stamp_ns), f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "",
+                            f.world_from_cam});
   }
   const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; };
   for (Trajectory& t : by_map) std::stable_sort(t.begin(), t.end(), earlier);
@@ -61,7 +63,7 @@ void write_by_map(const std::filesystem::path& folder, const std::string& name, 
     if (map >= by_map.size() || by_map[map].empty()) std::filesystem::remove(file(map));
 }
 
-std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
+std::string stats_json(const Statistics& s, const RunFacts& facts) {
   nlohmann::ordered_json j;
   j["frames"] = facts.offered;
   j["tracked"] = s.tracked;
@@ -91,19 +93,14 @@ std::string stats_json(const SlamStatistics& s, const RunFacts& facts) {
     const auto it = s.keyframe_rules.find(rule);
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
-  const KeyframeTestCounts& tests = s.keyframe_tests;
-  j["keyframe_tests"] = {{"decisions", tests.decisions},   {"waited", tests.waited},
-                         {"parallax", tests.parallax},     {"votes_asked", tests.votes_asked},
-                         {"visibility", tests.visibility}, {"spread", tests.spread},
-                         {"few_points", tests.few_points}, {"close_points", tests.close_points},
-                         {"view_left", tests.view_left}};
-  j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.mapping.points_retracted}};
+  j["keyframe_tests"] = s.keyframe_tests;
+  j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.points_retracted}};
   j["detector"] = {
       {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
-  j["mapping"] = {{"points_created", s.mapping.points_created},
-                  {"points_culled", s.mapping.points_culled},
-                  {"points_fused", s.mapping.points_fused},
-                  {"keyframes_culled", s.mapping.keyframes_culled}};
+  j["mapping"] = {{"points_created", s.points_created},
+                  {"points_culled", s.points_culled},
+                  {"points_fused", s.points_fused},
+                  {"keyframes_culled", s.keyframes_culled}};
   return j.dump(2) + "\n";
 }
 
@@ -123,21 +120,29 @@ double seconds_since_process_start() {
          std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
-void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, const RunFacts& facts) {
+void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
   write_by_map(folder, "trajectory", with_stamps(slam.trajectory(), facts.stamps));
   write_by_map(folder, "trajectory_online", with_stamps(slam.online_trajectory(), facts.stamps));
   write_by_map(folder, "keyframes", with_stamps(slam.keyframes(), facts.stamps));
-  const MapView map = slam.map();
-  const auto& orb = slam.options().features;
   if (facts.writes_map) {
-    save_map(folder / "map.dkb", *map, {slam.camera(), orb.scale, orb.levels});
-    write_file_atomically(folder / "map.ply", point_cloud_ply(*map));
+    slam.save_map(folder / "map.dkb");
+    write_file_atomically(folder / "map.ply", point_cloud_ply(*slam.map().map()));
   }
   write_file_atomically(folder / "config.yaml", facts.config_yaml);
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
   if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
   write_file_atomically(folder / "stats.json", stats_json(slam.statistics(), facts));
+}
+
+std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds) {
+  write_file_atomically(folder / "dense.ply", mesh_ply(map.mesh));
+  std::string line =
+      fmt::format("dense map: {} keyframes, {} triangles, {:.1f} s", map.views, map.mesh.triangles.size(), seconds);
+  if (!map.grid) return line + "; no floor in view: no occupancy grid";
+  write_file_atomically(folder / "occupancy.pgm", occupancy_pgm(*map.grid));
+  write_file_atomically(folder / "occupancy.yaml", occupancy_yaml(*map.grid, "occupancy.pgm"));
+  return line;
 }
 
 }  // namespace dkb

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "dkb/dataset/movers_file.h"
-#include "dkb/slam/slam_system.h"
 #include "dkb/util/timing.h"
+#include "dkb_slam/slam.h"
 
 namespace dkb {
 
@@ -20,7 +20,7 @@ struct RunFacts {
   std::string features_csv;  // empty = not asked for
   std::string debug_log;     // likewise
   MoverRows movers;
-  StageTimes times;  // decoding
+  StageTimes times;  // of stages that the system does not have
   bool writes_map = true;
 };
 
@@ -28,6 +28,9 @@ struct RunFacts {
 double seconds_since_process_start();
 
 // Writes every result of the contract into `folder`, each file atomically. Throws OutputError.
-void write_outputs(const std::filesystem::path& folder, const SlamSystem& slam, const RunFacts& facts);
+void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
+
+// dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws OutputError.
+std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds);
 
 }  // namespace dkb

@@ -92,7 +92,7 @@ TEST_F(Localise, MapsThatMeetAreMergedInTheWorldOfTheFirst) {
 }
 
 TEST_F(Localise, TheLibraryLoadsMapsLikewise) {
-  const CameraModel camera = read_camera_file(sequence() / "camera.yaml");
+  const CameraModel camera = Camera::load(sequence() / "camera.yaml");
   RgbdReader reader(open_tum_dataset(sequence()).pairs, camera, {}, nullptr);
   SlamSystem slam(camera), first(camera);
   first.set_localise_only(true);

@@ -168,7 +168,7 @@ TEST(RunCommand, GreyImagesFloatDepthAndHalfTheSizeWork) {
   const TempFolder temp;
   const fs::path folder = temp / "half";
   copy_sequence(folder, 15, true);
-  CameraModel camera = read_camera_file(folder / "camera.yaml");
+  CameraModel camera = Camera::load(folder / "camera.yaml");
   const CameraModel full = camera;
   camera.width /= 2;
   camera.height /= 2;
@@ -176,7 +176,7 @@ TEST(RunCommand, GreyImagesFloatDepthAndHalfTheSizeWork) {
   camera.fy /= 2;
   camera.cx = (camera.cx - 0.5) / 2;
   camera.cy = (camera.cy - 0.5) / 2;
-  write_text(folder / "camera.yaml", camera_to_yaml(camera));
+  write_text(folder / "camera.yaml", camera.to_yaml());
   for (const auto& row : rows_of(folder / "associations.txt")) {
     const GreyImage grey = read_grey(folder / row[1]);
     const DepthImage depth = read_depth(folder / row[3], full);

@@ -20,7 +20,7 @@ using Images = std::vector<std::shared_ptr<const RgbdImage>>;
 
 class SlamSystemTest : public ::testing::Test {
  protected:
-  SlamSystemTest() : camera(read_camera_file(sequence() / "camera.yaml")) {
+  SlamSystemTest() : camera(Camera::load(sequence() / "camera.yaml")) {
     RgbdReader reader(open_tum_dataset(sequence()).pairs, camera, {}, nullptr);
     while (const auto frame = reader.next()) images.push_back(frame->image);
   }

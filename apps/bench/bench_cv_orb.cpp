@@ -34,7 +34,7 @@ std::optional<double> measure_cv_orb(const std::vector<DatasetPair>& pairs, cons
   for (size_t i = 0; i < n; ++i) chosen.push_back(pairs[i * pairs.size() / n]);
   RgbdReaderOptions options;
   options.threaded = false;
-  RgbdReader reader(chosen, camera, options, nullptr);
+  RgbdReader reader(chosen, camera, options);
   double sum = 0;
   int frames = 0;
   bool warm = false;

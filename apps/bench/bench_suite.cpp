@@ -11,13 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "detector_choice.h"
-#include "dkb/slam/options.h"
+#include "dkb/dataset/detector_choice.h"
+#include "dkb_slam/options.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
-#include "run_command.h"
 
 namespace dkb::bench {
 namespace fs = std::filesystem;
@@ -175,14 +174,12 @@ SuiteSequence read_sequence(const std::string& name, const Reader& reader) {
 // Everything that `run` would refuse before its first frame, found before the first run of all.
 void check_options(const SuiteVariant& v, const Reader& reader) {
   try {
-    SlamOptions options = preset(v.preset);
-    Settings settings;
-    bind_settings(settings, options);
-    for (const auto& [key, value] : v.set) settings.set(key, value, "set");
-    if (!v.filter.empty()) settings.set("dynamics.filter", v.filter, "filter");
-    disable_parts(options, parse_disabled(v.disabled()));
+    Options options(v.preset);
+    for (const auto& [key, value] : v.set) options.set(key, value, "set");
+    if (!v.filter.empty()) options.set("dynamics.filter", v.filter, "filter");
+    options.disable(v.disabled());
     options.check();
-    if (!v.detector.empty()) detector_kinds(v.detector, "");
+    if (!v.detector.empty()) detector_kinds(v.detector, false);
   } catch (const InputError& e) {
     reader.fail(e.what());
   }

@@ -8,7 +8,6 @@
 
 #include "dkb/comparison/paper_filter.h"
 #include "dkb/detection/detection.h"
-#include "dkb/dynamics/mask_filter.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 
@@ -22,6 +21,16 @@ enum class FilterKind {
   multiview,  // features before surfaces that earlier keyframes saw (as DynaSLAM's geometry does)
   paper,      // flow residual and Gaussian depth test in boxes (DKB section 3.1)
   standard,   // silhouettes by depth and motion: our own
+};
+
+// A corner of the current image, with what flow and depth tell of it.
+struct FilterFeature {
+  Eigen::Vector2d image_pixel;     // [px] as read
+  Eigen::Vector2d pixel;           // [px] ideal
+  double depth = 0;                // [m] 0 = unknown
+  bool flowed = false;             // the two below are known
+  Eigen::Vector2d previous_pixel;  // [px] ideal, the same point in the previous image
+  double previous_depth = 0;       // [m] there; 0 = unknown
 };
 
 // Index of the smallest box that holds each feature, -1 = none.

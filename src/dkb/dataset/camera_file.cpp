@@ -92,12 +92,12 @@ CameraModel parse_camera(const std::string& text, const std::string& name) {
   return camera;
 }
 
-CameraModel read_camera_file(const fs::path& path) {
+Camera Camera::load(const fs::path& path) {
   return parse_camera(read_file(path), path.string());
 }
 
-std::string camera_to_yaml(const CameraModel& camera) {
-  CameraModel copy = camera;
+std::string Camera::to_yaml() const {
+  Camera copy = *this;
   Settings settings;
   bind(&settings, &copy);
   return settings.to_yaml();
@@ -110,11 +110,11 @@ CameraChoice choose_camera(const std::string& option, const fs::path& dataset) {
     if (!fs::exists(option, ec))
       throw InputError(option + ": neither a camera file nor a built-in camera (" + builtin_names() + ")" +
                        did_you_mean(option, kBuiltin));
-    return {read_camera_file(option), option};
+    return {Camera::load(option), option};
   }
   std::error_code ec;
   const fs::path beside = dataset / "camera.yaml";
-  if (fs::exists(beside, ec)) return {read_camera_file(beside), beside.string()};
+  if (fs::exists(beside, ec)) return {Camera::load(beside), beside.string()};
   const std::string name = camera_named_by(folder_name(dataset));
   if (const auto camera = builtin_camera(name)) return {*camera, name + " (from the folder's name)"};
   throw InputError(dataset.string() +

@@ -8,14 +8,8 @@
 
 namespace dkb {
 
-// Camera file: a YAML map of fx, fy, cx, cy [px], width, height [px], depth_factor [units per metre], all required; k1,
-// k2, p1, p2, k3 (default 0), fps [1/s], readout [s], depth_min, depth_max [m] optional. Throws InputError with
-// file:line: unknown (misspelt), missing, repeated or ill-typed key, value out of range, not YAML.
-CameraModel read_camera_file(const std::filesystem::path& path);
-CameraModel parse_camera(const std::string& text, const std::string& name);
-
-// The same as text, every key with its unit.
-std::string camera_to_yaml(const CameraModel& camera);
+// The text of a camera file (Camera::load), which `name` stands for in messages.
+Camera parse_camera(const std::string& text, const std::string& name);
 
 struct CameraChoice {
   CameraModel camera;

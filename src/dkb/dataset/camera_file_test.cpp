@@ -52,16 +52,16 @@ TEST(CameraFile, MessagesSayWhereWhatAndWhatToDo) {
 
 TEST(CameraFile, WrittenCameraReadsBackTheSame) {
   for (const char* name : {"fr1", "fr2", "fr3", "bonn"}) {
-    const CameraModel c = *builtin_camera(name), back = parse_camera(camera_to_yaml(c), "camera.yaml");
-    EXPECT_EQ(camera_to_yaml(back), camera_to_yaml(c));
+    const CameraModel c = *builtin_camera(name), back = parse_camera(c.to_yaml(), "camera.yaml");
+    EXPECT_EQ(back.to_yaml(), c.to_yaml());
     EXPECT_EQ(back.k3, c.k3);
   }
 }
 
 TEST(CameraFile, FilesInConfigAreTheBuiltInCameras) {
   for (const char* name : {"fr1", "fr2", "fr3", "bonn"}) {
-    const CameraModel file = read_camera_file(fs::path(DKB_CONFIG) / ("camera_" + std::string(name) + ".yaml"));
-    EXPECT_EQ(camera_to_yaml(file), camera_to_yaml(*builtin_camera(name))) << name;
+    const CameraModel file = Camera::load(fs::path(DKB_CONFIG) / ("camera_" + std::string(name) + ".yaml"));
+    EXPECT_EQ(file.to_yaml(), builtin_camera(name)->to_yaml()) << name;
   }
 }
 

@@ -47,17 +47,14 @@ std::string describe(const ImageHeader& h) {
   return article + std::to_string(h.bits) + type + colours + kind_name(h.kind);
 }
 
-// Metres from raw values; what lies outside the camera's range (or is no number) becomes 0.
-template <class Raw>
-DepthImage metres(const Image<Raw>& raw, float factor, const CameraModel& camera) {
-  DepthImage depth(raw.width(), raw.height());
-  const auto low = static_cast<float>(camera.depth_min), high = static_cast<float>(camera.depth_max);
-  const Raw* in = raw.data();
-  float* out = depth.data();
-  for (size_t i = 0; i < raw.size(); ++i) {
-    const float z = static_cast<float>(in[i]) / factor;
-    out[i] = z >= low && z <= high ? z : 0.0f;  // false for NaN
-  }
+DepthImage metres(Image<float> depth, const Camera& camera) {
+  depth_from_metres(depth.data(), depth.size(), camera, depth.data());
+  return depth;
+}
+
+DepthImage metres(const Image<uint16_t>& units, const Camera& camera) {
+  DepthImage depth(units.width(), units.height());
+  depth_from_units(units.data(), units.size(), camera, depth.data());
   return depth;
 }
 
@@ -124,13 +121,13 @@ DepthImage decode_depth(std::string_view bytes, const std::string& name, const C
     throw InputError(name + ": is " + kind + "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY");
   switch (header.kind) {
     case ImageKind::png:
-      return metres(formats::decode_png16(bytes, name, header), static_cast<float>(camera.depth_factor), camera);
+      return metres(formats::decode_png16(bytes, name, header), camera);
     case ImageKind::tiff:
-      return metres(formats::decode_tiff(bytes, name), 1.0f, camera);
+      return metres(formats::decode_tiff(bytes, name), camera);
     case ImageKind::pfm:
-      return metres(formats::decode_pfm(bytes, name), 1.0f, camera);
+      return metres(formats::decode_pfm(bytes, name), camera);
     default:
-      return metres(formats::decode_npy(bytes, name), 1.0f, camera);
+      return metres(formats::decode_npy(bytes, name), camera);
   }
 }
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "dkb/dynamics/mover.h"
+#include "dkb_slam/frame.h"
 
 namespace dkb {
 

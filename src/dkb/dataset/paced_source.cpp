@@ -5,7 +5,7 @@
 
 namespace dkb {
 
-PacedSource::PacedSource(RgbdReader& reader) : reader_(reader), thread_([this] { run(); }) {}
+PacedSource::PacedSource(Source& source) : source_(source), thread_([this] { run(); }) {}
 
 PacedSource::~PacedSource() {
   stop();
@@ -13,7 +13,7 @@ PacedSource::~PacedSource() {
 }
 
 void PacedSource::stop() {
-  reader_.stop();
+  source_.stop();
   {
     std::unique_lock lock(mutex_);
     stopped_ = true;
@@ -25,19 +25,19 @@ void PacedSource::stop() {
 void PacedSource::run() {
   using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> start;
-  double first_stamp = 0;
-  while (auto frame = reader_.next()) {
-    if (!start) {
-      start = Clock::now();
-      first_stamp = frame->timestamp;
-    }
-    const auto due = *start + std::chrono::duration_cast<Clock::duration>(
-                                  std::chrono::duration<double>(frame->timestamp - first_stamp));
-    {
+  int64_t first_stamp = 0;
+  for (SourceFrame frame = source_.next(); frame.state != SourceState::ended; frame = source_.next()) {
+    // A pair that cannot be read is told at once: it has no stamp to wait for.
+    if (frame.state == SourceState::frame) {
+      if (!start) {
+        start = Clock::now();
+        first_stamp = frame.frame.stamp_ns();
+      }
+      const auto due = *start + std::chrono::nanoseconds(frame.frame.stamp_ns() - first_stamp);
       std::unique_lock lock(mutex_);
       if (wake_.wait_until(lock, due, [&] { return stopped_; })) break;
     }
-    dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(*frame)));
+    dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame)));
   }
   queue_.close();
 }

@@ -4,33 +4,32 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
-#include <optional>
 #include <thread>
 
-#include "dkb/dataset/rgbd_reader.h"
 #include "dkb/util/bounded_queue.h"
+#include "dkb_slam/source.h"
 
 namespace dkb {
 
-// Hands the frames of a dataset over at the pace of their stamps, as a camera would. A consumer that falls behind finds
-// up to 30 frames waiting; only when these are full is the oldest dropped and counted.
-class PacedSource {
+// Hands the frames of a recording over at the pace of their stamps, as a camera would. A consumer that falls behind
+// finds up to 30 frames waiting; only when these are full is the oldest dropped and counted.
+class PacedSource final : public Source {
  public:
-  explicit PacedSource(RgbdReader& reader);
-  ~PacedSource();
-  PacedSource(const PacedSource&) = delete;
-  PacedSource& operator=(const PacedSource&) = delete;
+  explicit PacedSource(Source& source);
+  ~PacedSource() override;
 
-  // Waits for the next frame; nothing after the last one or stop().
-  std::optional<DatasetFrame> next() { return queue_.pop(); }
-  void stop();
+  const Camera& camera() const override { return source_.camera(); }
+  SourceFrame next() override { return queue_.pop().value_or(SourceFrame{}); }
+  void stop() override;
+  std::optional<size_t> size() const override { return source_.size(); }
+  std::string description() const override { return source_.description(); }
   int dropped() const { return dropped_; }
 
  private:
   void run();
 
-  RgbdReader& reader_;
-  BoundedQueue<DatasetFrame> queue_{30};
+  Source& source_;
+  BoundedQueue<SourceFrame> queue_{30};
   std::atomic<int> dropped_{0};
   std::mutex mutex_;
   std::condition_variable wake_;

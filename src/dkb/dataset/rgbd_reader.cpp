@@ -64,12 +64,10 @@ void RgbdReaderOptions::check() const {
   require_option(probed >= 1, "reader.probed", probed, "at least 1 pair");
 }
 
-RgbdReader::RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options,
-                       WarningLog* warnings)
+RgbdReader::RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options)
     : pairs_(std::move(pairs)),
       camera_(camera),
       options_(options),
-      warnings_(warnings),
       queue_((options.check(), camera.check(), static_cast<size_t>(options.queue))) {
   probe();
   if (options_.threaded) thread_ = std::thread([this] { run(); });
@@ -148,9 +146,6 @@ DatasetFrame RgbdReader::deliver(size_t index) {
     const std::lock_guard lock(times_mutex_);
     times_.add("decoding", decoded.ms);
   }
-  if (!decoded.skipped.empty() && warnings_ != nullptr)
-    warnings_->warn("frame skipped, an image cannot be read",
-                    "frame " + std::to_string(index) + ": " + decoded.skipped + "; frame skipped");
   return {index, pairs_[index].timestamp, pairs_[index].stamp, std::move(decoded.image), std::move(decoded.skipped)};
 }
 

@@ -14,7 +14,6 @@
 #include "dkb/geometry/camera.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/bounded_queue.h"
-#include "dkb/util/log.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -41,9 +40,8 @@ class RgbdReader {
  public:
   // Probes the first pairs: throws InputError when none of them decodes, or when one that decodes has another size than
   // the camera or is of a wrong type (8-bit depth, ...). What the probe decodes is not decoded again.
-  // Single bad pairs are handed out as skipped and go to `warnings` (may be null; must outlive the reader).
-  RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options,
-             WarningLog* warnings);
+  // Single bad pairs are handed out as skipped.
+  RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options);
   ~RgbdReader();  // stops the thread; never waits for more than the pair being decoded
   RgbdReader(const RgbdReader&) = delete;
   RgbdReader& operator=(const RgbdReader&) = delete;
@@ -68,7 +66,6 @@ class RgbdReader {
   const std::vector<DatasetPair> pairs_;
   const CameraModel camera_;
   const RgbdReaderOptions options_;
-  WarningLog* const warnings_;
   std::vector<std::unique_ptr<Decoded>> probed_;  // by index; emptied as they are delivered
   BoundedQueue<DatasetFrame> queue_;
   std::atomic<bool> stopped_{false};

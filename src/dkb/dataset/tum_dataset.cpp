@@ -7,6 +7,7 @@
 #include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -39,6 +40,15 @@ class RisingStamps {
   double last_ = 0;
   std::string before_;
 };
+
+void set_exact_stamps(std::vector<DatasetPair>& pairs, const std::string& name) {
+  const auto exact = [&](const std::string& stamp) {
+    const auto ns = parse_stamp_ns(stamp);
+    if (!ns) throw InputError(name + ": timestamp " + stamp + " is no time in seconds; give stamps below 9e9");
+    return *ns;
+  };
+  for (DatasetPair& pair : pairs) pair.stamp_ns = exact(pair.stamp), pair.depth_stamp_ns = exact(pair.depth_stamp);
+}
 
 }  // namespace
 
@@ -123,6 +133,7 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   if (fs::exists(associations, ec)) {
     dataset.list = "associations.txt";
     dataset.pairs = parse_associations(read_file(associations), associations.string(), folder);
+    set_exact_stamps(dataset.pairs, associations.string());
     return dataset;
   }
   for (const fs::path& list : {rgb, depth})
@@ -136,12 +147,13 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   for (const ListRow& row : depth_rows) depth_stamps.push_back(row.timestamp);
   for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
     const ListRow &c = colour_rows[i], &d = depth_rows[j];
-    dataset.pairs.push_back({c.timestamp, d.timestamp, c.stamp, d.stamp, folder / c.path, folder / d.path});
+    dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
   }
   if (dataset.pairs.empty())
     throw InputError(rgb.string() + ": no colour image has a depth image of depth.txt within " +
                      std::to_string(options.max_difference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
+  set_exact_stamps(dataset.pairs, rgb.string());
   return dataset;
 }
 

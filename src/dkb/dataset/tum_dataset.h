@@ -14,6 +14,7 @@ namespace dkb {
 struct DatasetPair {
   double timestamp = 0;               // [s] of the colour image
   double depth_timestamp = 0;         // [s] of the depth image
+  int64_t stamp_ns = 0, depth_stamp_ns = 0;  // the same, exactly
   std::string stamp;                  // the colour image's, as written in the list
   std::string depth_stamp;            // the depth image's
   std::filesystem::path colour_path;  // list's folder / name in the list

@@ -20,12 +20,6 @@ struct TimedPose {
   Rigid3 world_from_cam;
 };
 
-struct DenseMap {
-  SurfaceMesh mesh;
-  std::optional<OccupancyGrid> grid;  // nothing when no floor was found
-  int views = 0;                      // that were fused
-};
-
 // The dense map of the still world. Keyframes are noted as they come, cheaply, and fused when the poses are final, so
 // that loop corrections count. Not thread-safe. Deterministic.
 class DenseMapper {

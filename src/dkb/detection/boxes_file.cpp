@@ -9,6 +9,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -83,7 +84,7 @@ BoxesByTime parse_boxes(std::string_view text, const std::string& name, int widt
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.timestamp < b.timestamp; });
   BoxesByTime boxes;
   for (Row& row : rows) {
-    if (boxes.empty() || boxes.back().timestamp != row.timestamp) boxes.push_back({row.timestamp, {}, {}});
+    if (boxes.empty() || boxes.back().timestamp != row.timestamp) boxes.push_back({row.timestamp, {}});
     boxes.back().boxes.push_back(std::move(row.detection));
   }
   return boxes;
@@ -95,7 +96,7 @@ BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height)
 
 std::string boxes_to_text(const BoxesByTime& boxes) {
   std::string out = "# rgb_timestamp class x y w h score\n";
-  for (const Detections& at : boxes)
+  for (const TimedBoxes& at : boxes)
     for (const Detection& d : at.boxes) {
       std::string class_name = d.class_name.empty() ? "object" : d.class_name;
       std::replace_if(
@@ -109,20 +110,18 @@ std::string boxes_to_text(const BoxesByTime& boxes) {
 FileDetector::FileDetector(const std::filesystem::path& path, int width, int height)
     : boxes_(read_boxes(path, width, height)) {}
 
-Detections FileDetector::detect(const RgbdImage& image) {
-  const auto after = std::lower_bound(boxes_.begin(), boxes_.end(), image.timestamp,
-                                      [](const Detections& d, double stamp) { return d.timestamp < stamp; });
-  const Detections* nearest = nullptr;
+Detections FileDetector::detect(const DetectorInput& image) {
+  const double stamp = seconds_from_ns(image.stamp_ns);
+  const auto after = std::lower_bound(boxes_.begin(), boxes_.end(), stamp,
+                                      [](const TimedBoxes& t, double at) { return t.timestamp < at; });
+  const TimedBoxes* nearest = nullptr;
   double distance = kSameStamp;
   for (auto it = after == boxes_.begin() ? after : after - 1; it != boxes_.end() && it <= after; ++it)
-    if (std::abs(it->timestamp - image.timestamp) <= distance) {
+    if (std::abs(it->timestamp - stamp) <= distance) {
       nearest = &*it;
-      distance = std::abs(it->timestamp - image.timestamp);
+      distance = std::abs(it->timestamp - stamp);
     }
-  Detections found;
-  if (nearest != nullptr) found = *nearest;
-  found.timestamp = image.timestamp;
-  return found;
+  return nearest == nullptr ? Detections{} : Detections{nearest->boxes, {}};
 }
 
 }  // namespace dkb

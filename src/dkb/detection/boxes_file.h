@@ -10,8 +10,12 @@
 
 namespace dkb {
 
+struct TimedBoxes {
+  double timestamp = 0;  // [s] of the colour image
+  std::vector<Detection> boxes;
+};
 // Boxes of a whole sequence by increasing time stamp, one entry per stamp; boxes of one stamp in the file's order.
-using BoxesByTime = std::vector<Detections>;
+using BoxesByTime = std::vector<TimedBoxes>;
 
 // Text of rows `rgb_timestamp class x y w h [score]`: top-left corner and size in pixels. Further columns, blank lines,
 // comments (#), CRLF and a byte order mark are tolerated; rows may come in any order. A missing score is 1. Boxes are
@@ -30,7 +34,7 @@ class FileDetector final : public Detector {
   FileDetector(const std::filesystem::path& path, int width, int height);
   explicit FileDetector(BoxesByTime boxes) : boxes_(std::move(boxes)) {}
 
-  Detections detect(const RgbdImage& image) override;
+  Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "file"; }
   const BoxesByTime& boxes() const { return boxes_; }
 

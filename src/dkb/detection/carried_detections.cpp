@@ -112,7 +112,6 @@ Detections carry(const Detections& from, std::span<const PointMotion> motions, i
   const auto steps = static_cast<float>(frames);
   const float scale_limit = std::pow(options.max_scale_step, steps);
   Detections to;
-  to.timestamp = from.timestamp;
   to.mask = from.mask;
   if (!to.mask.empty())
     for (const Detection& d : from.boxes)

@@ -7,6 +7,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -125,10 +126,9 @@ GreyImage MaskFolder::read(const fs::path& path) const {
   return mask;
 }
 
-Detections MaskFolder::detect(const RgbdImage& image) {
+Detections MaskFolder::detect(const DetectorInput& image) {
   Detections found;
-  found.timestamp = image.timestamp;
-  if (const fs::path* path = find(image.timestamp)) {
+  if (const fs::path* path = find(seconds_from_ns(image.stamp_ns))) {
     found.mask = read(*path);
     for (const Box& box : region_boxes(found.mask, min_region)) found.boxes.push_back({"mover", box, 1.0f});
   }

@@ -27,7 +27,7 @@ class MaskFolder final : public Detector {
              int height);
 
   // Throws InputError for a mask that cannot be read or has another size.
-  Detections detect(const RgbdImage& image) override;
+  Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "masks"; }
 
  private:

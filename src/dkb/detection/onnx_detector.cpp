@@ -187,19 +187,18 @@ int OnnxDetector::frames_per_detection() const {
   return static_cast<int>(std::ceil(kReserve * ms / kFrameMs));
 }
 
-Detections OnnxDetector::detect(const RgbdImage& image) {
+Detections OnnxDetector::detect(const DetectorInput& image) {
   if (image.grey.empty()) throw InputError("the detector was given an empty image");
   const Letterbox letterbox =
-      Letterbox::fit(head_.kind, image.grey.width(), image.grey.height(), input_width_, input_height_);
+      Letterbox::fit(head_.kind, image.grey.width, image.grey.height, input_width_, input_height_);
   fill_blob(image, letterbox, head_.kind, &blob_);
   Detections found;
-  found.timestamp = image.timestamp;
   for (const OnnxNetwork::Output& output : network_->forward(blob_, input_width_, input_height_)) {
     if (recognise_head(output.dims, input_width_, input_height_) != head_) continue;
     for (const Prediction& p :
          suppress_overlaps(decode(head_, output.values, input_width_, input_height_, movable_, options_.min_score),
                            options_.max_overlap)) {
-      const Box box = clip(letterbox.to_image(p.box), image.grey.width(), image.grey.height());
+      const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
       if (box.w > 0 && box.h > 0) found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});
     }
     break;

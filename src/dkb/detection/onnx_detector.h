@@ -44,7 +44,7 @@ class OnnxDetector final : public Detector {
   ~OnnxDetector() override;
 
   // Throws InputError for an image without pixels, and std::runtime_error when the network fails.
-  Detections detect(const RgbdImage& image) override;
+  Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "yolo"; }
 
   // [frames of a 30 Hz camera] that one detection takes on one core of a desktop computer, estimated from the sizes of

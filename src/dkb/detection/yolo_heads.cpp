@@ -180,20 +180,19 @@ Box Letterbox::to_input(const Box& b) const {
   return {b.x * sx + static_cast<float>(left), b.y * sy + static_cast<float>(top), b.w * sx, b.h * sy};
 }
 
-void fill_blob(const RgbdImage& image, const Letterbox& box, YoloHead head, std::vector<float>* blob) {
+void fill_blob(const DetectorInput& image, const Letterbox& box, YoloHead head, std::vector<float>* blob) {
   const float factor = head == YoloHead::yolox ? 1.0f : 1.0f / 255.0f;
   const size_t plane = static_cast<size_t>(box.input_width) * static_cast<size_t>(box.input_height);
   blob->assign(3 * plane, kPadding * factor);
   float* const planes[] = {blob->data(), blob->data() + plane, blob->data() + 2 * plane};
   if (image.colour.empty()) {
-    resize_into<1>(image.grey.data(), box, factor, {planes[0]});
+    resize_into<1>(image.grey.row(0), box, factor, {planes[0]});
     std::copy_n(planes[0], plane, planes[1]);
     std::copy_n(planes[0], plane, planes[2]);
     return;
   }
-  static_assert(sizeof(Rgb) == 3);
   const int red = head == YoloHead::yolox ? 2 : 0;
-  resize_into<3>(&image.colour.data()->r, box, factor, {planes[red], planes[1], planes[2 - red]});
+  resize_into<3>(image.colour.row(0), box, factor, {planes[red], planes[1], planes[2 - red]});
 }
 
 std::vector<Prediction> decode(const HeadLayout& layout, std::span<const float> output, int input_width,

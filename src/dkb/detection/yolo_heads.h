@@ -44,7 +44,7 @@ struct Letterbox {
 
 // The network's input, 3 x input_height x input_width floats in the head's channel order and range: bilinear, pixel
 // centres at half coordinates. Grey images feed all three channels. `blob` is resized.
-void fill_blob(const RgbdImage& image, const Letterbox& letterbox, YoloHead head, std::vector<float>* blob);
+void fill_blob(const DetectorInput& image, const Letterbox& letterbox, YoloHead head, std::vector<float>* blob);
 
 // A decoded prediction: best class, box in pixels of the network's input.
 struct Prediction {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dynamics/mover_mask.h"
-#include "dkb/dynamics/mask_filter.h"
-
 #include <gtest/gtest.h>
 
 namespace dkb {
@@ -109,16 +107,6 @@ TEST(MoverMask, ErosionUndoesDilationAndTakesWhatIsOutsideForMarked) {
   dilate(corner, 2);
   erode(corner, 2);
   EXPECT_EQ(marked(corner), 1);
-}
-
-TEST(MoverMask, RejectsTheFeaturesOnItsCells) {
-  MoverMask mask{4, Image<uint8_t>(160, 120)};
-  mask.cells(10, 20) = 255;
-  std::vector<FilterFeature> features(2);
-  features[0].image_pixel = {41, 82};
-  features[1].image_pixel = {45, 82};
-  EXPECT_EQ(mask_filter(features, mask), (std::vector<uint8_t>{1, 0}));
-  EXPECT_EQ(mask_filter(features, MoverMask()), (std::vector<uint8_t>{0, 0}));
 }
 
 }  // namespace

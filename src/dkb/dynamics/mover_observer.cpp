@@ -76,6 +76,21 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
   return 0;
 }
 
+// Between the twentieths at either end, which may be of other surfaces.
+Eigen::Vector3d MoverObserver::size_of(std::span<const size_t> cells) const {
+  std::array<std::vector<float>, 3> values;
+  for (size_t cell : cells) {
+    const Eigen::Vector2f& ray = rays_[cell];
+    values[0].push_back(depth_[cell] * ray.x());
+    values[1].push_back(depth_[cell] * ray.y());
+    values[2].push_back(depth_[cell]);
+  }
+  Eigen::Vector3d size;
+  for (size_t i = 0; i < 3; ++i)
+    size[static_cast<Eigen::Index>(i)] = quantile(values[i], 0.95) - quantile(values[i], 0.05);
+  return size;
+}
+
 Eigen::Vector3d MoverObserver::median_position(std::span<const size_t> cells) const {
   const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
   const size_t stride = (cells.size() + kMostPoints - 1) / kMostPoints;
@@ -174,7 +189,7 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     });
     if (cells.size() < static_cast<size_t>(options_.least_cells)) continue;
     observations.push_back(
-        {boxes[b].class_name, boxes[b].box, median_position(cells), position_sd(static_cast<double>(depths[b]))});
+        {boxes[b].class_name, boxes[b].box, median_position(cells), position_sd(static_cast<double>(depths[b])), size_of(cells)});
   }
   return observations;
 }
@@ -289,7 +304,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
     observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),
-                            position_sd(static_cast<double>(upper_median(depths)))});
+                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells)});
   }
   return observations;
 }

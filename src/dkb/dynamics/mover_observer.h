@@ -32,6 +32,7 @@ struct MoverObservation {
   Box box;                            // [px] the detector's, or the region's bounds
   Eigen::Vector3d position_in_world;  // [m] median of its visible surface points, per coordinate
   double position_sd = 0;             // [m] standard deviation of each coordinate
+  Eigen::Vector3d size{0, 0, 0};      // [m] of its visible surface along the camera's axes: width, height, depth
 };
 
 // Tells the objects of one image apart and measures where their surfaces are: those in boxes, each with the part of the
@@ -58,6 +59,7 @@ class MoverObserver {
   void for_each_cell(const CellRange& range, const Function& function) const;
   float depth_near(const DepthImage& depth, int x, int y) const;
   Eigen::Vector3d median_position(std::span<const size_t> cells) const;
+  Eigen::Vector3d size_of(std::span<const size_t> cells) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
   std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellRange>& ranges) const;

@@ -121,7 +121,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     seen.push_back(o.position_in_world);
     if (t.id == 0) continue;
     movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
-                      o.position_sd, o.box});
+                      o.position_sd, t.covariance, o.size, o.box});
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];

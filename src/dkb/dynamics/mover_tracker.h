@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dynamics/mover.h"
+#include "dkb_slam/frame.h"
 #include "dkb/dynamics/mover_observer.h"
 
 namespace dkb {

@@ -10,9 +10,9 @@
 namespace dkb {
 
 struct PointEvidenceOptions {
-  int sightings =
-      10;  // times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1
-  void check() const { require_option(sightings >= 1, "dynamics.evidence.sightings", sightings, "at least 1"); }
+  // Times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1.
+  int sightings = 10;
+  void check() const { require_option(sightings >= 1, "dynamics.evidence_sightings", sightings, "at least 1"); }
 };
 
 // What the frames say of each map point over time: was it on a mover, or did it fit the still world?

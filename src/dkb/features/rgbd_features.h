@@ -19,8 +19,6 @@ struct Keypoint {
   float angle = 0;              // [rad]
   float response = 0;
   uint8_t octave = 0;
-  bool suspect = false;   // lies where a mover is seen: only well-established map points may be matched here
-  bool by_mover = false;  // hangs together with a mover: where depth is missing, it may be a mover's
   Rgb colour;
 };
 
@@ -46,6 +44,10 @@ class UndistortionTable {
  public:
   explicit UndistortionTable(const CameraModel& camera);
   Eigen::Vector2f operator()(float x, float y) const;
+  // The way back: the table's offset at the ideal pixel is near enough.
+  Eigen::Vector2f image_pixel(const Eigen::Vector2d& ideal) const {
+    return 2 * ideal.cast<float>() - (*this)(static_cast<float>(ideal.x()), static_cast<float>(ideal.y()));
+  }
 
  private:
   int columns_ = 0, rows_ = 0;

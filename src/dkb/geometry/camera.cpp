@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
 
 namespace dkb {
 namespace {
@@ -81,6 +82,14 @@ std::optional<CameraModel> builtin_camera(const std::string& name) {
     return std::nullopt;
   }
   return c;
+}
+
+Camera Camera::named(const std::string& name) {
+  const auto camera = builtin_camera(name);
+  if (!camera)
+    throw InputError("camera: there is none named \"" + name + "\"" +
+                     did_you_mean(name, {"fr1", "fr2", "fr3", "bonn"}) + "; names: fr1, fr2, fr3, bonn");
+  return *camera;
 }
 
 }  // namespace dkb

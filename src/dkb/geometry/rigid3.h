@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cmath>
 
-namespace dkb {
+#include "dkb_slam/geometry.h"
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+namespace dkb {
 
 // Skew-symmetric matrix: skew(a) * b = a x b.
 inline Eigen::Matrix3d skew(const Eigen::Vector3d& a) {
@@ -32,27 +29,6 @@ inline Eigen::Vector3d vector_from_rotation(const Eigen::Quaterniond& q) {
   if (n < 1e-12) return 2.0 * v;
   return (2.0 * std::atan2(n, sign * q.w()) / n) * v;
 }
-
-// Rigid motion between coordinate frames. `b_from_a` maps a point given in frame a to frame b:
-//   point_in_b = b_from_a * point_in_a,   c_from_a = c_from_b * b_from_a.
-struct Rigid3 {
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // [m]
-
-  Rigid3() = default;
-  Rigid3(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) : rotation(q), translation(t) {}
-
-  Eigen::Matrix3d matrix3() const { return rotation.toRotationMatrix(); }
-  Rigid3 inverse() const {
-    const Eigen::Quaterniond q = rotation.conjugate();
-    return {q, -(q * translation)};
-  }
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
-  // The product is normalised, so that long chains stay rotations.
-  Rigid3 operator*(const Rigid3& other) const {
-    return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
-  }
-};
 
 // Small motion from its tangent vector [translation m, rotation rad]; first-order coupling is left out, so that
 // translation and rotation stay independent coordinates: T(d) = (exp(d_rot), d_trans).

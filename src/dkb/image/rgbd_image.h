@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <memory>
+
 #include "dkb/image/image.h"
+#include "dkb_slam/frame.h"
 
 namespace dkb {
 
@@ -14,5 +18,11 @@ struct RgbdImage {
   ColourImage colour;          // empty for grey cameras
   DepthImage depth;            // [m], 0 = no data; same size as grey
 };
+
+// What a detector is shown of a frame, which must outlive it.
+DetectorInput detector_input(const Frame& frame);
+
+// The frame of an image whose stamps are known to the microsecond.
+Frame frame_of(std::shared_ptr<const RgbdImage> image);
 
 }  // namespace dkb

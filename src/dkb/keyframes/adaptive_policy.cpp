@@ -12,7 +12,7 @@ namespace dkb {
 namespace {
 
 // Median depth [m] of the features that show a map point; 0 when none has a depth.
-double median_depth(const KeyframeQuery& q) {
+double median_depth(const KeyframeContext& q) {
   std::vector<float> depths;
   for (size_t f = 0; f < q.points->size(); ++f)
     if ((*q.points)[f] != kNoPoint && q.features->keypoints[f].depth > 0)
@@ -97,7 +97,7 @@ void AdaptiveKeyframePolicy::study_keyframe(KeyframeId id, const Map& map) {
     }
 }
 
-AdaptiveKeyframePolicy::Matches AdaptiveKeyframePolicy::match(const KeyframeQuery& q,
+AdaptiveKeyframePolicy::Matches AdaptiveKeyframePolicy::match(const KeyframeContext& q,
                                                               const Rigid3& cam_from_keyframe) const {
   Matches result;
   const Eigen::Vector3d camera = centre_in_world(cam_from_keyframe);
@@ -111,7 +111,7 @@ AdaptiveKeyframePolicy::Matches AdaptiveKeyframePolicy::match(const KeyframeQuer
   return result;
 }
 
-KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Map& map) {
+KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const Map& map) {
   const Rigid3 cam_from_keyframe = q.cam_from_world * q.last_keyframe_cam_from_world.inverse();
   if (q.last_keyframe != reference_.keyframe) {
     reference_ = {q.last_keyframe, {}, cam_from_keyframe, q.tracked_points};

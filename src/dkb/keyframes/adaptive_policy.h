@@ -39,11 +39,11 @@ AdaptiveKeyframeOptions paper_keyframe_options();
 // The votes compare with the last keyframe as the map view shows it: while mapping has not published that keyframe,
 // only the floor decides. Frames must be offered one by one, since the gate averages over a window and the reference
 // frame is the first one after a keyframe. Deterministic.
-class AdaptiveKeyframePolicy final : public KeyframePolicy {
+class AdaptiveKeyframePolicy final : public KeyframeDecider {
  public:
   // The size [px] is that of the images. Throws InvalidOption.
   AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width, int image_height);
-  KeyframeDecision decide(const KeyframeQuery& query, const Map& map) override;
+  KeyframeDecision decide(const KeyframeContext& query, const Map& map) override;
 
  private:
   // The first frame after the last keyframe, as it was then.
@@ -67,7 +67,7 @@ class AdaptiveKeyframePolicy final : public KeyframePolicy {
   void study_keyframe(KeyframeId id, const Map& map);
   const KeyframePoint* find(PointId id) const;
   bool level_changed(const KeyframePoint& point, const Eigen::Vector3d& camera_in_keyframe) const;
-  Matches match(const KeyframeQuery& query, const Rigid3& cam_from_keyframe) const;
+  Matches match(const KeyframeContext& query, const Rigid3& cam_from_keyframe) const;
 
   AdaptiveKeyframeOptions options_;
   int image_width_, image_height_;

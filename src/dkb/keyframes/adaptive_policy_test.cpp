@@ -33,10 +33,10 @@ class Wall {
   }
 
   // The frame `frame` at `pose`, which tracks the first `tracked` points.
-  KeyframeQuery query(FrameIndex frame, const Rigid3& cam_from_world, int tracked = kSide * kSide) {
+  KeyframeContext query(FrameIndex frame, const Rigid3& cam_from_world, int tracked = kSide * kSide) {
     features_ = look(cam_from_world);
     std::fill(points_.begin() + tracked, points_.end(), kNoPoint);
-    KeyframeQuery q;
+    KeyframeContext q;
     q.frame = frame;
     q.last_keyframe_frame = 0;
     q.last_keyframe = 0;
@@ -181,7 +181,7 @@ TEST(AdaptiveKeyframes, HaveNoVoteWithoutMatches) {
 TEST(AdaptiveKeyframes, TheFloorKeepsTrackingAlive) {
   Wall wall;
   AdaptiveKeyframePolicy policy(all_levels(), 640, 480);
-  KeyframeQuery q = wall.query(2, {}, 150);
+  KeyframeContext q = wall.query(2, {}, 150);
   EXPECT_FALSE(policy.decide(q, wall.map()).insert);
   q.reference_points = 601;  // 150 < 0.25 * 601
   EXPECT_EQ(policy.decide(q, wall.map()).rule, KeyframeRule::floor);
@@ -230,10 +230,10 @@ TEST(AdaptiveKeyframes, MayMeasureTheWayByTheDepth) {
   Wall wall;  // without depths a percent of the depth is a centimetre; with depths of 4 m the same way counts a quarter
   AdaptiveKeyframeOptions options = all_levels();
   options.parallax.translation_unit = TranslationUnit::depth_percent;
-  const KeyframeQuery unknown = wall.query(1, moved_by(0.4));
+  const KeyframeContext unknown = wall.query(1, moved_by(0.4));
   EXPECT_NE(AdaptiveKeyframePolicy(options, 640, 480).decide(unknown, wall.map()).explanation.find("deg + 40.00"),
             std::string::npos);
-  KeyframeQuery far = wall.query(1, moved_by(0.4));
+  KeyframeContext far = wall.query(1, moved_by(0.4));
   RgbdFeatures deep = *far.features;
   for (Keypoint& k : deep.keypoints) k.depth = 4;
   far.features = &deep;
@@ -247,7 +247,7 @@ TEST(AdaptiveKeyframes, DoNotDependOnWhereTheWorldLies) {
     AdaptiveKeyframePolicy policy(all_levels(), 640, 480);
     std::string result;
     for (int i = 1; i < 8; ++i) {
-      KeyframeQuery q = wall.query(i, moved_by(0.05 * i));
+      KeyframeContext q = wall.query(i, moved_by(0.05 * i));
       // The reference frame was in the old world; from frame 2 on poses are in a world that a correction has moved.
       if (i > 1) {
         q.cam_from_world = q.cam_from_world * moved_world;
@@ -266,7 +266,7 @@ TEST(AdaptiveKeyframes, DoNotDependOnWhereTheWorldLies) {
 TEST(AdaptiveKeyframes, ExplainThemselvesWhenAsked) {
   Wall wall;
   AdaptiveKeyframePolicy policy(all_levels(), 640, 480);
-  KeyframeQuery q = wall.query(1, {});
+  KeyframeContext q = wall.query(1, {});
   EXPECT_NE(policy.decide(q, wall.map()).explanation.find("parallax 0.00 deg + 0.00 against T 30.00 (F 0.000): no"),
             std::string::npos);
   EXPECT_NE(

@@ -18,7 +18,7 @@ BaselineKeyframePolicy::BaselineKeyframePolicy(BaselineKeyframeOptions options) 
   options_.check();
 }
 
-KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeQuery& q, const Map&) {
+KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeContext& q, const Map&) {
   const bool settled = q.frame - q.last_relocalisation_frame > options_.frames_between;
   KeyframeDecision decision;
   KeyframeTests& tests = decision.tests;

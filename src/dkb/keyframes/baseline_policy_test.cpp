@@ -9,8 +9,8 @@ namespace {
 
 // A frame that just calls for a keyframe: 169 of the reference's 200 points are tracked, the limit being 0.85 * 200 =
 // 170.
-KeyframeQuery due() {
-  KeyframeQuery q;
+KeyframeContext due() {
+  KeyframeContext q;
   q.frame = 100;
   q.last_keyframe_frame = 90;
   q.mapper_idle = true;
@@ -21,13 +21,13 @@ KeyframeQuery due() {
   return q;
 }
 
-KeyframeDecision decide(const KeyframeQuery& q) {
+KeyframeDecision decide(const KeyframeContext& q) {
   const Map map;
   return BaselineKeyframePolicy({}).decide(q, map);
 }
 
 TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   const KeyframeDecision decision = decide(q);
   EXPECT_TRUE(decision.insert);
   EXPECT_EQ(decision.rule, KeyframeRule::baseline);
@@ -37,7 +37,7 @@ TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
 }
 
 TEST(BaselineKeyframes, SayWhichTestSpokeAndExplainItWhenAsked) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   EXPECT_TRUE(decide(q).tests.view_left);
   EXPECT_FALSE(decide(q).tests.close_points);
   EXPECT_TRUE(decide(q).explanation.empty());
@@ -49,7 +49,7 @@ TEST(BaselineKeyframes, SayWhichTestSpokeAndExplainItWhenAsked) {
 }
 
 TEST(BaselineKeyframes, AreMadeWhenCloseDepthsAreWasted) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   q.tracked_points = 200;  // the view has not been left
   q.tracked_close_points = 99;
   q.creatable_close_points = 70;
@@ -62,7 +62,7 @@ TEST(BaselineKeyframes, AreMadeWhenCloseDepthsAreWasted) {
 }
 
 TEST(BaselineKeyframes, WaitForTheMapperButNotForEver) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   q.mapper_idle = false;
   EXPECT_FALSE(decide(q).insert);
   q.last_keyframe_frame = 80;  // 20 frames ago
@@ -72,7 +72,7 @@ TEST(BaselineKeyframes, WaitForTheMapperButNotForEver) {
 }
 
 TEST(BaselineKeyframes, WaitAfterARelocalisation) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   q.last_relocalisation_frame = 80;
   EXPECT_FALSE(decide(q).insert);
   q.last_relocalisation_frame = 79;
@@ -80,7 +80,7 @@ TEST(BaselineKeyframes, WaitAfterARelocalisation) {
 }
 
 TEST(BaselineKeyframes, NeedEnoughTrackedPoints) {
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   q.tracked_points = 50;
   EXPECT_TRUE(decide(q).insert);
   q.tracked_points = 49;
@@ -97,7 +97,7 @@ TEST(BaselineKeyframes, EveryNumberIsAnOption) {
   EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);
   options = {};
   options.frames_between = 5;
-  KeyframeQuery q = due();
+  KeyframeContext q = due();
   q.mapper_idle = false;
   EXPECT_TRUE(BaselineKeyframePolicy(options).decide(q, map).insert);  // 10 frames since the last one
 }

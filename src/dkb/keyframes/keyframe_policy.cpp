@@ -15,6 +15,8 @@ const char* name_of(KeyframeRule rule) {
       return "adaptive";
     case KeyframeRule::floor:
       return "floor";
+    case KeyframeRule::own:
+      return "own";
     case KeyframeRule::none:
       break;
   }
@@ -40,6 +42,12 @@ void KeyframeTestCounts::add(const KeyframeTests& tests) {
   few_points += tests.few_points;
   close_points += tests.close_points;
   view_left += tests.view_left;
+}
+
+std::map<std::string, int> KeyframeTestCounts::by_name() const {
+  return {{"decisions", decisions},   {"waited", waited},         {"parallax", parallax},
+          {"votes_asked", votes_asked}, {"visibility", visibility}, {"spread", spread},
+          {"few_points", few_points}, {"close_points", close_points}, {"view_left", view_left}};
 }
 
 }  // namespace dkb

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +13,9 @@
 namespace dkb {
 
 // What a policy may know of a tracked frame.
-struct KeyframeQuery {
+struct KeyframeContext {
   FrameIndex frame = 0;
+  int64_t stamp_ns = 0, last_keyframe_stamp_ns = 0;
   FrameIndex last_keyframe_frame = 0;  // frame of the newest keyframe
   FrameIndex last_relocalisation_frame = -1000000;
   KeyframeId last_keyframe = kNoKeyframe;
@@ -26,10 +29,11 @@ struct KeyframeQuery {
   // Inliers: what was matched and where.
   const std::vector<PointId>* points = nullptr;  // per feature; kNoPoint where nothing was matched
   const RgbdFeatures* features = nullptr;
+  const std::vector<std::optional<Eigen::Vector3d>>* positions = nullptr;  // per feature: of its point [m]; a user's rule alone gets them
   bool explain = false;  // fill KeyframeDecision::explanation
 };
 
-enum class KeyframeRule { none, first, baseline, adaptive, floor };
+enum class KeyframeRule { none, first, baseline, adaptive, floor, own };
 const char* name_of(KeyframeRule rule);
 const char* yes_or_no(bool yes);  // for explanations
 
@@ -48,6 +52,7 @@ struct KeyframeTestCounts {
   int waited = 0, parallax = 0, votes_asked = 0, visibility = 0, spread = 0, few_points = 0, close_points = 0,
       view_left = 0;
   void add(const KeyframeTests& tests);
+  std::map<std::string, int> by_name() const;
 };
 
 struct KeyframeDecision {
@@ -62,10 +67,10 @@ std::string explained(const KeyframeDecision& decision);
 
 // Decides whether a tracked frame becomes a keyframe.
 // Deterministic: the same frames in the same order give the same decisions.
-class KeyframePolicy {
+class KeyframeDecider {
  public:
-  virtual ~KeyframePolicy() = default;
-  virtual KeyframeDecision decide(const KeyframeQuery& query, const Map& map) = 0;
+  virtual ~KeyframeDecider() = default;
+  virtual KeyframeDecision decide(const KeyframeContext& query, const Map& map) = 0;
 };
 
 // The rule published with ORB-SLAM2 (T-RO 2017) for RGB-D cameras, as restated in DKB section 3.2.
@@ -80,10 +85,10 @@ struct BaselineKeyframeOptions {
   void check() const;
 };
 
-class BaselineKeyframePolicy final : public KeyframePolicy {
+class BaselineKeyframePolicy final : public KeyframeDecider {
  public:
   explicit BaselineKeyframePolicy(BaselineKeyframeOptions options);
-  KeyframeDecision decide(const KeyframeQuery& query, const Map& map) override;
+  KeyframeDecision decide(const KeyframeContext& query, const Map& map) override;
 
  private:
   BaselineKeyframeOptions options_;

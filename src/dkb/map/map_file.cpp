@@ -30,6 +30,10 @@
 // stored that were fused into one that lives, which is all that Map::resolve() can tell of them.
 #include "dkb/map/map_file.h"
 
+#include <fmt/format.h>
+
+#include <array>
+
 #include "dkb/map/byte_stream.h"
 #include "dkb/map/map_sections.h"
 #include "dkb/util/errors.h"
@@ -138,6 +142,24 @@ void save_map(const std::filesystem::path& path, const Map& map, const MapFileCo
 
 MapFile load_map(const std::filesystem::path& path) {
   return decode_map(read_file(path), path.string());
+}
+
+void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
+  const auto numbers = [](const Camera& c) {
+    return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3};
+  };
+  const auto text = [](const Camera& c) {
+    return fmt::format("{}x{} fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
+  };
+  const Camera &a = of_map.camera, &b = wanted.camera;
+  if (a.width != b.width || a.height != b.height || numbers(a) != numbers(b))
+    throw InputError(fmt::format("{}: was made with another camera ({}) than this one ({}); give a map of this camera, "
+                                 "or the camera of the map",
+                                 name, text(a), text(b)));
+  if (of_map.levels != wanted.levels || of_map.scale_factor != wanted.scale_factor)
+    throw InputError(fmt::format("{}: was made with {} pyramid levels of {}; set features.levels={} and "
+                                 "features.scale={}",
+                                 name, of_map.levels, of_map.scale_factor, of_map.levels, of_map.scale_factor));
 }
 
 }  // namespace dkb

@@ -18,6 +18,9 @@ struct MapFileContext {
   void check() const;         // throws InvalidOption
 };
 
+// Throws InputError, which opens with `name` and says what to set, unless maps of both can be one.
+void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name);
+
 struct MapFile {
   Map map;
   MapFileContext context;

@@ -47,7 +47,7 @@ class LocalMapper {
 
   const Map& map() const { return map_; }
   const MappingReport& report() const { return report_; }
-  const StageTimes& times() const { return times_; }
+  StageTimes take_times() { return times_.take(); }  // durations since they were taken last
 
  private:
   void insert(const KeyframePacket& packet);

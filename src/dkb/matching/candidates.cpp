@@ -35,10 +35,11 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
   return c;
 }
 
-std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
-                                                 const CameraModel& camera, const Rigid3& cam_from_world,
+std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
+                                                 const MatchableFeatures& matchable, const CameraModel& camera, const Rigid3& cam_from_world,
                                                  double scale_factor, int levels, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
+  const RgbdFeatures& features = matchable.features;
   const Eigen::Matrix3f rotation = cam_from_world.matrix3().cast<float>();
   const Eigen::Vector3f translation = cam_from_world.translation.cast<float>();
   const Eigen::Vector3f centre = centre_in_world(cam_from_world).cast<float>();
@@ -74,7 +75,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     features.grid.for_each_near(u, v, radius, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
       if (k.octave < level - 1 || k.octave > level + 1) return;
-      if (k.suspect &&
+      if (matchable.on_mover(static_cast<size_t>(f)) &&
           (!c.established || (k.depth > 0 && std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z())))
         return;
       if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "dkb/features/rgbd_features.h"
+#include "dkb/features/frame_features.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/map.h"
@@ -48,8 +48,8 @@ struct ProjectionMatch {
 // Matches candidates to features near their projections. One match per feature and candidate: the smaller distance
 // wins, ties go to the earlier candidate. Features in `taken` (non-zero) are left alone. `visible` (when given) is set
 // to 1 for each candidate whose projection lies in view. Deterministic; result by increasing feature.
-std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates, const RgbdFeatures& features,
-                                                 const CameraModel& camera, const Rigid3& cam_from_world,
+std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
+                                                 const MatchableFeatures& matchable, const CameraModel& camera, const Rigid3& cam_from_world,
                                                  double scale_factor, int levels, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible);
 

@@ -41,7 +41,7 @@ FrameRecord write_frame(const Simulator& simulator, int index, const std::filesy
 
 // The camera file without the key `readout`, which is not known (see SimulatorOptions).
 std::string camera_file(const CameraModel& camera) {
-  std::string text = camera_to_yaml(camera);
+  std::string text = camera.to_yaml();
   const size_t start = text.find("readout:");
   if (start != std::string::npos) text.erase(start, text.find('\n', start) + 1 - start);
   return text;

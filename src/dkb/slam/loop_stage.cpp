@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/loop_stage.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "dkb/util/errors.h"
@@ -42,7 +43,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             result.ms = watch.ms();
             return result;
           },
-          threaded, ThreadPriority::background),
+          {.name = "loop search", .threaded = threaded, .priority = ThreadPriority::background}),
       adjustment_(
           [optics, local_ba, ba = options.global_ba](const Task& task) {
             const Stopwatch watch;
@@ -53,7 +54,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             result.ms = watch.ms();
             return result;
           },
-          threaded, ThreadPriority::background) {
+          {.name = "global bundle adjustment", .threaded = threaded, .priority = ThreadPriority::background}) {
   options_.check();
 }
 
@@ -62,7 +63,9 @@ void LoopStage::offer(const MapView& view, FrameIndex now, bool may_skip) {
   for (; next_ < view->keyframe_count(); ++next_) {
     if (!options_.loop.enabled || view->live_keyframe(next_) == nullptr) continue;
     if (may_skip && search_.outstanding() >= kMostLate) continue;
-    search_.push({view, next_, generation_}, now + options_.loop_latency(keyframes));
+    // Never before the search before it, however many keyframes were culled meanwhile.
+    search_due_ = std::max(search_due_, now + options_.loop_latency(keyframes));
+    search_.push({view, next_, generation_}, search_due_);
   }
   if (adjustment_wanted_ && adjustment_.outstanding() == 0) {
     adjustment_.push({view, kNoKeyframe, generation_}, now + options_.global_ba_latency(keyframes));
@@ -76,7 +79,6 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
     times_.add("loop", found->ms);
     if (!found->correction || found->generation != generation_) continue;
     ++generation_;
-    ++(found->correction->kind == MapCorrection::Kind::merge ? merges_ : loops_);
     adjustment_wanted_ = true;
     corrections.push_back(std::move(found->correction));
   }

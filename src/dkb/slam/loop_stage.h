@@ -8,6 +8,7 @@
 #include "dkb/loop/global_adjustment.h"
 #include "dkb/loop/loop_closer.h"
 #include "dkb/util/due_stage.h"
+#include "dkb/util/timing.h"
 
 namespace dkb {
 
@@ -46,10 +47,8 @@ class LoopStage {
   // Corrections due at `now`, in the order in which mapping must take them.
   std::vector<std::shared_ptr<const MapCorrection>> take_due(FrameIndex now, bool wait);
   bool idle() const { return search_.outstanding() == 0 && adjustment_.outstanding() == 0 && !adjustment_wanted_; }
-  int loops() const { return loops_; }
-  int merges() const { return merges_; }
-  // Durations so far: loop, global_ba, of the results that were taken.
-  const StageTimes& times() const { return times_; }
+  // Durations of loop and global_ba since they were taken last, of the results that were taken.
+  StageTimes take_times() { return times_.take(); }
 
  private:
   struct Task {
@@ -68,8 +67,8 @@ class LoopStage {
   int closed_generation_ = -1;  // likewise: where it found the last loop
   int generation_ = 0;          // corrections handed out that moved the map by a loop or a merge
   KeyframeId next_ = 0;         // the first keyframe that was not offered yet
+  FrameIndex search_due_ = 0;   // of the search pushed last
   bool adjustment_wanted_ = false;
-  int loops_ = 0, merges_ = 0;
   StageTimes times_;
   DueStage<Task, Result> search_, adjustment_;  // last: their threads use the above
 };

@@ -7,11 +7,11 @@
 namespace dkb {
 
 MappingStage::MappingStage(LocalMapper mapper, bool threaded)
-    : mapper_(std::move(mapper)), stage_([this](const Task& task) { return work(task); }, threaded) {}
+    : mapper_(std::move(mapper)), stage_([this](const Task& task) { return work(task); }, {.name = "mapping", .threaded = threaded}) {}
 
 MappingStage::Result MappingStage::work(const Task& task) {
-  if (task.correction) return {mapper_.apply(*task.correction), true};
-  return {mapper_.process(task.packet), false};
+  MapView view = task.correction ? mapper_.apply(*task.correction) : mapper_.process(task.packet);
+  return {std::move(view), task.correction != nullptr, mapper_.report(), mapper_.take_times()};
 }
 
 void MappingStage::push(KeyframePacket packet, FrameIndex due) {
@@ -28,6 +28,8 @@ std::optional<MapView> MappingStage::take_due(FrameIndex now, bool wait) {
   while (auto result = stage_.take_due(now, wait)) {
     newest = std::move(result->view);
     corrections_ -= result->of_correction ? 1 : 0;
+    report_ = result->report;
+    times_.merge(result->times);
   }
   return newest;
 }

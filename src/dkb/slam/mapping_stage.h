@@ -6,6 +6,7 @@
 
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/util/due_stage.h"
+#include "dkb/util/timing.h"
 
 namespace dkb {
 
@@ -26,9 +27,10 @@ class MappingStage {
   size_t outstanding_corrections() const { return corrections_; }
   // Waits for all outstanding work.
   std::optional<MapView> drain();
-  // Ends the thread; the mapper may be looked at afterwards.
-  void stop() { stage_.stop(); }
-  const LocalMapper& mapper() const { return mapper_; }  // only after stop(), or without a thread
+  // What the mapper did, up to the view taken last.
+  const MappingReport& report() const { return report_; }
+  // Its stages' durations since they were taken last, likewise.
+  StageTimes take_times() { return times_.take(); }
 
  private:
   struct Task {  // one of the two
@@ -38,10 +40,14 @@ class MappingStage {
   struct Result {
     MapView view;
     bool of_correction = false;
+    MappingReport report;
+    StageTimes times;
   };
   Result work(const Task& task);
 
   LocalMapper mapper_;
+  MappingReport report_;
+  StageTimes times_;
   size_t corrections_ = 0;        // outstanding ones
   DueStage<Task, Result> stage_;  // last: its thread uses the mapper
 };

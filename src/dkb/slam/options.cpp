@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/options.h"
 
+#include <algorithm>
+#include <sstream>
+
 #include "dkb/util/errors.h"
+#include "dkb_slam/options.h"
 
 namespace dkb {
 
@@ -244,21 +248,21 @@ void bind_settings(Settings& s, SlamOptions& o) {
           {"paper", FilterKind::paper},
           {"default", FilterKind::standard}},
          "which features are kept from tracking");
-  s.bind("dynamics.paper.flow_threshold", &d.paper.flow_threshold, "[px] d_th (DKB eq. 9)");
-  s.bind("dynamics.paper.compensate", &d.paper.compensate, "flow against the camera's own motion; false = raw eq. 9");
-  s.bind("dynamics.epipolar.threshold", &d.epipolar.threshold, "[px] distance to the epipolar line");
-  s.bind("dynamics.multiview.depth_step", &d.multiview.depth_step, "[m] before what earlier keyframes saw");
-  s.bind("dynamics.multiview.radius", &d.multiview.radius, "[px] around such a spot");
-  s.bind("dynamics.multiview.keyframes", &d.multiview.keyframes, "earlier keyframes compared");
-  s.bind("dynamics.silhouette.cell", &d.silhouette.cell, "[px] grid on which depth is looked at");
-  s.bind("dynamics.silhouette.core", &d.silhouette.core, "share of a box in which the object is sought");
-  s.bind("dynamics.silhouette.least_share", &d.silhouette.least_share,
+  s.bind("dynamics.paper.flow_threshold", &d.rivals.paper.flow_threshold, "[px] d_th (DKB eq. 9)");
+  s.bind("dynamics.paper.compensate", &d.rivals.paper.compensate, "flow against the camera's own motion; false = raw eq. 9");
+  s.bind("dynamics.epipolar.threshold", &d.rivals.epipolar.threshold, "[px] distance to the epipolar line");
+  s.bind("dynamics.multiview.depth_step", &d.rivals.multiview.depth_step, "[m] before what earlier keyframes saw");
+  s.bind("dynamics.multiview.radius", &d.rivals.multiview.radius, "[px] around such a spot");
+  s.bind("dynamics.multiview.keyframes", &d.rivals.multiview.keyframes, "earlier keyframes compared");
+  s.bind("dynamics.silhouette.cell", &d.carried.silhouette.cell, "[px] grid on which depth is looked at");
+  s.bind("dynamics.silhouette.core", &d.carried.silhouette.core, "share of a box in which the object is sought");
+  s.bind("dynamics.silhouette.least_share", &d.carried.silhouette.least_share,
          "of the core's weight that the object's depth layer needs");
-  s.bind("dynamics.silhouette.layer", &d.silhouette.layer, "half-width of that layer relative to its depth");
-  s.bind("dynamics.silhouette.step", &d.silhouette.step, "relative depth step within one surface");
-  s.bind("dynamics.silhouette.reach", &d.silhouette.reach, "[m] parts of an object before or behind its layer");
-  s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
-  s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
+  s.bind("dynamics.silhouette.layer", &d.carried.silhouette.layer, "half-width of that layer relative to its depth");
+  s.bind("dynamics.silhouette.step", &d.carried.silhouette.step, "relative depth step within one surface");
+  s.bind("dynamics.silhouette.reach", &d.carried.silhouette.reach, "[m] parts of an object before or behind its layer");
+  s.bind("dynamics.silhouette.margin", &d.carried.silhouette.margin, "share by which boxes are widened");
+  s.bind("dynamics.silhouette.rim", &d.carried.silhouette.rim, "[cells] by which silhouettes are widened");
   s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
   s.bind("dynamics.motion.views_per_frame", &d.motion.views_per_frame, "past views compared with each frame");
   s.bind("dynamics.motion.settle", &d.motion.settle,
@@ -282,9 +286,9 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.motion.lone_hole", &d.motion.lone_hole,
          "share of the image from which missing depth may be a mover by itself");
   s.bind("dynamics.support_cell", &d.support_cell, "[px] the same when it only supports another detector");
-  s.bind("dynamics.flow.window", &d.flow.window, "[px] of optical flow");
-  s.bind("dynamics.points_per_box", &d.points_per_box, "features followed to carry a box");
-  s.bind("dynamics.missed_results", &d.missed_results,
+  s.bind("dynamics.flow.window", &d.carried.flow.window, "[px] of optical flow");
+  s.bind("dynamics.points_per_box", &d.carried.points_per_box, "features followed to carry a box");
+  s.bind("dynamics.missed_results", &d.carried.missed_results,
          "detector results that may miss an object before its box is dropped");
   s.bind("dynamics.evidence_sightings", &o.evidence.sightings, "times on a mover before a map point is retracted");
 
@@ -307,6 +311,68 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency,
          "[frames] after which a keyframe's mapping becomes visible");
   s.bind("pipeline.mapper_queue", &o.pipeline.mapper_queue, "[keyframes] outstanding at most in a real-time run");
+}
+
+Options::Options(const std::string& name) : values_(std::make_unique<SlamOptions>(preset(name))) {}
+Options::Options(const Options& other)
+    : threaded(other.threaded),
+      realtime(other.realtime),
+      dense_map(other.dense_map),
+      base_from_cam(other.base_from_cam),
+      values_(std::make_unique<SlamOptions>(*other.values_)) {}
+Options& Options::operator=(const Options& other) {
+  if (this == &other) return *this;
+  threaded = other.threaded;
+  realtime = other.realtime;
+  dense_map = other.dense_map;
+  base_from_cam = other.base_from_cam;
+  *values_ = *other.values_;
+  return *this;
+}
+Options::~Options() = default;
+
+void Options::set(const std::string& key, const std::string& value, const std::string& where) {
+  Settings settings;
+  bind_settings(settings, *values_);
+  settings.set(key, value, where.empty() ? "settings" : where);
+}
+
+void Options::assign(const std::string& assignment, const std::string& where) {
+  Settings settings;
+  bind_settings(settings, *values_);
+  settings.set_assignment(assignment, where.empty() ? "settings" : where);
+}
+
+void Options::load(const std::filesystem::path& path) {
+  Settings settings;
+  bind_settings(settings, *values_);
+  settings.load_yaml(path);
+}
+
+void Options::disable(const std::string& list) {
+  const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
+  DisabledParts parts;
+  bool* const switches[] = {&parts.dynamic_removal, &parts.keyframes, &parts.weighted_ba, &parts.loop};
+  std::istringstream names(list);
+  for (std::string name; std::getline(names, name, ',');) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end())
+      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
+                       "; parts: dr, kf, ba, loop");
+    *switches[at - known.begin()] = true;
+  }
+  disable_parts(*values_, parts);
+}
+
+std::string Options::to_yaml() const {
+  SlamOptions values = *values_;
+  Settings settings;
+  bind_settings(settings, values);
+  return settings.to_yaml();
+}
+
+void Options::check() const {
+  values_->check();
 }
 
 }  // namespace dkb

@@ -14,7 +14,7 @@
 #include "dkb/keyframes/adaptive_policy.h"
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
-#include "dkb/slam/dynamic_stage.h"
+#include "dkb/slam/scene_stage.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/readout_calibration.h"
 #include "dkb/tracking/tracker.h"
@@ -49,6 +49,7 @@ struct SlamOptions {
   PointEvidenceOptions evidence;
   MoverTrackerOptions movers;
   DenseOptions dense;
+  bool dense_map = false;  // keep what the dense map is made of
   PipelineOptions pipeline;
   uint64_t seed = 1;     // reaches every source of randomness
   Rigid3 base_from_cam;  // mount: the world is the robot's base at the first tracked frame

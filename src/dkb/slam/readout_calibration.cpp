@@ -28,7 +28,7 @@ ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNo
 }
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
-                             const std::function<std::optional<Eigen::Vector3d>(PointId)>& position_of) {
+                             const std::vector<std::optional<Eigen::Vector3d>>& positions) {
   if (known_ || velocity.isZero()) return;
   // Normal equations of [pose, readout]: pixel error = J pose + d readout.
   Matrix6d pose_pose = Matrix6d::Zero();
@@ -36,8 +36,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
   double readout_readout = 0, readout_gradient = 0;
   int matches = 0;
   for (size_t f = 0; f < frame.points.size(); ++f) {
-    if (frame.points[f] == kNoPoint) continue;
-    const auto position = position_of(frame.points[f]);
+    const auto& position = positions[f];
     if (!position) continue;
     const Eigen::Vector3d p = frame.cam_from_world * *position;
     if (p.z() < 0.1) continue;

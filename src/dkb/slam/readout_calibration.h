@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <optional>
+#include <vector>
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
@@ -30,9 +30,11 @@ class ReadoutCalibration {
 
   // [s] to be used for the next frame; the camera file's own where it has one.
   double readout() const { return readout_; }
-  // A tracked frame, whose features were made with readout(), and the camera's motion then [m/s, rad/s].
+  bool known() const { return known_; }
+  // A tracked frame, whose features were made with readout(), the camera's motion then [m/s, rad/s], and where in the
+  // world the map points are that its features show [m].
   void add(const TrackedFrame& frame, const Vector6d& velocity,
-           const std::function<std::optional<Eigen::Vector3d>(PointId)>& position_of);
+           const std::vector<std::optional<Eigen::Vector3d>>& positions);
 
  private:
   CameraModel camera_;

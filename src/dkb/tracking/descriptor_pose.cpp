@@ -7,15 +7,15 @@
 namespace dkb {
 
 std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoint>& known,
-                                                  const RgbdFeatures& features, const CameraModel& camera,
+                                                  const MatchableFeatures& matchable, const CameraModel& camera,
                                                   const SensorNoise& noise, double scale_factor, int least_matches,
                                                   const RansacOptions& ransac) {
+  const RgbdFeatures& features = matchable.features;
   std::vector<Descriptor> descriptors;
   descriptors.reserve(known.size());
   for (const DescribedPoint& k : known) descriptors.push_back(k.descriptor);
   std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
-  std::erase_if(matches,
-                [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
+  std::erase_if(matches, [&](const DescriptorMatch& m) { return matchable.on_mover(static_cast<size_t>(m.b)); });
   if (static_cast<int>(matches.size()) < least_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   observations.reserve(matches.size());

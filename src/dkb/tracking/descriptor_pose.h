@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "dkb/features/rgbd_features.h"
+#include "dkb/features/frame_features.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
@@ -31,7 +31,7 @@ struct DescriptorPose {
 // by descriptor alone, and RANSAC seeks the pose that most matches agree on. Features that may lie on movers take no
 // part. Nothing with fewer than `least_matches` matches or where RANSAC finds no pose. Deterministic for a seed.
 std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoint>& known,
-                                                  const RgbdFeatures& features, const CameraModel& camera,
+                                                  const MatchableFeatures& matchable, const CameraModel& camera,
                                                   const SensorNoise& noise, double scale_factor, int least_matches,
                                                   const RansacOptions& ransac);
 

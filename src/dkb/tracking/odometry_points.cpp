@@ -37,7 +37,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
   points_.clear();
   for (size_t f = 0; f < frame.points.size(); ++f) {
     const Keypoint& k = frame.features->keypoints[f];
-    if (frame.points[f] != kNoPoint || frame.outlier[f] || k.suspect) continue;
+    if (frame.points[f] != kNoPoint || frame.outlier[f] || frame.matchable().on_mover(f)) continue;
     Point p;
     p.feature = static_cast<int>(f);
     p.guessed = !(k.depth > 0);

@@ -50,9 +50,9 @@ Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, do
   options_.check();
 }
 
-std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores,
-                                              const LooksTheSame& looks_the_same) const {
-  std::vector<PoseProposal> proposals = propose(map, features, ignores, looks_the_same);
+std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                              PointAppearance* appearance) const {
+  std::vector<PoseProposal> proposals = propose(map, features, ignores, appearance);
   int most = 0;
   for (const PoseProposal& p : proposals) most = std::max(most, p.inliers);
   std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < options_.ambiguity * most; });
@@ -68,11 +68,11 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures
   return std::move(best);
 }
 
-std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeatures& features,
-                                               const IgnoresPoint& ignores, const LooksTheSame& looks_the_same) const {
+std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFeatures& features,
+                                               const IgnoresPoint& ignores, PointAppearance* appearance) const {
   std::vector<Descriptor> still;
-  for (size_t f = 0; f < features.size(); ++f)
-    if (!features.keypoints[f].suspect) still.push_back(features.descriptors[f]);
+  for (size_t f = 0; f < features.features.size(); ++f)
+    if (!features.on_mover(f)) still.push_back(features.features.descriptors[f]);
   std::vector<PoseProposal> proposals;
   for (const PlaceMatch& like : map.similar_keyframes(still, static_cast<size_t>(options_.candidates))) {
     // A keyframe that sees what an earlier one led to would lead there again.
@@ -85,15 +85,15 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeature
       return shared >= options_.least_matches;
     });
     if (explained) continue;
-    if (auto proposal = propose_from(map, like.id, features, ignores, looks_the_same))
+    if (auto proposal = propose_from(map, like.id, features, ignores, appearance))
       proposals.push_back(std::move(*proposal));
   }
   return proposals;
 }
 
-std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
+std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                                       const IgnoresPoint& ignores,
-                                                      const LooksTheSame& looks_the_same) const {
+                                                      PointAppearance* appearance) const {
   PoseProposal proposal;
   proposal.keyframe = keyframe;
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
@@ -103,12 +103,12 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   std::erase_if(around, [&](const Candidate& c) { return ignores(c.id); });
   if (!search(around, options_.radius, features, proposal)) return std::nullopt;
   if (!search(around, options_.radius_fine, features, proposal)) return std::nullopt;
-  verify(map, around, features, looks_the_same, proposal);
+  verify(map, around, features, appearance, proposal);
   return proposal;
 }
 
 // By descriptors alone.
-std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, const RgbdFeatures& features,
+std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, const MatchableFeatures& features,
                                                const IgnoresPoint& ignores, std::vector<PointId>& points) const {
   std::vector<DescribedPoint> known;
   const Keyframe& keyframe = *map.keyframe(id);
@@ -136,7 +136,7 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
 }
 
 // Matches the map around anew under the proposal's pose and refines it.
-bool Relocaliser::search(const std::vector<Candidate>& around, double radius, const RgbdFeatures& features,
+bool Relocaliser::search(const std::vector<Candidate>& around, double radius, const MatchableFeatures& features,
                          PoseProposal& proposal) const {
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
@@ -144,14 +144,14 @@ bool Relocaliser::search(const std::vector<Candidate>& around, double radius, co
                                            match, nullptr, nullptr);
   std::vector<PoseObservation> observations;
   for (const ProjectionMatch& m : matches)
-    observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
+    observations.push_back(pose_observation(features.features.keypoints[static_cast<size_t>(m.feature)],
                                             around[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
   const PoseEstimate pose = optimise_pose(camera_, proposal.cam_from_world, observations);
   if (!pose.ok || pose.inliers < options_.least_agreeing) return false;
   proposal.cam_from_world = pose.cam_from_world;
   proposal.inliers = pose.inliers;
   proposal.position_sd = std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
-  proposal.points.assign(features.size(), kNoPoint);
+  proposal.points.assign(features.features.size(), kNoPoint);
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
       proposal.points[static_cast<size_t>(matches[i].feature)] = around[static_cast<size_t>(matches[i].candidate)].id;
@@ -160,8 +160,8 @@ bool Relocaliser::search(const std::vector<Candidate>& around, double radius, co
 
 // What the map would have in view from there must be found, or at least look as it did. In a room that only looks alike
 // most things do, but some are others, and those are told by the points that no feature was matched with.
-void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
-                         const LooksTheSame& looks_the_same, PoseProposal& proposal) const {
+void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const MatchableFeatures& features,
+                         PointAppearance* appearance, PoseProposal& proposal) const {
   std::vector<PointId> matched;
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
@@ -179,12 +179,12 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, c
       ++proposal.alike;
       continue;
     }
-    if (!looks_the_same) continue;
+    if (appearance == nullptr) continue;
     const Eigen::Vector3d in_cam = proposal.cam_from_world * c.position;
     const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
     const int octave =
         std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(scale_factor_))), 0, levels_ - 1);
-    const auto same = looks_the_same(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
+    const auto same = appearance->same(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
     if (!same) continue;
     ++(*same ? proposal.alike : proposal.changed);
   }

@@ -5,7 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "dkb/features/rgbd_features.h"
+#include "dkb/features/frame_features.h"
+#include "dkb/features/image_appearance.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
@@ -46,11 +47,6 @@ struct PoseProposal {
   double alike_share() const { return alike + changed > 0 ? static_cast<double>(alike) / (alike + changed) : 1; }
 };
 
-// How a place of the image looks compared with a map point that ought to be there: nothing where it cannot be told,
-// else whether it looks the same. `pixel` [px] is ideal, `depth` [m] the point's; `octave` is the pyramid level.
-using LooksTheSame = std::function<std::optional<bool>(const Eigen::Vector2d& pixel, double depth, int octave,
-                                                       const Descriptor& descriptor)>;
-
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the
 // frame, seeks a pose by RANSAC and searches the map around it. Without any idea of where the camera was.
 // Deterministic for a seed. Features that may lie on movers take no part.
@@ -62,24 +58,24 @@ class Relocaliser {
   // True for points that must not be matched.
   using IgnoresPoint = std::function<bool(PointId)>;
 
-  // `looks_the_same` may be empty: then only what features tell is verified.
+  // `appearance` may be null: then only what features tell is verified.
   // The verified pose; nothing when there is none, or when poses at different places explain the frame nearly as well.
-  std::optional<PoseProposal> find(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores,
-                                   const LooksTheSame& looks_the_same) const;
+  std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                   PointAppearance* appearance) const;
   // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
-  std::vector<PoseProposal> propose(const Map& map, const RgbdFeatures& features, const IgnoresPoint& ignores,
-                                    const LooksTheSame& looks_the_same) const;
+  std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                    PointAppearance* appearance) const;
   // The pose that this one keyframe leads to, verified or not.
-  std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
-                                           const IgnoresPoint& ignores, const LooksTheSame& looks_the_same) const;
+  std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
+                                           const IgnoresPoint& ignores, PointAppearance* appearance) const;
 
  private:
-  std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const RgbdFeatures& features,
+  std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                     const IgnoresPoint& ignores, std::vector<PointId>& points) const;
-  bool search(const std::vector<Candidate>& around, double radius, const RgbdFeatures& features,
+  bool search(const std::vector<Candidate>& around, double radius, const MatchableFeatures& features,
               PoseProposal& proposal) const;
-  void verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
-              const LooksTheSame& looks_the_same, PoseProposal& proposal) const;
+  void verify(const Map& map, const std::vector<Candidate>& around, const MatchableFeatures& features,
+              PointAppearance* appearance, PoseProposal& proposal) const;
 
   CameraModel camera_;
   SensorNoise noise_;

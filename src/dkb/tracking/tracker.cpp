@@ -37,20 +37,6 @@ void TrackingOptions::check() const {
   relocalisation.check();
 }
 
-const char* name_of(TrackingState state) {
-  switch (state) {
-    case TrackingState::initialising:
-      return "initialising";
-    case TrackingState::tracking:
-      return "tracking";
-    case TrackingState::lost:
-      return "lost";
-    case TrackingState::relocalised:
-      return "relocalised";
-  }
-  return "?";
-}
-
 Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
                  const TrackingOptions& options, uint64_t seed)
     : camera_(camera),
@@ -60,36 +46,17 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       options_(options),
       seed_(seed),
       relocaliser_(camera, noise, scale_factor, levels, options.relocalisation, options.local_map, seed),
-      view_(std::make_shared<const Map>()),
       odometry_(camera, scale_factor, options.close_depth) {
   options_.check();
   noise_.check();
 }
 
-Rigid3 Tracker::keyframe_pose(KeyframeId id) const {
-  if (view_->keyframe(id) != nullptr) return view_->cam_from_world(id);
-  for (const PendingKeyframe& p : pending_)
-    if (p.id == id)
-      return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * keyframe_pose(p.reference);
-  return {};
-}
-
-KeyframeId Tracker::root(KeyframeId id) const {
-  while (view_->keyframe(id) == nullptr) {
-    const auto pending = std::find_if(pending_.begin(), pending_.end(), [id](const auto& p) { return p.id == id; });
-    if (pending == pending_.end() || pending->reference == kNoKeyframe) return id;
-    id = pending->reference;
-  }
-  return view_->root(id);
-}
-
 Rigid3 Tracker::take_view(MapView view) {
-  view_ = std::move(view);
+  map_.take_view(std::move(view));
   candidates_made_ = -1;
-  std::erase_if(pending_, [&](const PendingKeyframe& p) { return view_->keyframe(p.id) != nullptr; });
-  std::erase_if(provisional_, [&](const auto& p) { return view_->keyframe(p.second.keyframe) != nullptr; });
+  std::erase_if(provisional_, [&](const auto& p) { return map_.view().keyframe(p.second.keyframe) != nullptr; });
   std::erase_if(retracted_, [&](PointId id) {
-    return view_->keyframe(birth_keyframe(id)) != nullptr && view_->point(id) == nullptr;
+    return map_.view().keyframe(birth_keyframe(id)) != nullptr && map_.view().point(id) == nullptr;
   });
   if (sighting_) express_anew(*sighting_);
   if (!last_) return {};
@@ -98,12 +65,12 @@ Rigid3 Tracker::take_view(MapView view) {
 
 // A frame's pose and points by the view as it is now; how the world moved under its camera.
 Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
-  const Rigid3 moved = frame.cam_from_reference * keyframe_pose(frame.reference);
+  const Rigid3 moved = frame.cam_from_reference * map_.cam_from_world(frame.reference);
   const Rigid3 new_world_from_old = moved.inverse() * frame.cam_from_world;
   frame.cam_from_world = moved;
   std::set<PointId> seen;  // two features may show points that have been fused since: the first keeps it
   for (PointId& p : frame.points) {
-    if (p != kNoPoint && !provisional_.contains(p)) p = view_->resolve(p);
+    if (p != kNoPoint && !provisional_.contains(p)) p = map_.view().resolve(p);
     if (p != kNoPoint && !seen.insert(p).second) p = kNoPoint;
   }
   return new_world_from_old;
@@ -115,21 +82,28 @@ Rigid3 Tracker::expected_motion(double seconds) const {
 }
 
 std::optional<Eigen::Vector3d> Tracker::position(PointId id) const {
-  if (const MapPoint* p = view_->point(id)) return p->position;
+  if (const MapPoint* p = map_.view().point(id)) return p->position;
   const auto it = provisional_.find(id);
   if (it == provisional_.end()) return std::nullopt;
-  return keyframe_pose(it->second.keyframe).inverse() * it->second.point_in_keyframe;
+  return map_.cam_from_world(it->second.keyframe).inverse() * it->second.point_in_keyframe;
+}
+
+std::vector<std::optional<Eigen::Vector3d>> Tracker::positions(const std::vector<PointId>& points) const {
+  std::vector<std::optional<Eigen::Vector3d>> result(points.size());
+  for (size_t i = 0; i < points.size(); ++i)
+    if (points[i] != kNoPoint) result[i] = position(points[i]);
+  return result;
 }
 
 int Tracker::reference_point_count(KeyframeId reference, int observers) const {
-  const Keyframe* k = view_->live_keyframe(reference);
+  const Keyframe* k = map_.view().live_keyframe(reference);
   int count = 0;
   if (k == nullptr) {
     for (const auto& [id, p] : provisional_) count += p.keyframe == reference;
     return count;
   }
   for (PointId id : k->points)
-    if (const MapPoint* p = view_->point(id)) count += static_cast<int>(p->observations.size()) >= observers;
+    if (const MapPoint* p = map_.view().point(id)) count += static_cast<int>(p->observations.size()) >= observers;
   return count;
 }
 
@@ -137,7 +111,7 @@ void Tracker::reset_motion() {
   velocity_.reset();
   last_.reset();
   odometry_.clear();
-  state_ = view_->keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
+  state_ = map_.view().keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
 }
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match) const {
@@ -162,35 +136,36 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
   if (candidates_made_ >= 0 && index - candidates_made_ < options_.refresh_frames) return;
-  candidates_ = local_map_candidates(points, *view_, options_.local_map);
+  candidates_ = local_map_candidates(points, map_.view(), options_.local_map);
   for (Candidate& c : candidates_) c.established = established(c.id, index);
   candidates_made_ = index;
 }
 
 bool Tracker::established(PointId id, FrameIndex now) const {
-  const MapPoint* p = view_->point(id);
+  const MapPoint* p = map_.view().point(id);
   if (p == nullptr || p->observations.size() < 2) return false;
-  return view_->keyframe(birth_keyframe(id))->frame + options_.established_frames <= now;
+  return map_.view().keyframe(birth_keyframe(id))->frame + options_.established_frames <= now;
 }
 
 // Features on movers that showed no well-known point end here: mapping never sees them.
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.source.clear();
   for (size_t f = 0; f < frame.points.size(); ++f)
-    if (!frame.features->keypoints[f].suspect || frame.points[f] != kNoPoint)
-      frame.source.push_back(static_cast<int>(f));
-  if (frame.source.size() == frame.points.size()) return;
-  RgbdFeatures left = subset(*frame.features, frame.source);
-  for (Keypoint& k : left.keypoints) k.suspect = false;
-  frame.features = std::make_shared<const RgbdFeatures>(std::move(left));
-  for (size_t k = 0; k < frame.source.size(); ++k) {
-    frame.points[k] = frame.points[static_cast<size_t>(frame.source[k])];
-    frame.outlier[k] = frame.outlier[static_cast<size_t>(frame.source[k])];
-    frame.odometry[k] = frame.odometry[static_cast<size_t>(frame.source[k])];
+    if (!frame.matchable().on_mover(f) || frame.points[f] != kNoPoint) frame.source.push_back(static_cast<int>(f));
+  const size_t left = frame.source.size();
+  if (left == frame.points.size()) return;
+  frame.features = std::make_shared<const RgbdFeatures>(subset(*frame.features, frame.source));
+  for (size_t k = 0; k < left; ++k) {
+    const auto f = static_cast<size_t>(frame.source[k]);
+    frame.points[k] = frame.points[f];
+    frame.outlier[k] = frame.outlier[f];
+    frame.odometry[k] = frame.odometry[f];
+    frame.motion[k] = frame.motion[f];
   }
-  frame.odometry.resize(frame.source.size());
-  frame.points.resize(frame.source.size());
-  frame.outlier.resize(frame.source.size());
+  frame.points.resize(left);
+  frame.outlier.resize(left);
+  frame.odometry.resize(left);
+  frame.motion.resize(left);
 }
 
 bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
@@ -227,7 +202,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   match.ratio = static_cast<float>(options_.match_ratio);
   std::vector<uint8_t> visible(candidates.size(), 0);
   const auto matches =
-      match_by_projection(candidates, features, camera_, initial, scale_factor_, levels_, match, &taken, &visible);
+      match_by_projection(candidates, frame.matchable(), camera_, initial, scale_factor_, levels_, match, &taken, &visible);
   for (const auto& m : matches)
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
@@ -239,7 +214,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
     for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
     const std::vector<Candidate> others = odometry_.candidates(*last_);
     for (const auto& m :
-         match_by_projection(others, features, camera_, initial, scale_factor_, levels_, match, &taken, nullptr)) {
+         match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match, &taken, nullptr)) {
       const auto c = static_cast<size_t>(m.candidate);
       pairs.push_back(odometry_pair(m.feature, {others[c].position, odometry_.guessed(c)}));
     }
@@ -254,8 +229,9 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   for (PointId id : matched) ++sightings_[id].visible;
   // A guessed depth is let pass more; not where a mover may be.
   const auto strays = [&](const Pair& pair) {
-    const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
-    if (pair.use_depth || !k.by_mover) return false;
+    const auto f = static_cast<size_t>(pair.feature);
+    if (pair.use_depth || frame.matchable().motion_of(f) == FeatureMotion::still) return false;
+    const Keypoint& k = features.keypoints[f];
     const double sigma = pose_observation(k, pair.point_in_world, noise_, scale_factor_).pixel_sigma;
     const Eigen::Vector2d seen = camera_.project(pose.cam_from_world * pair.point_in_world);
     return (seen - k.pixel.cast<double>()).squaredNorm() > PoseOptions().chi2_pixel * sigma * sigma;
@@ -283,7 +259,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
 }
 
 void Tracker::finish(TrackedFrame& frame) {
-  KeyframeId reference = keyframe_sharing_most(frame.points, *view_);
+  KeyframeId reference = keyframe_sharing_most(frame.points, map_.view());
   // A keyframe that is still being mapped is the reference while most matches are its provisional points.
   std::map<KeyframeId, int> pending_votes;
   int lasting = 0;
@@ -298,7 +274,7 @@ void Tracker::finish(TrackedFrame& frame) {
   for (const auto& [keyframe, votes] : pending_votes)
     if (reference == kNoKeyframe || votes > lasting) reference = keyframe;
   frame.reference = reference;
-  frame.cam_from_reference = frame.cam_from_world * keyframe_pose(reference).inverse();
+  frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(reference).inverse();
 }
 
 Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
@@ -310,8 +286,8 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
 
 // Features and pose as they are when the camera's motion within the image is known. The frame keeps what it has when
 // that does not explain it.
-void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const {
-  auto features = features_at(velocity);
+void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& made, TrackedFrame& frame) const {
+  auto features = made.at(velocity);
   std::vector<Pair> pairs;
   int in_map = 0;
   for (size_t f = 0; f < frame.points.size(); ++f)
@@ -341,15 +317,15 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
 // Rooms that look alike are told apart by where the camera can have come to.
 bool Tracker::within_reach(const PoseProposal& found, double timestamp) const {
   if (!last_) return true;
-  if (root(last_->reference) != root(found.keyframe)) return false;
+  if (map_.root(last_->reference) != map_.root(found.keyframe)) return false;
   const RelocalisationOptions& o = options_.relocalisation;
   const double way = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
   return way <= o.reach + o.reach_per_second * (timestamp - last_->timestamp);
 }
 
-bool Tracker::relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same) {
+bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
   auto found = relocaliser_.find(
-      *view_, *frame.features, [this](PointId id) { return is_retracted(id); }, looks_the_same);
+      map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
   if (!found) return false;
   if (!within_reach(*found, frame.timestamp) && found->alike_share() < options_.relocalisation.least_alike_far)
     return false;
@@ -360,12 +336,12 @@ bool Tracker::relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
 // rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
-bool Tracker::confirm_sighting(TrackedFrame& frame) {
+bool Tracker::confirm_sighting(TrackedFrame& frame, const MotionPrior* prior) {
   if (!sighting_) return false;
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(sighting_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_ = -1;
-  if (last_->index + 1 == frame.index && track_from_last(frame)) return true;
+  if (last_->index + 1 == frame.index && track_from_last(frame, prior)) return true;
   last_ = std::move(before_loss);
   state_ = TrackingState::lost;
   return false;
@@ -374,7 +350,8 @@ bool Tracker::confirm_sighting(TrackedFrame& frame) {
 // A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight.
 bool Tracker::start_map(TrackedFrame& frame) {
   int with_depth = 0;
-  for (const Keypoint& k : frame.features->keypoints) with_depth += k.depth > 0 && !k.suspect;
+  for (size_t f = 0; f < frame.features->size(); ++f)
+    with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
   if (with_depth < options_.initial_points) return false;
   if (state_ == TrackingState::lost && (options_.new_map_after == 0 || ++lost_frames_ < options_.new_map_after))
     return false;
@@ -386,22 +363,22 @@ bool Tracker::start_map(TrackedFrame& frame) {
   return true;
 }
 
-TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map,
-                            const LooksTheSame& looks_the_same) {
-  TrackOutcome outcome;
-  TrackedFrame& frame = outcome.frame;
-  frame.index = index;
-  frame.timestamp = timestamp;
-  frame.features = features_at(velocity());
+TrackedFrame Tracker::track(const TrackingInput& input) {
+  TrackedFrame frame;
+  frame.index = input.index;
+  frame.timestamp = input.timestamp;
+  frame.features = input.features.at(velocity());
+  frame.motion = input.features.motion;
   const size_t n = frame.features->size();
+  frame.motion.resize(n, FeatureMotion::still);
   frame.points.assign(n, kNoPoint);
   frame.outlier.assign(n, 0);
   frame.odometry.assign(n, std::nullopt);
 
   const bool has_map = state_ != TrackingState::initialising;
-  bool followed = has_map && track_from_last(frame);
-  bool found_again = has_map && !followed && confirm_sighting(frame);
-  if (has_map && !followed && !found_again && relocalise(frame, looks_the_same)) {
+  bool followed = has_map && track_from_last(frame, input.prior);
+  bool found_again = has_map && !followed && confirm_sighting(frame, input.prior);
+  if (has_map && !followed && !found_again && relocalise(frame, input.appearance)) {
     // At once where it is but a step from the frame before; else when the next frame agrees.
     followed = is_step_from_last(frame);
     found_again = followed;
@@ -409,43 +386,43 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
       finish(frame);
       sighting_ = frame;
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
-      outcome.state = state_ = TrackingState::lost;
       velocity_.reset();
-      return outcome;
+      frame.state = state_ = TrackingState::lost;
+      return frame;
     }
   }
   if (!followed && !found_again) {
     if (has_map) state_ = TrackingState::lost;
     velocity_.reset();
     odometry_.clear();
-    outcome.wants_first_keyframe = may_start_map && start_map(frame);
-    if (outcome.wants_first_keyframe) {
+    frame.starts_map = input.may_start_map && start_map(frame);
+    if (frame.starts_map) {
       state_ = TrackingState::tracking;
       lost_frames_ = 0;
       last_ = frame;
     }
-    outcome.state = state_;
-    return outcome;
+    frame.state = state_;
+    return frame;
   }
   lost_frames_ = 0;
   sighting_.reset();
-  if (!last_ || timestamp <= last_->timestamp) {
+  if (!last_ || frame.timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {
     // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
     // now. The full half would carry the noise of both steps into every feature.
     const Vector6d step = velocity_to(frame);
     const Vector6d before = velocity_.value_or(step);
-    refine_at_velocity(step + kAccelerationShare * (step - before), features_at, frame);
+    refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
     velocity_ = velocity_to(frame);
   }
   drop_unmatched_suspects(frame);
   finish(frame);
-  outcome.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
+  frame.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
   state_ = TrackingState::tracking;
   last_ = frame;
   odometry_.remember(frame);
-  return outcome;
+  return frame;
 }
 
 }  // namespace dkb

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,6 +16,7 @@
 #include "dkb/tracking/local_map.h"
 #include "dkb/tracking/odometry_points.h"
 #include "dkb/tracking/relocaliser.h"
+#include "dkb/tracking/tracking_map.h"
 
 namespace dkb {
 
@@ -41,13 +41,11 @@ struct TrackingOptions {
   void check() const;
 };
 
-enum class TrackingState { initialising, tracking, lost, relocalised };
-const char* name_of(TrackingState state);
-
-struct TrackOutcome {
-  TrackingState state = TrackingState::initialising;
-  TrackedFrame frame;                 // pose valid when tracking or relocalised
-  bool wants_first_keyframe = false;  // the frame starts a map
+// A map point where a pose puts it.
+struct PointInView {
+  PointId id = kNoPoint;
+  Eigen::Vector2d pixel;  // [px] ideal
+  double depth = 0;       // [m]
 };
 
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.
@@ -60,21 +58,15 @@ class Tracker {
   // A newer view: the last pose is re-expressed through its reference keyframe. Returns how the world moved under the
   // camera: new_world_from_old_world.
   Rigid3 take_view(MapView view);
-  const Map& view() const { return *view_; }
-  const MapView& shared_view() const { return view_; }
+  const TrackingMap& map() const { return map_; }
 
   // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
   Rigid3 expected_motion(double seconds) const;
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
   Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
-  // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once
-  // for the expected velocity, and again for the one that the first pose shows.
-  using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
-  // With `may_start_map` false a frame that finds no map stays without a pose. `looks_the_same` helps to tell places
-  // that look alike apart when a lost camera is sought; it may be empty.
-  TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map = true,
-                     const LooksTheSame& looks_the_same = {});
+  // The frame's features are made for the expected velocity, and again for the one that the first pose shows.
+  TrackedFrame track(const TrackingInput& input);
 
   // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
   KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame);
@@ -83,18 +75,15 @@ class Tracker {
 
   // These points move: they are matched no more, and mapping is told with the next packet.
   void retract(const std::vector<PointId>& points);
-  // Calls visit(id, ideal pixel, depth [m]) for each map point near the last frame that its pose puts in view.
-  void visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const;
+  // The map points near the last frame that its pose puts in view.
+  std::vector<PointInView> points_in_view() const;
   const std::optional<TrackedFrame>& last_frame() const { return last_; }
 
-  // Pose of a keyframe, also of one that mapping has not published yet.
-  Rigid3 keyframe_pose(KeyframeId id) const;
-  // The first keyframe of the map that a keyframe belongs to, likewise.
-  KeyframeId root(KeyframeId id) const;
   // Points of the reference keyframe that at least `observers` keyframes see.
   int reference_point_count(KeyframeId reference, int observers) const;
   // Position of a point that tracking may match, in the world; nothing when it is gone.
   std::optional<Eigen::Vector3d> position(PointId id) const;
+  std::vector<std::optional<Eigen::Vector3d>> positions(const std::vector<PointId>& points) const;
   // Forgets velocity and the last frame, so that the next frame is found anew in the map.
   void reset_motion();
   // Where the camera of the very first map stands; later ones start where the camera was seen last.
@@ -109,14 +98,15 @@ class Tracker {
   };
   Pair odometry_pair(int feature, const OdometryMatch& match) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
-  std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
+  std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                          std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const;
-  bool track_from_last(TrackedFrame& frame);
+  std::optional<Rigid3> match_last_frame(const MatchableFeatures& features, std::vector<PointId>& points) const;
+  std::vector<Rigid3> expected_poses(double dt, const MotionPrior* prior) const;
+  bool track_from_last(TrackedFrame& frame, const MotionPrior* prior);
   bool is_step(const Rigid3& cam_from_world) const;
-  bool relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same);
+  bool relocalise(TrackedFrame& frame, PointAppearance* appearance);
   bool is_step_from_last(const TrackedFrame& frame) const;
-  bool confirm_sighting(TrackedFrame& frame);
+  bool confirm_sighting(TrackedFrame& frame, const MotionPrior* prior);
   Rigid3 express_anew(TrackedFrame& frame) const;
   bool within_reach(const PoseProposal& found, double timestamp) const;
   bool start_map(TrackedFrame& frame);
@@ -126,7 +116,7 @@ class Tracker {
   void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
   Vector6d velocity_to(const TrackedFrame& frame) const;
-  void refine_at_velocity(const Vector6d& velocity, const FeaturesAt& features_at, TrackedFrame& frame) const;
+  void refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
   bool established(PointId id, FrameIndex now) const;
   static void drop_unmatched_suspects(TrackedFrame& frame);
   void finish(TrackedFrame& frame);
@@ -140,12 +130,7 @@ class Tracker {
   Relocaliser relocaliser_;
   Rigid3 start_;  // cam_from_world
 
-  MapView view_;
-  struct PendingKeyframe {
-    KeyframeId id, reference;
-    Rigid3 cam_from_reference;
-  };
-  std::vector<PendingKeyframe> pending_;  // keyframes not in the view yet, by id
+  TrackingMap map_;
   std::map<PointId, ProvisionalPoint> provisional_;
   std::map<PointId, PointSighting> sightings_;
   std::vector<PointId> retracted_;   // increasing; until the view has dropped them

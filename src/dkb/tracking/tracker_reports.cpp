@@ -40,18 +40,20 @@ void Tracker::retract(const std::vector<PointId>& points) {
   }
 }
 
-void Tracker::visit_points_in_view(const std::function<void(PointId, const Eigen::Vector2d&, double)>& visit) const {
-  if (!last_) return;
+std::vector<PointInView> Tracker::points_in_view() const {
+  std::vector<PointInView> in_view;
+  if (!last_) return in_view;
   const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
     const Eigen::Vector3d p = last_->cam_from_world * world;
     if (p.z() < 0.1) return;
     const Eigen::Vector2d pixel = camera_.project(p);
     if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height)
-      visit(id, pixel, p.z());
+      in_view.push_back({id, pixel, p.z()});
   };
   for (const Candidate& c : candidates_)
     if (!is_retracted(c.id)) offer(c.id, c.position);
   for (const auto& [id, p] : provisional_) offer(id, *position(id));
+  return in_view;
 }
 
 KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) {
@@ -84,7 +86,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   }
   take_reports(packet);
 
-  pending_.push_back({id, packet.reference, packet.cam_from_reference});
+  map_.add_pending(id, packet.reference, packet.cam_from_reference);
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
   if (last_ && last_->index == frame.index) {
     for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;

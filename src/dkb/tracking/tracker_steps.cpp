@@ -14,7 +14,7 @@ constexpr double kLargestTurn = 0.5;  // [rad]
 
 }  // namespace
 
-std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const RgbdFeatures& features,
+std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                                 std::vector<PointId>& points) const {
   std::vector<Candidate> candidates;
   const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
@@ -37,7 +37,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
   std::vector<Pair> pairs;
   for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
-  const PoseEstimate pose = refine(predicted, pairs, features);
+  const PoseEstimate pose = refine(predicted, pairs, features.features);
   if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
@@ -47,7 +47,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
 
 // By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
 // the last place of each point finds just enough wrong ones for a wrong pose.
-std::optional<Rigid3> Tracker::match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const {
+std::optional<Rigid3> Tracker::match_last_frame(const MatchableFeatures& features, std::vector<PointId>& points) const {
   std::vector<DescribedPoint> known;
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
@@ -62,19 +62,31 @@ std::optional<Rigid3> Tracker::match_last_frame(const RgbdFeatures& features, st
   return found->cam_from_world;
 }
 
-bool Tracker::track_from_last(TrackedFrame& frame) {
+// Where the camera is expected: by the prior where there is one, else by the motion so far.
+std::vector<Rigid3> Tracker::expected_poses(double dt, const MotionPrior* prior) const {
+  std::vector<Rigid3> steps;
+  if (prior != nullptr) {
+    Rigid3 step = prior->previous_from_current.inverse();
+    if (prior->rotation_only) step.translation = expected_motion(dt).translation;
+    steps.push_back(step);
+  }
+  if (velocity_) steps.push_back(expected_motion(dt));
+  for (Rigid3& step : steps) step = step * last_->cam_from_world;
+  return steps;
+}
+
+bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
   if (state_ == TrackingState::lost || !last_) return false;
-  const RgbdFeatures& features = *frame.features;
-  std::vector<PointId> points(features.size(), kNoPoint);
-  const double dt = frame.timestamp - last_->timestamp;
+  const MatchableFeatures features = frame.matchable();
+  std::vector<PointId> points(frame.points.size(), kNoPoint);
   std::optional<Rigid3> pose;
-  if (velocity_)
-    pose = track_last_frame(expected_motion(dt) * last_->cam_from_world, options_.radius_last_frame, features, points);
+  for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, prior))
+    if (!pose) pose = track_last_frame(expected, options_.radius_last_frame, features, points);
   if (!pose) pose = match_last_frame(features, points);
   if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
-  if (!pose && view_->live_keyframe(last_->reference) != nullptr) {
+  if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
-    auto near = relocaliser_.propose_from(*view_, last_->reference, features,
+    auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); }, {});
     if (!near || !is_step(near->cam_from_world)) return false;
     pose = near->cam_from_world;

@@ -1,70 +1,164 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <exception>
 #include <functional>
+#include <mutex>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
-#include "dkb/util/bounded_queue.h"
+#include "dkb/util/errors.h"
 #include "dkb/util/thread_priority.h"
-#include "dkb/util/timing.h"
 
 namespace dkb {
 
+struct DueStageOptions {
+  std::string name;      // of the stage, for the messages of what fails in it
+  bool threaded = true;  // false: push() does the work, with the same results
+  ThreadPriority priority = ThreadPriority::normal;
+};
+
 // Background work whose results become visible at a fixed later frame (logical time), whatever the speed of the
-// machine. Due times are frames by index. One task after the other, in order. Without a thread the same work is done
-// inside push().
+// machine. One task after the other, in order. One thread pushes and takes.
+//
+// What the work throws is thrown by take_due() at the due frame of that task, as an InputError that names the stage;
+// later tasks are worked at all the same.
 template <class Task, class Result>
 class DueStage {
  public:
   using Work = std::function<Result(const Task&)>;
 
-  DueStage(Work work, bool threaded, ThreadPriority priority = ThreadPriority::normal)
-      : work_(std::move(work)), tasks_(kSlots), results_(kSlots) {
-    if (threaded)
-      thread_ = std::thread([this, priority] {
-        set_thread_priority(priority);
-        while (const auto task = tasks_.pop()) results_.push(work_(*task));
-      });
+  DueStage(Work work, DueStageOptions options) : work_(std::move(work)), options_(std::move(options)) {
+    if (options_.threaded) thread_ = std::thread([this] { run(); });
   }
-  ~DueStage() { stop(); }
+  // Lets the task in work end and drops those that wait.
+  ~DueStage() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
   DueStage(const DueStage&) = delete;
   DueStage& operator=(const DueStage&) = delete;
 
-  // Due times must not fall from one task to the next.
+  // Throws std::logic_error when `due` is before that of the task pushed last.
   void push(Task task, int64_t due) {
-    due_.push_back(due);
-    if (thread_.joinable())
-      tasks_.push(std::move(task));
-    else
-      results_.push(work_(task));
+    if (due < last_due_) throw std::logic_error(options_.name + ": due frames must not fall");
+    last_due_ = due;
+    if (!options_.threaded) {
+      finished_.push_back(work_at({std::move(task), due}));
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      waiting_.push_back({std::move(task), due});
+    }
+    changed_.notify_all();
   }
-  // The next result that is due at `now`. Waits for it when `wait`; else takes only what is ready.
-  std::optional<Result> take_due(int64_t now, bool wait) {
-    if (due_.empty() || due_.front() > now) return std::nullopt;
-    std::optional<Result> result = wait ? results_.pop() : results_.try_pop();
-    if (result) due_.pop_front();
-    return result;
+  // The next result that is due at `now`. Waits for it when `wait`, or for as long as `patience` [s] in a real-time
+  // run; else takes only what is ready.
+  std::optional<Result> take_due(int64_t now, bool wait) { return take(now, wait ? kForever : 0); }
+  std::optional<Result> take_due_within(int64_t now, double patience) { return take(now, patience); }
+  // Whether a result is due at `now` that is not there yet.
+  bool must_wait(int64_t now) const {
+    const std::lock_guard lock(mutex_);
+    return finished_.empty() && answer_is_due(now);
+  }
+  // Drops the tasks that nobody has begun; how many these were. For real-time runs alone.
+  size_t drop_waiting() {
+    const std::lock_guard lock(mutex_);
+    const size_t dropped = waiting_.size();
+    waiting_.clear();
+    return dropped;
   }
   // Tasks pushed whose results were not taken.
-  size_t outstanding() const { return due_.size(); }
-  // Ends the thread once what is outstanding is finished.
-  void stop() {
-    tasks_.close();
-    if (thread_.joinable()) thread_.join();
+  size_t outstanding() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.size() + (working_due_ ? 1 : 0) + finished_.size();
   }
 
  private:
-  // More than can ever be outstanding: tracking waits for each task at its due time, or holds back new ones.
-  static constexpr size_t kSlots = 4096;
-  Work work_;
-  BoundedQueue<Task> tasks_;
-  BoundedQueue<Result> results_;
-  std::deque<int64_t> due_;
+  static constexpr double kForever = -1;
+  struct Pending {
+    Task task;
+    int64_t due = 0;
+  };
+  struct Finished {
+    std::optional<Result> result;  // or else the error
+    std::exception_ptr error;
+    int64_t due = 0;
+  };
+
+  Finished work_at(const Pending& pending) const {
+    Finished done;
+    done.due = pending.due;
+    try {
+      done.result = work_(pending.task);
+    } catch (const InputError&) {
+      done.error = std::current_exception();
+    } catch (const std::exception& e) {
+      done.error = std::make_exception_ptr(InputError(options_.name + " failed: " + e.what()));
+    } catch (...) {
+      done.error = std::make_exception_ptr(InputError(options_.name + " failed: it threw something that is no exception"));
+    }
+    return done;
+  }
+  void run() {
+    set_thread_priority(options_.priority);
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+      if (stopping_) return;
+      const Pending pending = std::move(waiting_.front());
+      waiting_.pop_front();
+      working_due_ = pending.due;
+      lock.unlock();
+      Finished done = work_at(pending);
+      lock.lock();
+      working_due_.reset();
+      finished_.push_back(std::move(done));
+      changed_.notify_all();
+    }
+  }
+  bool answer_is_due(int64_t now) const {
+    if (!finished_.empty()) return finished_.front().due <= now;
+    if (working_due_) return *working_due_ <= now;
+    return !waiting_.empty() && waiting_.front().due <= now;
+  }
+  std::optional<Result> take(int64_t now, double patience) {
+    std::unique_lock lock(mutex_);
+    const auto settled = [&] { return !finished_.empty() || !answer_is_due(now); };
+    if (patience < 0)
+      changed_.wait(lock, settled);
+    else if (patience > 0)
+      changed_.wait_for(lock, std::chrono::duration<double>(patience), settled);
+    if (finished_.empty() || finished_.front().due > now) return std::nullopt;
+    Finished done = std::move(finished_.front());
+    finished_.pop_front();
+    if (done.error) std::rethrow_exception(done.error);
+    return std::move(done.result);
+  }
+
+  const Work work_;
+  const DueStageOptions options_;
+  int64_t last_due_ = INT64_MIN;  // the pushing thread's own
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable changed_;
+  std::deque<Pending> waiting_;
+  std::optional<int64_t> working_due_;
+  std::deque<Finished> finished_;
+  bool stopping_ = false;
   std::thread thread_;
 };
 

@@ -4,7 +4,10 @@
 #include <chrono>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "dkb_slam/frame.h"
 
 namespace dkb {
 
@@ -20,16 +23,13 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_;
 };
 
-struct StageSummary {
-  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;
-  size_t count = 0;
-};
-
 // Durations of named stages; one instance per thread, merged at the end.
 class StageTimes {
  public:
   void add(const std::string& stage, double ms) { samples_[stage].push_back(static_cast<float>(ms)); }
   void merge(const StageTimes& other);
+  // Hands over what it holds.
+  StageTimes take() { return std::exchange(*this, {}); }
   std::map<std::string, StageSummary> summaries() const;
 
  private:

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What goes in for every frame, and what comes out.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb_slam/detector.h"
+#include "dkb_slam/geometry.h"
+#include "dkb_slam/image.h"
+
+namespace dkb {
+
+struct RgbdImage;  // the library's own
+
+/// What something else knows of the camera's motion since the frame before: wheels, an inertial unit, a planner. It
+/// guides the search for the frame's pose; the images have the last word.
+struct MotionPrior {
+  Rigid3 previous_from_current;               ///< camera axes; of the frames that process() was given last and now
+  bool rotation_only = false;                 ///< the translation is not known
+  Matrix6d covariance = Matrix6d::Identity(); ///< right perturbation, [translation m, rotation rad], camera axes
+};
+
+/// A pair of images as the caller has them. The views are read during the call and may be gone after it.
+struct FrameInput {
+  int64_t stamp_ns = 0;           ///< of the colour image, middle of the exposure; rises from frame to frame
+  ImageView colour;               ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
+  ImageView depth;                ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
+  int64_t depth_stamp_ns = -1;    ///< of the depth image; -1 = the colour image's
+  std::optional<MotionPrior> prior;
+};
+
+/// A pair of images, checked, copied and never changed again. Copies of it share the images. A frame may be made on
+/// another thread than the one that feeds it to Slam, so that converting costs the tracking thread nothing.
+class DKB_SLAM_API Frame {
+ public:
+  Frame() = default;
+  /// Throws InputError when an image is missing, has another size than the camera, a stride below its width, or a
+  /// format that does not fit, and when a number of the prior is not finite.
+  Frame(const Camera& camera, const FrameInput& input);
+  /// The library's own readers enter here.
+  explicit Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns);
+
+  bool empty() const { return image_ == nullptr; }
+  int64_t stamp_ns() const { return stamp_ns_; }
+  int64_t depth_stamp_ns() const { return depth_stamp_ns_; }
+  const std::optional<MotionPrior>& prior() const { return prior_; }
+  void set_prior(const std::optional<MotionPrior>& prior) { prior_ = prior; }
+  ImageView colour() const;  ///< rgb8; empty for grey cameras. Valid as long as a copy of the frame lives
+  ImageView grey() const;    ///< grey8, likewise
+  ImageView depth() const;   ///< depth_f32, likewise
+  const std::shared_ptr<const RgbdImage>& image() const { return image_; }
+
+ private:
+  std::shared_ptr<const RgbdImage> image_;
+  int64_t stamp_ns_ = 0, depth_stamp_ns_ = 0;
+  std::optional<MotionPrior> prior_;
+};
+
+enum class TrackingState {
+  initialising,  ///< no map yet
+  tracking,      ///< the pose is good
+  lost,          ///< there is no pose
+  relocalised,   ///< found again; the pose is good
+  paused,        ///< Slam::pause(true): the frame was not looked at
+};
+DKB_SLAM_API const char* name_of(TrackingState state);
+
+/// Something that moves by itself, as seen in one frame: an obstacle for a planner.
+struct Mover {
+  int id = 0;                                  ///< the same in all frames of one run, from 1
+  std::string class_name;                      ///< the detector's; "object" when no detector knows it
+  Eigen::Vector3d position_in_world{0, 0, 0};  ///< [m] median of its visible surface points, per coordinate
+  Eigen::Vector3d velocity_in_world{0, 0, 0};  ///< [m/s]
+  double position_sd = 0;                      ///< [m] standard deviation of each coordinate of the position
+  Matrix6d covariance = Matrix6d::Zero();      ///< of [position m, velocity m/s] in the world
+  Eigen::Vector3d size{0, 0, 0};               ///< [m] of what is visible: width, height, depth, along the camera's axes
+  Box box;                                     ///< [px] of the original image
+  bool operator==(const Mover&) const = default;
+};
+
+/// What became of a feature.
+enum class FeatureState : uint8_t {
+  unused,   ///< nothing was matched with it
+  used,     ///< inlier of the pose, or it made or extended a map point
+  outlier,  ///< matched, but the pose does not explain it
+  dynamic,  ///< it may lie on something that moves
+};
+DKB_SLAM_API const char* name_of(FeatureState state);
+
+/// Why a feature was rejected.
+enum class FeatureReason : uint8_t {
+  none,        ///< it was not
+  on_mover,    ///< it lies where a detector or the motion segmentation sees a mover
+  moved,       ///< it moved in a way that the camera's own motion does not explain (the filters of other systems)
+  disagrees,   ///< its place or depth is off from the point that it was matched with
+};
+DKB_SLAM_API const char* name_of(FeatureReason reason);
+
+/// One feature that a frame extracted.
+struct FeatureReport {
+  float image_x = 0, image_y = 0;  ///< [px] of the image as read
+  FeatureState state = FeatureState::unused;
+  FeatureReason reason = FeatureReason::none;
+};
+
+/// Durations of one stage, by the steady clock.
+struct StageSummary {
+  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;
+  size_t count = 0;
+};
+
+/// Everything of one frame.
+struct FrameResult {
+  int frame = 0;         ///< counts the frames that were accepted, from 0
+  int64_t stamp_ns = 0;  ///< the input's
+  TrackingState state = TrackingState::initialising;
+  /// Camera axes: x right, y down, z forward. World: the first tracked camera, or the robot's base there
+  /// (Options::base_from_cam). There is a pose when tracked().
+  std::optional<Rigid3> world_from_cam;
+  std::optional<Rigid3> odom_from_cam;  ///< smooth: does not jump when the map is corrected; steer by this
+  std::optional<Matrix6d> covariance;   ///< right perturbation of world_from_cam, [translation m, rotation rad]
+  Rigid3 world_from_odom;               ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
+  int inliers = 0;                      ///< map points that the pose rests on
+  int reference_keyframe = -1;          ///< the keyframe that shows most of them
+  std::vector<Mover> movers;            ///< seen in this frame, by id
+  std::vector<Detection> detections;    ///< boxes of the detectors, carried to this image
+  MoverMask mask;                       ///< where movers are in this image
+  std::vector<FeatureReport> features;  ///< every feature that was extracted, people's included
+  bool keyframe = false;                ///< the frame became a keyframe
+  std::string keyframe_explanation;     ///< why, or why not; empty unless Slam::explain_keyframes(true)
+  double tracking_ms = 0;               ///< steady clock: own work on this frame
+  double waiting_ms = 0;                ///< for mapping and the detector; 0 in a real-time run, but for the first frame
+
+  bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
+};
+
+}  // namespace dkb

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Rigid motions between coordinate frames, and the camera.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "dkb_slam/version.h"
+
+namespace dkb {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// Rigid motion between coordinate frames. `b_from_a` maps a point given in frame a to frame b:
+///     point_in_b = b_from_a * point_in_a,   c_from_a = c_from_b * b_from_a.
+struct Rigid3 {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of unit norm
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();         ///< [m]
+
+  Rigid3() = default;
+  Rigid3(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) : rotation(q), translation(t) {}
+
+  Eigen::Matrix3d matrix3() const { return rotation.toRotationMatrix(); }
+  Rigid3 inverse() const {
+    const Eigen::Quaterniond q = rotation.conjugate();
+    return {q, -(q * translation)};
+  }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  /// The product is normalised, so that long chains stay rotations.
+  Rigid3 operator*(const Rigid3& other) const {
+    return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
+  }
+};
+
+/// Pinhole camera with Brown-Conrady distortion, and the depth format that comes with it. Camera axes: x right, y down,
+/// z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the colour camera.
+struct DKB_SLAM_API Camera {
+  int width = 640;                           ///< [px] 16 ... 16384
+  int height = 480;                          ///< [px] likewise
+  double fx = 525.0, fy = 525.0;             ///< [px] > 0
+  double cx = 319.5, cy = 239.5;             ///< [px]
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;     ///< radial k, tangential p, in OpenCV's order k1 k2 p1 p2 k3
+  double k3 = 0;                             ///< the third radial coefficient
+  double depth_factor = 5000.0;              ///< [units per metre] of integer depth images, > 0
+  double fps = 30.0;                         ///< [1/s] nominal frame rate, > 0
+  double readout = 0.0;                      ///< [s] rolling shutter, first to last row's exposure; 0 = unknown or none
+  double depth_min = 0.2, depth_max = 10.0;  ///< [m] depth outside is taken for missing
+
+  /// A camera that is known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Throws InputError naming the
+  /// nearest one.
+  static Camera named(const std::string& name);
+  /// Reads a camera file: a YAML map of the fields above; fx, fy, cx, cy, width, height and depth_factor are required.
+  /// Throws InputError with file and line.
+  static Camera load(const std::filesystem::path& path);
+  /// The camera file's text, every field with its unit.
+  std::string to_yaml() const;
+  /// Throws InvalidOption naming the field.
+  void check() const;
+
+  bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  /// Ideal (undistorted) pixel of a point in front of the camera; point_in_cam.z() must not be 0.
+  Eigen::Vector2d project(const Eigen::Vector3d& point_in_cam) const {
+    return {fx * point_in_cam.x() / point_in_cam.z() + cx, fy * point_in_cam.y() / point_in_cam.z() + cy};
+  }
+  /// Point at depth z [m], along the optical axis, that is seen at an ideal pixel.
+  Eigen::Vector3d unproject(const Eigen::Vector2d& pixel, double z) const {
+    return {(pixel.x() - cx) / fx * z, (pixel.y() - cy) / fy * z, z};
+  }
+  Eigen::Vector2d distort(const Eigen::Vector2d& ideal_pixel) const;    ///< ideal to image pixel
+  Eigen::Vector2d undistort(const Eigen::Vector2d& image_pixel) const;  ///< image to ideal pixel, by iteration
+};
+
+}  // namespace dkb

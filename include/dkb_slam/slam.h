@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// RGB-D SLAM: frames in, one by one; poses, movers and a map out.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dkb_slam/detector.h"
+#include "dkb_slam/errors.h"
+#include "dkb_slam/frame.h"
+#include "dkb_slam/keyframe_policy.h"
+#include "dkb_slam/map.h"
+#include "dkb_slam/options.h"
+
+namespace dkb {
+
+/// Something that happened, for whoever does not look at every frame's result.
+struct Event {
+  enum class Kind {
+    keyframe,  ///< a frame became a keyframe
+    loop,      ///< a place was seen again, and the map moved
+    merge,     ///< two maps became one
+    lost,      ///< the first frame without a pose
+    found,     ///< the first frame with one again
+    new_map,   ///< a map was begun, the first one included
+    warning,   ///< something a person should know; `text` says what
+  };
+  Kind kind = Kind::warning;
+  int frame = 0;         ///< index of the frame it came with
+  int64_t stamp_ns = 0;  ///< of that frame
+  int keyframe = -1;     ///< of keyframe, loop and merge
+  std::string text;
+};
+DKB_SLAM_API const char* name_of(Event::Kind kind);
+
+/// A frame of the trajectory.
+struct TrajectoryFrame {
+  int frame = 0;  ///< below 0: a keyframe of the map that was loaded
+  int64_t stamp_ns = 0;
+  Rigid3 world_from_cam;
+  int map = 0;  ///< 0 = the first map; maps that were never joined have worlds of their own
+};
+
+struct Statistics {
+  int frames = 0, tracked = 0, lost = 0, relocalisations = 0;
+  int keyframes = 0, keyframes_inserted = 0;  ///< in the map now; ever made
+  int maps = 0;                               ///< that are not joined
+  int loops = 0, merges = 0;
+  size_t map_points = 0;
+  int points_created = 0, points_culled = 0, points_fused = 0, points_retracted = 0, keyframes_culled = 0;
+  std::map<std::string, int> keyframe_rules;  ///< keyframes by the rule that made them
+  std::map<std::string, int> keyframe_tests;  ///< how often each test of the rule spoke for a keyframe
+  long features_removed = 0;                  ///< features that the filter kept from tracking
+  std::string detector = "none";              ///< kinds, joined by +
+  double detector_rate_hz = 0;                ///< answers of the slow detector per second of the sequence
+  int detector_latency_frames = 0;
+  std::map<std::string, StageSummary> stages;
+};
+
+/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map() and the switches.
+/// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
+/// Several systems may live in one process and know nothing of each other.
+///
+/// Deterministic: the same frames and options give the same poses and map to the last bit, with or without threads,
+/// except with Options::realtime.
+///
+/// Throws InputError for bad input, which harms nothing: the frame is not counted and the next one goes on. Once a
+/// worker thread has failed, every call of process() and finish() throws its error until reset() or load_map().
+class DKB_SLAM_API Slam {
+ public:
+  /// `policy` decides about keyframes in the place of the built-in rule; may be null. Throws InvalidOption.
+  explicit Slam(const Camera& camera, const Options& options = Options(), Detectors detectors = {},
+                std::shared_ptr<KeyframePolicy> policy = nullptr);
+  ~Slam();
+  Slam(Slam&&) noexcept;
+  Slam& operator=(Slam&&) noexcept;
+
+  /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise.
+  FrameResult process(const FrameInput& input);
+  FrameResult process(const Frame& frame);
+
+  /// Waits for all outstanding work and takes its result: trajectory and map are complete then. process() may go on.
+  void finish();
+  /// Forgets the world, its frames and its clock. The next frame starts a new one.
+  void reset();
+  /// While paused, frames are answered with state `paused` and change nothing.
+  void pause(bool on);
+  /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
+  void localize_only(bool on);
+  /// Every frame's result then says which of the keyframe tests said what, with their numbers.
+  void explain_keyframes(bool on);
+
+  /// Writes the map as it is now, by a temporary file and a rename. Throws InputError when it cannot.
+  void save_map(const std::filesystem::path& path) const;
+  /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Throws
+  /// InputError, and leaves all as it is, when the file is broken or was made with another camera or pyramid.
+  void load_map(const std::filesystem::path& path);
+
+  /// The map as tracking knows it.
+  MapSnapshot map() const;
+  /// Poses of all tracked frames by the map as it is now; complete after finish().
+  std::vector<TrajectoryFrame> trajectory() const;
+  /// The same frames as they were published.
+  std::vector<TrajectoryFrame> online_trajectory() const;
+  /// Keyframes of the map, by id.
+  std::vector<TrajectoryFrame> keyframes() const;
+  Statistics statistics() const;  ///< stages of other threads are complete after finish()
+
+  /// The dense map of the still world, from the keyframes so far; Options::dense_map must be on. Takes seconds.
+  DenseMap dense_map() const;
+
+  /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is
+  /// set.
+  std::vector<Event> take_events();
+  /// Runs a task at once or later, on a thread of its choice, in the order in which tasks are given to it.
+  using Executor = std::function<void(std::function<void()> task)>;
+  /// Calls `callback` for each event: on the feeding thread before process() returns, or where `executor` runs it.
+  /// What the callback throws leaves process(). An empty callback ends it.
+  void on_event(std::function<void(const Event&)> callback, Executor executor = {});
+
+  const Camera& camera() const;
+  const Options& options() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dkb

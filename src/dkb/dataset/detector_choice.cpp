@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/detector_choice.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+
+#include "dkb/dataset/image_codecs.h"
+#include "dkb/detection/boxes_file.h"
+#include "dkb/detection/mask_folder.h"
+#include "dkb/detection/onnx_detector.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+
+std::vector<std::string> detector_kinds(const std::string& detector, bool has_model) {
+  if (detector == "auto") return {has_model ? "yolo" : "motion"};
+  const std::vector<std::string> known = {"auto", "none", "yolo", "motion", "file"};
+  std::vector<std::string> kinds;
+  std::istringstream parts(detector);
+  for (std::string kind; std::getline(parts, kind, '+');) {
+    if (std::find(known.begin() + 1, known.end(), kind) == known.end())
+      throw InputError("--detector: there is no detector \"" + kind + "\"" + did_you_mean(kind, known) +
+                       "; detectors: auto, none, yolo, motion, file, or several joined by +");
+    if (kind != "none") kinds.push_back(kind);
+  }
+  return kinds;
+}
+
+Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
+  Detectors made;
+  const std::vector<std::string> kinds = detector_kinds(choice.kinds, !choice.model.empty());
+  const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
+  if (has("yolo")) {
+    if (choice.model.empty())
+      throw InputError(
+          "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
+    auto detector = std::make_shared<OnnxDetector>(OnnxOptions{.model = choice.model, .labels = choice.labels},
+                                                   camera.width, camera.height);
+    const int frames = detector->frames_per_detection();
+    made.schedule.every = choice.every > 0 ? choice.every : frames + 1;
+    made.schedule.latency = choice.latency > 0 ? choice.latency : frames + 1;
+    made.slow = std::move(detector);
+  }
+  if (!choice.boxes.empty() && !has("file"))
+    throw InputError("--boxes: --detector " + choice.kinds + " does not read boxes; add --detector file" +
+                     (kinds.empty() || choice.kinds == "auto" ? "" : ", or join it: " + choice.kinds + "+file"));
+  if (has("file")) {
+    if (choice.boxes.empty()) throw InputError("--detector file: no boxes; name their file with --boxes");
+    made.prompt.push_back(std::make_shared<FileDetector>(choice.boxes, camera.width, camera.height));
+  }
+  if (!choice.masks.empty()) {
+    std::vector<double> stamps;
+    for (int64_t stamp : choice.stamps_ns) stamps.push_back(seconds_from_ns(stamp));
+    made.prompt.push_back(std::make_shared<MaskFolder>(choice.masks, read_grey, stamps, camera.width, camera.height));
+  }
+  made.motion = has("motion");
+  return made;
+}
+
+}  // namespace dkb

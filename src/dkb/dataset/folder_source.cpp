@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/folder_source.h"
+
+#include "dkb/dataset/camera_file.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+TumDataset selected_pairs(const std::filesystem::path& folder, const FolderOptions& options) {
+  TumDataset dataset = open_tum_dataset(folder);
+  select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &dataset);
+  return dataset;
+}
+
+CameraChoice camera_of(const std::filesystem::path& folder, const FolderOptions& options) {
+  const bool told = !options.camera.empty() || std::filesystem::exists(folder / "camera.yaml");
+  try {
+    return choose_camera(options.camera, folder);
+  } catch (const InputError&) {
+    if (told || !options.fallback_camera) throw;
+    return {*options.fallback_camera, "of the map"};
+  }
+}
+
+std::string described(const TumDataset& dataset, const CameraChoice& camera) {
+  return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
+}
+
+}  // namespace
+
+FolderSource::FolderSource(const std::filesystem::path& folder, const FolderOptions& options)
+    : dataset_(selected_pairs(folder, options)),
+      reader_(dataset_.pairs,
+              [&] {
+                const CameraChoice choice = camera_of(folder, options);
+                description_ = described(dataset_, choice);
+                return camera_ = choice.camera;
+              }(),
+              {.threaded = options.threaded}) {}
+
+SourceFrame FolderSource::next() {
+  SourceFrame next;
+  auto read = reader_.next();
+  if (!read) return next;
+  next.index = read->index;
+  next.stamp = std::move(read->stamp);
+  next.note = std::move(read->skipped);
+  next.state = read->image == nullptr ? SourceState::skipped : SourceState::frame;
+  const DatasetPair& pair = dataset_.pairs[read->index];
+  if (read->image != nullptr) next.frame = Frame(std::move(read->image), pair.stamp_ns, pair.depth_stamp_ns);
+  return next;
+}
+
+std::unique_ptr<Source> open_folder(const std::filesystem::path& folder, const FolderOptions& options) {
+  return std::make_unique<FolderSource>(folder, options);
+}
+
+}  // namespace dkb

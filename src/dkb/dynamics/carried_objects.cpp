@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/carried_objects.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "dkb/detection/mask_folder.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// Boxes to carry a mask by, where the detector gives none.
+void box_regions(Detections& detections) {
+  if (detections.mask.empty() || !detections.boxes.empty()) return;
+  for (const Box& box : region_boxes(detections.mask, MaskFolder::min_region))
+    detections.boxes.push_back({"mover", box, 1.0f});
+}
+
+}  // namespace
+
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
+  constexpr float kStill = -0.3f;  // the score runs from -1 to 3
+  for (int y = 0; y < mask.cells.height(); ++y)
+    for (int x = 0; x < mask.cells.width(); ++x) {
+      const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;
+      if (score.contains(sx, sy) && score(sx, sy) < kStill) mask.cells(x, y) = 0;
+    }
+}
+
+void CarriedObjectsOptions::check() const {
+  flow.check();
+  carry.check();
+  silhouette.check();
+  require_option(points_per_box >= 4, "dynamics.points_per_box", points_per_box, "at least 4");
+  require_option(missed_results >= 0, "dynamics.missed_results", missed_results, "at least 0");
+}
+
+CarriedObjects::CarriedObjects(const Camera& camera, const CarriedObjectsOptions& options)
+    : camera_(camera), options_(options), flow_(options.flow) {
+  options_.check();
+}
+
+std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const ImagePyramid& to,
+                                                 const std::vector<Detection>& boxes) const {
+  std::vector<Eigen::Vector2f> points;
+  std::vector<uint8_t> chosen(from.corners.size(), 0);
+  for (const Detection& d : boxes) {
+    std::vector<size_t> inside;
+    for (size_t i = 0; i < from.corners.size(); ++i)
+      if (!chosen[i] && d.box.contains(from.corners[i].x(), from.corners[i].y())) inside.push_back(i);
+    const size_t step = std::max<size_t>(1, inside.size() / static_cast<size_t>(options_.points_per_box));
+    for (size_t k = 0; k < inside.size(); k += step) {
+      chosen[inside[k]] = 1;
+      points.push_back(from.corners[inside[k]]);
+    }
+  }
+  std::vector<PointMotion> motions;
+  const auto results = flow_.track(*from.pyramid, to, points);
+  for (size_t i = 0; i < points.size(); ++i)
+    if (results[i].found)
+      motions.push_back({points[i].x(), points[i].y(), results[i].position.x(), results[i].position.y()});
+  return motions;
+}
+
+Detections CarriedObjects::carry_to(const PastFrame& from, const ImagePyramid& to, const Detections& detections,
+                                    int frames) const {
+  if (frames == 0) return detections;
+  return carry(detections, motions(from, to, detections.boxes), frames, camera_.width, camera_.height, options_.carry);
+}
+
+std::vector<Detection> CarriedObjects::boxes() const {
+  std::vector<Detection> boxes;
+  for (const Carried& c : carried_) boxes.push_back(c.detection);
+  return boxes;
+}
+
+// carry() may drop boxes that left the image, so each goes alone and keeps its count of misses.
+void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid) {
+  if (past.empty() || carried_.empty()) return;
+  const auto moved_points = motions(past.back(), pyramid, boxes());
+  const auto carried = [&](const Detections& d) {
+    return carry(d, moved_points, 1, camera_.width, camera_.height, options_.carry);
+  };
+  if (!mask_.empty()) mask_ = carried({boxes(), mask_}).mask;
+  std::vector<Carried> moved;
+  for (const Carried& c : carried_) {
+    const Detections there = carried({{c.detection}, {}});
+    if (!there.boxes.empty()) moved.push_back({there.boxes.front(), c.missed});
+  }
+  carried_ = std::move(moved);
+}
+
+std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, FrameIndex now,
+                                              const PastFrames& past, const ImagePyramid& pyramid, int score_cell) {
+  std::vector<LateMask> late;
+  Detections detections = answer;
+  box_regions(detections);
+  Detections here = detections;
+  const auto source = std::find_if(past.begin(), past.end(), [&](const PastFrame& p) { return p.frame == from; });
+  if (source != past.end()) {
+    for (const PastFrame& p : past) {
+      if (!p.keyframe || detections.boxes.empty()) continue;
+      const Detections there = carry_to(*source, *p.pyramid, detections, std::abs(p.frame - from));
+      LateMask mask{p.frame, silhouettes(p.image->depth, there.mask.empty() ? there.boxes : std::vector<Detection>(),
+                                         options_.silhouette)};
+      if (!p.still_score.empty()) clear_still(mask.mask, p.still_score, score_cell);
+      if (!there.mask.empty()) unite(mask.mask, {1, there.mask}, camera_.width, camera_.height);
+      late.push_back(std::move(mask));
+    }
+    here = carry(detections, motions(*source, pyramid, detections.boxes), now - from, camera_.width, camera_.height,
+                 options_.carry);
+  }
+  std::vector<Carried> next;
+  for (const Detection& d : here.boxes) next.push_back({d, 0});
+  // What the detector overlooks once or twice does not vanish.
+  for (const Carried& old : carried_) {
+    const bool seen_again = std::any_of(here.boxes.begin(), here.boxes.end(), [&](const Detection& d) {
+      return intersection_over_union(d.box, old.detection.box) > 0.3f;
+    });
+    if (!seen_again && old.missed < options_.missed_results) next.push_back({old.detection, old.missed + 1});
+  }
+  carried_ = std::move(next);
+  mask_ = std::move(here.mask);
+  return late;
+}
+
+}  // namespace dkb

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/detection/carried_detections.h"
+#include "dkb/dynamics/mover_mask.h"
+#include "dkb/dynamics/past_frame.h"
+#include "dkb/dynamics/silhouette.h"
+#include "dkb/features/optical_flow.h"
+
+namespace dkb {
+
+struct CarriedObjectsOptions {
+  OpticalFlowOptions flow;
+  CarryOptions carry;
+  SilhouetteOptions silhouette;
+  int points_per_box = 40;  // features followed to carry a box, >= 4
+  int missed_results = 2;   // detector results that may miss an object before its box is dropped, >= 0
+  void check() const;
+};
+
+// Where movers were in an earlier keyframe, as a detection has shown since.
+struct LateMask {
+  FrameIndex frame = 0;
+  MoverMask mask;
+};
+
+// What a slow detector has said, carried by optical flow to the newest image. Deterministic.
+class CarriedObjects {
+ public:
+  CarriedObjects(const Camera& camera, const CarriedObjectsOptions& options);
+
+  // One frame on, from the newest of `past` to the image of `pyramid`.
+  void follow(const PastFrames& past, const ImagePyramid& pyramid);
+  // Works in what was detected in frame `from`, and counts in frame `now` from here on. The masks of the keyframes since
+  // `from`, which may have let movers into the map: the detector's own, or else silhouettes of its boxes, without what
+  // was seen to stand still (score by cells of `score_cell` px).
+  std::vector<LateMask> receive(FrameIndex from, const Detections& detections, FrameIndex now, const PastFrames& past,
+                                const ImagePyramid& pyramid, int score_cell);
+
+  std::vector<Detection> boxes() const;
+  const GreyImage& mask() const { return mask_; }  // empty when the detector gives none
+
+ private:
+  struct Carried {
+    Detection detection;
+    int missed = 0;
+  };
+  std::vector<PointMotion> motions(const PastFrame& from, const ImagePyramid& to,
+                                   const std::vector<Detection>& boxes) const;
+  Detections carry_to(const PastFrame& from, const ImagePyramid& to, const Detections& detections, int frames) const;
+
+  Camera camera_;
+  CarriedObjectsOptions options_;
+  OpticalFlow flow_;
+  std::vector<Carried> carried_;
+  GreyImage mask_;
+};
+
+// Takes out of `mask` what the motion segmentation saw standing still before the object came: it is no part of it.
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell);
+
+}  // namespace dkb

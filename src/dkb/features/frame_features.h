@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "dkb/features/rgbd_features.h"
+
+namespace dkb {
+
+// What is known of the surface that a feature lies on.
+enum class FeatureMotion : uint8_t {
+  still,       // nothing speaks against it
+  near_mover,  // hangs together with a mover: where depth is missing, it may be the mover's
+  on_mover,    // a mover is seen there: only well-established map points may be found
+};
+
+// Features as matching takes them. Without `motion` all of them stand still.
+struct MatchableFeatures {
+  const RgbdFeatures& features;
+  std::span<const FeatureMotion> motion;  // per feature
+
+  MatchableFeatures(const RgbdFeatures& f, std::span<const FeatureMotion> m = {}) : features(f), motion(m) {}
+  FeatureMotion motion_of(size_t feature) const { return motion.empty() ? FeatureMotion::still : motion[feature]; }
+  bool on_mover(size_t feature) const { return motion_of(feature) == FeatureMotion::on_mover; }
+};
+
+// The features of a frame that tracking may use. Where they lie and how deep depends on the camera's velocity [m/s,
+// rad/s]: rows are exposed one after the other, and the depth image is of another time.
+class FrameFeatures {
+ public:
+  virtual ~FrameFeatures() = default;
+  virtual std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const = 0;
+
+  std::vector<FeatureMotion> motion;  // per feature; empty = all stand still
+};
+
+// Those that the extractor found in an image. What it is made of must outlive it.
+class ExtractedFeatures final : public FrameFeatures {
+ public:
+  ExtractedFeatures(const OrbFeatures& orb, const RgbdImage& image, const Camera& camera,
+                    const UndistortionTable& undistort, const DepthOptions& options)
+      : orb_(orb), image_(image), camera_(camera), undistort_(undistort), options_(options) {}
+  std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
+    return std::make_shared<const RgbdFeatures>(
+        make_rgbd_features(orb_, image_, camera_, undistort_, velocity, options_));
+  }
+
+ private:
+  const OrbFeatures& orb_;
+  const RgbdImage& image_;
+  const Camera& camera_;
+  const UndistortionTable& undistort_;
+  const DepthOptions& options_;
+};
+
+}  // namespace dkb

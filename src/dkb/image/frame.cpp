@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb_slam/frame.h"
+
+#include <cmath>
+#include <cstring>
+#include <iterator>
+
+#include "dkb/image/image.h"
+#include "dkb/image/rgbd_image.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+void check_view(const ImageView& view, bool is_depth, const Camera& camera) {
+  const std::string name = is_depth ? "depth image" : "colour image";
+  if (view.data == nullptr) throw InputError(name + ": its data is null; give a buffer of the camera's size");
+  const bool depth_format = view.format == PixelFormat::depth_u16 || view.format == PixelFormat::depth_f32;
+  if (static_cast<unsigned>(view.format) > static_cast<unsigned>(PixelFormat::depth_f32) || depth_format != is_depth)
+    throw InputError(name + ": its format is " + name_of(view.format) + "; it must be " +
+                     (is_depth ? "depth_u16 or depth_f32" : "rgb8, bgr8, rgba8, bgra8 or grey8"));
+  if (view.width != camera.width || view.height != camera.height)
+    throw InputError(name + ": it is of " + size_text(view.width, view.height) + " px, the camera of " +
+                     size_text(camera.width, camera.height) + "; give images of the camera's size");
+  if (view.stride != 0 && view.stride < view.row_bytes())
+    throw InputError(name + ": its stride of " + std::to_string(view.stride) + " bytes is less than the " +
+                     std::to_string(view.row_bytes()) + " of a row");
+}
+
+void check_prior(const MotionPrior& prior) {
+  const Rigid3& m = prior.previous_from_current;
+  if (!m.translation.allFinite() || !m.rotation.coeffs().allFinite() || !prior.covariance.allFinite())
+    throw InputError("motion prior: one of its numbers is not finite; leave the prior out of this frame");
+  if (std::abs(m.rotation.norm() - 1) > 1e-3)
+    throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
+}
+
+ColourImage copy_colour(const ImageView& view) {
+  const bool blue_first = view.format == PixelFormat::bgr8 || view.format == PixelFormat::bgra8;
+  const int step = bytes_per_pixel(view.format);
+  ColourImage image(view.width, view.height);
+  for (int y = 0; y < view.height; ++y) {
+    const uint8_t* in = view.row(y);
+    Rgb* out = image.row(y);
+    for (int x = 0; x < view.width; ++x, in += step)
+      out[x] = blue_first ? Rgb{in[2], in[1], in[0]} : Rgb{in[0], in[1], in[2]};
+  }
+  return image;
+}
+
+GreyImage copy_grey(const ImageView& view) {
+  GreyImage image(view.width, view.height);
+  for (int y = 0; y < view.height; ++y) std::memcpy(image.row(y), view.row(y), view.row_bytes());
+  return image;
+}
+
+DepthImage copy_depth(const ImageView& view, const Camera& camera) {
+  DepthImage image(view.width, view.height);
+  std::vector<uint16_t> units(view.format == PixelFormat::depth_u16 ? static_cast<size_t>(view.width) : 0);
+  const auto width = static_cast<size_t>(view.width);
+  for (int y = 0; y < view.height; ++y) {  // rows need not be aligned
+    float* out = image.row(y);
+    if (view.format == PixelFormat::depth_u16) {
+      std::memcpy(units.data(), view.row(y), view.row_bytes());
+      depth_from_units(units.data(), width, camera, out);
+    } else {
+      std::memcpy(out, view.row(y), view.row_bytes());
+      depth_from_metres(out, width, camera, out);
+    }
+  }
+  return image;
+}
+
+template <class T>
+ImageView view_of(const Image<T>& image, PixelFormat format) {
+  if (image.empty()) return {};
+  return {image.data(), image.width(), image.height(), 0, format};
+}
+
+}  // namespace
+
+const char* name_of(PixelFormat format) {
+  static constexpr const char* names[] = {"rgb8", "bgr8", "rgba8", "bgra8", "grey8", "depth_u16", "depth_f32"};
+  const auto i = static_cast<size_t>(format);
+  return i < std::size(names) ? names[i] : "unknown";
+}
+
+int bytes_per_pixel(PixelFormat format) {
+  static constexpr int bytes[] = {3, 3, 4, 4, 1, 2, 4};
+  const auto i = static_cast<size_t>(format);
+  return i < std::size(bytes) ? bytes[i] : 0;
+}
+
+Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.stamp_ns), prior_(input.prior) {
+  depth_stamp_ns_ = input.depth_stamp_ns < 0 ? stamp_ns_ : input.depth_stamp_ns;
+  check_view(input.colour, false, camera);
+  check_view(input.depth, true, camera);
+  if (prior_) check_prior(*prior_);
+  auto image = std::make_shared<RgbdImage>();
+  image->timestamp = seconds_from_ns(stamp_ns_);
+  image->depth_timestamp = seconds_from_ns(depth_stamp_ns_);
+  if (input.colour.format == PixelFormat::grey8) {
+    image->grey = copy_grey(input.colour);
+  } else {
+    image->colour = copy_colour(input.colour);
+    image->grey = grey_from_colour(image->colour);
+  }
+  image->depth = copy_depth(input.depth, camera);
+  image_ = std::move(image);
+}
+
+Frame::Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns)
+    : image_(std::move(image)), stamp_ns_(stamp_ns), depth_stamp_ns_(depth_stamp_ns) {}
+
+ImageView Frame::colour() const {
+  return image_ == nullptr ? ImageView{} : view_of(image_->colour, PixelFormat::rgb8);
+}
+ImageView Frame::grey() const {
+  return image_ == nullptr ? ImageView{} : view_of(image_->grey, PixelFormat::grey8);
+}
+ImageView Frame::depth() const {
+  return image_ == nullptr ? ImageView{} : view_of(image_->depth, PixelFormat::depth_f32);
+}
+
+DetectorInput detector_input(const Frame& frame) {
+  return {frame.stamp_ns(), frame.colour(), frame.grey(), frame.depth()};
+}
+
+Frame frame_of(std::shared_ptr<const RgbdImage> image) {
+  const int64_t stamp = ns_from_seconds(image->timestamp), depth_stamp = ns_from_seconds(image->depth_timestamp);
+  return Frame(std::move(image), stamp, depth_stamp);
+}
+
+}  // namespace dkb

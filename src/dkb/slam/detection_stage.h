@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/image/rgbd_image.h"
+#include "dkb/map/ids.h"
+#include "dkb/util/due_stage.h"
+#include "dkb/util/timing.h"
+#include "dkb_slam/detector.h"
+
+namespace dkb {
+
+// An answer of the slow detector at the frame from which on it counts.
+struct DueDetections {
+  FrameIndex frame = 0;  // whose image it was made from
+  int64_t stamp_ns = 0;  // of that image
+  Detections detections;
+};
+
+// Detection beside tracking. Every n-th image goes to the detector, and its answer counts a fixed number of frames
+// later. The first answer is waited for and counts at its own frame, so that nobody gets into the map before.
+// A detector that throws is a warning, and is not asked again.
+class DetectionStage {
+ public:
+  // The detector must outlive the stage. In a real-time run answers are not waited for, but for the first, and that one
+  // for a few seconds at most; images that the detector is too slow for are left out and counted.
+  DetectionStage(Detector& detector, const Camera& camera, const DetectionSchedule& schedule, bool threaded,
+                 bool realtime);
+
+  // Offers the image of a frame, by increasing index, and takes what counts from this frame on, oldest first.
+  std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  std::vector<std::string> take_warnings();
+
+  double rate_hz() const;  // answers per second of the sequence
+  size_t dropped() const { return dropped_; }
+  // Durations of detection and wait_detector since they were taken last.
+  StageTimes take_times() { return times_.take(); }
+
+ private:
+  struct Task {
+    FrameIndex index = 0;
+    Frame frame;
+  };
+  struct Answer {
+    DueDetections due;
+    std::string warning;
+    double ms = 0;
+  };
+  Answer detect(const Task& task) const;
+  void offer(FrameIndex index, const Frame& frame);
+  std::optional<Answer> take(FrameIndex index);
+
+  Detector& detector_;
+  const int width_, height_;
+  const DetectionSchedule schedule_;
+  const bool realtime_;
+  FrameIndex next_ = 0;  // the earliest frame to be offered
+  bool answered_ = false, failed_ = false;
+  size_t answers_ = 0, dropped_ = 0;
+  int64_t first_stamp_ = 0, last_stamp_ = 0;  // [ns] of answers
+  std::vector<std::string> warnings_;
+  StageTimes times_;
+  DueStage<Task, Answer> stage_;  // last: its thread uses the above
+};
+
+// Takes what lies outside the image out of `detections`, and a mask of another size; what was wrong, or nothing.
+std::string make_fit(Detections& detections, int width, int height);
+
+}  // namespace dkb

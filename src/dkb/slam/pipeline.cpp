@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// What happens to a frame, in order. What each step means for map and robot is in pipeline_steps.cpp.
+#include "dkb/slam/pipeline.h"
+
+#include <limits>
+#include <utility>
+
+namespace dkb {
+
+// One frame, as in DKB section 3: features, what moves, pose, keyframe decision. Mapping happens beside it.
+FrameResult Pipeline::process(const Frame& frame) {
+  last_stamp_ns_ = frame.stamp_ns();
+  FrameResult result;
+  const Stopwatch waiting;
+  take_due_map();
+  const std::vector<DueDetections> detections = scenes_.exchange(next_frame_, frame);
+  result.waiting_ms = waiting.ms();
+
+  const Stopwatch working;
+  const Scene scene = scenes_.look(extract(frame), undistort_, detections, expect(frame), outcome_);  // DKB 3.1
+  retract_late(scene.late_masks);
+  const UsableFeatures usable = usable_features(scene, options_.dynamics.motion.smoothing.reach, context_.camera.fx);
+  TrackedFrame tracked = track(scene, usable);
+  weigh_evidence(scene, tracked);
+  const KeyframeDecision decision = decide(scene, tracked);     // DKB 3.2
+  if (decision.insert) insert_keyframe(scene, tracked);         // DKB 3.3 happens there
+  result.features = report_features(scene, usable, tracked);
+  publish(scene, tracked, decision, result);
+  result.tracking_ms = working.ms();
+  record_.add_time("tracking", result.tracking_ms);
+  return result;
+}
+
+void Pipeline::finish() {
+  const FrameIndex due = next_frame_ + options_.pipeline.mapper_latency;
+  KeyframePacket report = tracker_.make_report();
+  if (next_keyframe_ > 0 && !localize_only_) mapping_.push(std::move(report), due);
+  bool adjusted_last = !options_.final_ba;
+  while (true) {
+    if (const auto view = mapping_.drain()) take_view(*view);
+    if (localize_only_ || next_keyframe_ == 0) break;
+    loop_.offer(tracker_.map().shared_view(), next_frame_, false);
+    auto corrections = loop_.take_due(std::numeric_limits<FrameIndex>::max(), true);
+    if (corrections.empty() && loop_.idle()) {
+      if (adjusted_last) break;
+      adjusted_last = true;
+      loop_.want_adjustment();
+    }
+    correct(std::move(corrections), due);
+  }
+  collect_times();
+}
+
+}  // namespace dkb

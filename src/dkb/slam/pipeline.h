@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/dense/dense_mapper.h"
+#include "dkb/dynamics/mover_tracker.h"
+#include "dkb/dynamics/point_evidence.h"
+#include "dkb/features/orb_extractor.h"
+#include "dkb/slam/loop_stage.h"
+#include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/odometry_frame.h"
+#include "dkb/slam/options.h"
+#include "dkb/slam/readout_calibration.h"
+#include "dkb/slam/run_record.h"
+#include "dkb/slam/scene_stage.h"
+#include "dkb/tracking/tracker.h"
+
+namespace dkb {
+
+// What stands outside a world and lasts from one to the next.
+struct PipelineContext {
+  Camera camera;
+  SlamOptions options;
+  Detectors detectors;
+  std::shared_ptr<KeyframePolicy> policy;  // of the user; may be null
+};
+
+// The stages of one world, from its first frame to its last: a new world gets a new pipeline. What a stage knows of
+// earlier frames is its own; a frame itself is a value that every stage makes richer.
+class Pipeline {
+ public:
+  // Goes on in `map`, whose keyframes are of frames below 0; an empty one is a new world. `context` and `record` must outlive the pipeline.
+  Pipeline(const PipelineContext& context, RunRecord& record, Map map);
+
+  // Throws InputError for a frame that does not fit.
+  void check(const Frame& frame) const;
+  // A frame that fits. Throws InputError for what failed in a stage's thread: the pipeline is of no use after that.
+  FrameResult process(const Frame& frame);
+  // Waits for all outstanding work and takes its result.
+  void finish();
+
+  void localize_only(bool on) { localize_only_ = on; }
+  void explain_keyframes(bool on) { explain_keyframes_ = on; }
+  const TrackingMap& map() const { return tracker_.map(); }
+  // From the keyframes so far. Throws InputError when dense mapping is off.
+  DenseMap dense_map() const;
+
+  std::vector<Event> take_events();
+
+ private:
+  void take_due_map();
+  void take_view(const MapView& view);
+  void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
+  ExtractedFrame extract(const Frame& frame);
+  Expectation expect(const Frame& frame) const;
+  TrackedFrame track(const Scene& scene, const UsableFeatures& usable);
+  void retract_late(const std::vector<LateMask>& masks);
+  void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
+  KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
+  void insert_keyframe(const Scene& scene, TrackedFrame& tracked);
+  void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
+  void note(Event::Kind kind, std::string text = "", int keyframe = -1);
+  void note_changes(const TrackedFrame& tracked);
+  void collect_times();
+
+  const PipelineContext& context_;
+  const SlamOptions& options_;
+  RunRecord& record_;
+  UndistortionTable undistort_;
+  OrbExtractor extractor_;
+  Tracker tracker_;
+  std::unique_ptr<KeyframeDecider> decider_;
+  SceneStage scenes_;
+  PointEvidence evidence_;
+  ReadoutCalibration readout_;
+  MoverTracker movers_;
+  OdometryFrame odometry_;
+  std::optional<DenseMapper> dense_;
+
+  // What the next frame needs of the one before.
+  FrameIndex next_frame_ = 0;
+  int64_t last_stamp_ns_ = 0;
+  Camera camera_at_readout_;  // as calibrated by now
+  double crowded_share_ = 0;  // of its features that movers took
+  MoverMask last_mask_;
+  std::optional<FrameOutcome> outcome_;
+  TrackingState last_state_ = TrackingState::initialising;
+  struct LastKeyframe {
+    KeyframeId id = kNoKeyframe;  // the newest one where the camera is
+    FrameIndex frame = 0;
+    int64_t stamp_ns = 0;
+  };
+  KeyframeId next_keyframe_ = 0;
+  LastKeyframe last_keyframe_;
+  FrameIndex last_relocalisation_ = -1000000;
+  struct RecentKeyframe {
+    FrameIndex frame;
+    KeyframeId id;
+    std::shared_ptr<const RgbdFeatures> features;
+  };
+  std::deque<RecentKeyframe> recent_keyframes_;  // whose detections may still be out
+
+  bool localize_only_ = false, explain_keyframes_ = false;
+  std::vector<Event> events_;
+  MappingStage mapping_;  // last: their threads end first
+  LoopStage loop_;
+};
+
+}  // namespace dkb

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dkb/keyframes/user_policy.h"
+#include "dkb/slam/pipeline.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
+  if (context.policy) return std::make_unique<UserKeyframeDecider>(context.policy);
+  if (context.options.keyframe_policy == KeyframePolicyKind::adaptive)
+    return std::make_unique<AdaptiveKeyframePolicy>(context.options.adaptive_keyframes, context.camera.width,
+                                                    context.camera.height);
+  return std::make_unique<BaselineKeyframePolicy>(context.options.baseline_keyframes);
+}
+
+ReadoutOptions readout_options(const SlamOptions& options) {
+  ReadoutOptions readout = options.readout;
+  readout.estimate = readout.estimate && options.depth.model_rolling_shutter;
+  return readout;
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
+    : context_(context),
+      options_(context.options),
+      record_(record),
+      undistort_(context.camera),
+      extractor_(options_.features),
+      tracker_(context.camera, options_.noise, options_.features.scale, options_.features.levels, options_.tracking,
+               options_.seed),
+      decider_(make_decider(context)),
+      scenes_(context.camera, options_.dynamics, context.detectors, options_.pipeline.threaded,
+              options_.pipeline.realtime),
+      evidence_(options_.evidence),
+      readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
+      movers_(context.camera, options_.movers),
+      odometry_(options_.base_from_cam),
+      camera_at_readout_(context.camera),
+      next_keyframe_(map.keyframe_count()),
+      mapping_(LocalMapper(context.camera, options_.noise, options_.features.scale, options_.features.levels,
+                           options_.mapping, map),
+               options_.pipeline.threaded),
+      loop_(Optics{context.camera, options_.noise, options_.features.scale, options_.features.levels},
+            options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
+  tracker_.set_start(options_.base_from_cam.inverse());
+  loop_.start_at(next_keyframe_);
+  last_keyframe_.id = next_keyframe_ - 1;
+  if (next_keyframe_ > 0) {
+    tracker_.take_view(map.snapshot());
+    tracker_.reset_motion();
+  }
+  if (options_.dense_map) {
+    DenseOptions dense = options_.dense;
+    if (!options_.pipeline.threaded) dense.threads = 1;
+    dense_.emplace(context.camera, options_.noise, dense);
+  }
+  record_.set_map(tracker_.map());
+  collect_times();
+}
+
+void Pipeline::check(const Frame& frame) const {
+  const std::string name = "frame " + std::to_string(next_frame_);
+  if (frame.empty()) throw InputError(name + ": it has no images");
+  const Camera& camera = context_.camera;
+  const RgbdImage& image = *frame.image();
+  const bool fits = image.grey.width() == camera.width && image.grey.height() == camera.height &&
+                    image.depth.width() == camera.width && image.depth.height() == camera.height;
+  if (!fits)
+    throw InputError(name + ": its images are not of the camera's size, " + std::to_string(camera.width) + " x " +
+                     std::to_string(camera.height));
+  if (next_frame_ > 0 && frame.stamp_ns() <= last_stamp_ns_)
+    throw InputError(name + ": its stamp " + stamp_text(frame.stamp_ns()) + " is not after the one before it (" +
+                     stamp_text(last_stamp_ns_) + "); call reset() or load_map() when the clock was set back");
+}
+
+void Pipeline::take_due_map() {
+  const Stopwatch watch;
+  const bool wait = !options_.pipeline.realtime;
+  const auto view = mapping_.take_due(next_frame_, wait);
+  if (view) take_view(*view);
+  if (!localize_only_) {
+    if (view && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, !wait);
+    correct(loop_.take_due(next_frame_, wait), next_frame_ + options_.pipeline.mapper_latency);
+  }
+  record_.add_time("wait_mapper", watch.ms());
+}
+
+void Pipeline::take_view(const MapView& view) {
+  const Rigid3 moved = tracker_.take_view(view);
+  odometry_.move_world(moved);
+  movers_.rebase(moved);
+  if (outcome_) outcome_->new_world_from_old = moved * outcome_->new_world_from_old;
+  record_.set_map(tracker_.map());
+}
+
+void Pipeline::correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due) {
+  for (auto& correction : corrections) {
+    if (correction->kind != MapCorrection::Kind::adjustment) {
+      const bool merge = correction->kind == MapCorrection::Kind::merge;
+      const LoopInfo loop{correction->near_side.front(), correction->far_side.front(), merge};
+      record_.add(loop);
+      note(merge ? Event::Kind::merge : Event::Kind::loop,
+           "keyframe " + std::to_string(loop.keyframe) + " shows the place of " +
+               std::to_string(loop.earlier_keyframe),
+           loop.keyframe);
+    }
+    mapping_.push(std::move(correction), due);
+  }
+}
+
+ExtractedFrame Pipeline::extract(const Frame& frame) {
+  const Stopwatch watch;
+  const GreyImage& grey = frame.image()->grey;
+  // When movers took most of the last frame's features, the rest of the image gets its half now.
+  const bool crowded = crowded_share_ > 0.5 && !last_mask_.empty();
+  ExtractedFrame extracted{next_frame_, frame,
+                           crowded ? extractor_.extract(grey, last_mask_.cells, last_mask_.cell)
+                                   : extractor_.extract(grey)};
+  record_.add_time("features", watch.ms());
+  return extracted;
+}
+
+Expectation Pipeline::expect(const Frame& frame) const {
+  Expectation expected;
+  const auto& last = tracker_.last_frame();
+  if (!last) return expected;
+  expected.current_from_previous = tracker_.expected_motion(frame.image()->timestamp - last->timestamp);
+  expected.cam_from_world = expected.current_from_previous * last->cam_from_world;
+  const Map& map = tracker_.map().view();
+  const auto keyframes = map.live_keyframes();
+  const size_t count = std::min(keyframes.size(), static_cast<size_t>(scenes_.keyframes_looked_at()));
+  for (size_t n = keyframes.size() - count; n < keyframes.size(); ++n) {
+    const Keyframe& k = *map.keyframe(keyframes[n]);
+    const Rigid3 cam_from_keyframe = expected.cam_from_world * k.cam_from_world.inverse();
+    for (const Keypoint& p : k.features->keypoints)
+      if (p.depth > 0)
+        expected.keyframe_points_in_camera.push_back(
+            cam_from_keyframe * context_.camera.unproject(p.pixel.cast<double>(), p.depth));
+  }
+  return expected;
+}
+
+// Detections that came after their keyframe: what it made on movers goes.
+void Pipeline::retract_late(const std::vector<LateMask>& masks) {
+  for (const LateMask& late : masks) {
+    if (dense_) dense_->remove_movers(late.frame, late.mask);
+    for (const RecentKeyframe& k : recent_keyframes_) {
+      if (k.frame != late.frame) continue;
+      std::vector<PointId> points;
+      for (size_t f = 0; f < k.features->size(); ++f) {
+        const Keypoint& p = k.features->keypoints[f];
+        if (late.mask.at(p.image_pixel.x(), p.image_pixel.y()))
+          points.push_back(make_point_id(k.id, static_cast<int>(f)));
+      }
+      tracker_.retract(points);
+    }
+  }
+}
+
+TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
+  const Frame& frame = scene.extracted.frame;
+  const RgbdImage& image = *frame.image();
+  camera_at_readout_.readout = readout_.readout();
+  ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.depth);
+  features.motion = usable.motion;
+  ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
+  TrackedFrame tracked =
+      tracker_.track({.index = next_frame_,
+                      .timestamp = image.timestamp,
+                      .features = features,
+                      .appearance = &appearance,
+                      .prior = frame.prior() ? &*frame.prior() : nullptr,
+                      .may_start_map = !localize_only_});
+  if (!tracked.tracked()) return tracked;
+  if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
+  return tracked;
+}
+
+// Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
+void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
+  if (!tracked.tracked() || scene.mask.empty()) return;
+  std::vector<PointId> matched;
+  for (PointId p : tracked.points)
+    if (p != kNoPoint) {
+      evidence_.fits_still_world(p);
+      matched.push_back(p);
+    }
+  std::sort(matched.begin(), matched.end());
+  const DepthImage& depth = scene.extracted.image().depth;
+  for (const PointInView& point : tracker_.points_in_view()) {
+    const Eigen::Vector2f at = undistort_.image_pixel(point.pixel);
+    if (!scene.mask.at(at.x(), at.y())) continue;
+    const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+    if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
+    const double surface = depth(x, y);
+    if (std::abs(surface - point.depth) < 0.05 * surface + 0.05 &&
+        !std::binary_search(matched.begin(), matched.end(), point.id))
+      evidence_.on_mover(point.id);
+  }
+  tracker_.retract(evidence_.take_convicted());
+}
+
+KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracked) {
+  if (!tracked.tracked()) return {};
+  if (tracked.state == TrackingState::relocalised) {
+    last_relocalisation_ = tracked.index;
+    last_keyframe_.id = tracked.reference;
+  }
+  const Stopwatch watch;
+  KeyframeDecision decision;
+  if (tracked.starts_map) {
+    decision = {true, KeyframeRule::first, "the map starts here"};
+  } else if (localize_only_) {
+    decision = {false, KeyframeRule::none, "the map is not changed"};
+  } else {
+    KeyframeContext c;
+    c.frame = tracked.index;
+    c.stamp_ns = scene.extracted.frame.stamp_ns();
+    c.last_keyframe_frame = last_keyframe_.frame;
+    c.last_keyframe_stamp_ns = last_keyframe_.stamp_ns;
+    c.last_relocalisation_frame = last_relocalisation_;
+    c.last_keyframe = last_keyframe_.id;
+    c.mapper_idle = mapping_.outstanding() == 0;
+    c.tracked_points = tracked.inliers;
+    for (size_t f = 0; f < tracked.points.size(); ++f) {
+      const float z = tracked.features->keypoints[f].depth;
+      if (!(z > 0) || z > options_.tracking.close_depth) continue;
+      ++(tracked.points[f] != kNoPoint ? c.tracked_close_points : c.creatable_close_points);
+    }
+    c.reference_points = tracker_.reference_point_count(tracked.reference, next_keyframe_ > 2 ? 2 : 1);
+    c.cam_from_world = tracked.cam_from_world;
+    c.last_keyframe_cam_from_world = tracker_.map().cam_from_world(c.last_keyframe);
+    c.points = &tracked.points;
+    c.features = tracked.features.get();
+    c.explain = explain_keyframes_;
+    const auto positions = context_.policy ? tracker_.positions(tracked.points)
+                                           : std::vector<std::optional<Eigen::Vector3d>>();
+    c.positions = &positions;
+    decision = decider_->decide(c, tracker_.map().view());
+    record_.add(decision.tests);
+    if (options_.pipeline.realtime && static_cast<int>(mapping_.outstanding()) >= options_.pipeline.mapper_queue) {
+      decision.insert = false;
+      decision.rule = KeyframeRule::none;
+      decision.explanation = "mapping has enough to do; " + decision.explanation;
+    }
+  }
+  record_.add_time("keyframe_decision", watch.ms());
+  if (decision.insert) record_.add(decision.rule);
+  return decision;
+}
+
+void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
+  const KeyframeId id = next_keyframe_++;
+  last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
+  KeyframePacket packet = tracker_.make_keyframe(id, tracked);
+  tracked.makes_point.assign(tracked.points.size(), 0);
+  for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;
+  recent_keyframes_.push_back({tracked.index, id, tracked.features});
+  while (recent_keyframes_.front().frame < tracked.index - 2 * scenes_.memory()) recent_keyframes_.pop_front();
+  mapping_.push(std::move(packet), tracked.index + options_.pipeline.mapper_latency);
+  tracked.reference = id;
+  tracked.cam_from_reference = {};
+  if (dense_) {
+    const Stopwatch watch;
+    // People who stand still are fit to track by, but no part of the map.
+    MoverMask movers = scene.mask;
+    const RgbdImage& image = scene.extracted.image();
+    unite(movers, silhouettes(image.depth, scene.boxes, options_.dynamics.carried.silhouette), image.depth.width(),
+          image.depth.height());
+    dense_->add_keyframe(tracked.index, image, movers);
+    record_.add_time("dense_keyframe", watch.ms());
+  }
+}
+
+void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision,
+                       FrameResult& result) {
+  const Frame& frame = scene.extracted.frame;
+  result.frame = tracked.index;
+  result.stamp_ns = frame.stamp_ns();
+  result.state = tracked.state;
+  result.detections = scene.boxes;
+  result.mask = scene.mask;
+  if (tracked.tracked()) {
+    const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
+    odometry_.update(world_from_cam, tracked.state == TrackingState::relocalised && tracked.index == 0);
+    result.world_from_cam = world_from_cam;
+    result.odom_from_cam = odometry_.odom_from_cam();
+    result.covariance = tracked.covariance;
+    result.inliers = tracked.inliers;
+    result.reference_keyframe = tracked.reference;
+    result.keyframe = decision.insert;
+    if (explain_keyframes_) result.keyframe_explanation = explained(decision);
+    if (options_.dynamics.filter == FilterKind::standard)
+      result.movers = movers_.update(frame.image()->timestamp, frame.image()->depth, scene.mask, scene.boxes,
+                                     world_from_cam);
+  } else if (tracked.state == TrackingState::lost) {
+    odometry_.lost();
+  }
+  result.world_from_odom = odometry_.world_from_odom();
+  record_.add(tracked, result, tracker_.map());
+  note_changes(tracked);
+  if (decision.insert) note(Event::Kind::keyframe, "", tracked.reference);
+  if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
+
+  const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
+                                     [](FeatureReason reason) { return reason != FeatureReason::none; });
+  crowded_share_ = scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
+  last_mask_ = scene.mask;
+  outcome_ = FrameOutcome{tracked.tracked() ? std::optional(tracked.cam_from_world) : std::nullopt, decision.insert, {}};
+  last_state_ = tracked.state;
+  collect_times();
+  ++next_frame_;
+}
+
+void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
+  events_.push_back({kind, next_frame_, last_stamp_ns_, keyframe, std::move(text)});
+}
+
+void Pipeline::note_changes(const TrackedFrame& tracked) {
+  if (tracked.starts_map) note(Event::Kind::new_map);
+  if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
+  if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
+  for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
+}
+
+// What runs beside tracking says how it is getting on.
+void Pipeline::collect_times() {
+  const MappingReport& report = mapping_.report();
+  Statistics s;
+  s.points_created = report.points_created;
+  s.points_culled = report.points_culled;
+  s.points_fused = report.points_fused;
+  s.points_retracted = report.points_retracted;
+  s.keyframes_culled = report.keyframes_culled;
+  s.detector = scenes_.detector_kind();
+  s.detector_rate_hz = scenes_.detector_rate_hz();
+  s.detector_latency_frames = scenes_.detector_latency();
+  StageTimes times = mapping_.take_times();
+  times.merge(loop_.take_times());
+  times.merge(scenes_.take_times());
+  record_.set_stages(s, times);
+}
+
+std::vector<Event> Pipeline::take_events() {
+  return std::exchange(events_, {});
+}
+
+DenseMap Pipeline::dense_map() const {
+  if (!dense_) throw InputError("dense map: it was not asked for; set Options::dense_map");
+  std::vector<TimedPose> poses;
+  for (const TrajectoryFrame& f : record_.trajectory(false))
+    if (f.map == 0) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
+  return dense_->build(poses, options_.seed);
+}
+
+}  // namespace dkb

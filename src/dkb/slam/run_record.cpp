@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/run_record.h"
+
+#include <algorithm>
+
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+// Maps are numbered by the age of their roots. A root that is not among them is newer than all.
+int rank_of(const std::vector<KeyframeId>& roots, KeyframeId root) {
+  return static_cast<int>(std::lower_bound(roots.begin(), roots.end(), root) - roots.begin());
+}
+
+}  // namespace
+
+void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const TrackingMap& map) {
+  const std::lock_guard lock(mutex_);
+  map_ = map;
+  ++counts_.frames;
+  for (const FeatureReport& f : result.features) counts_.features_removed += f.state == FeatureState::dynamic;
+  counts_.lost += result.state == TrackingState::lost;
+  if (!result.tracked()) return;
+  ++counts_.tracked;
+  counts_.relocalisations += result.state == TrackingState::relocalised;
+  records_.push_back({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam});
+}
+
+void RunRecord::add(const KeyframeTests& tests) {
+  const std::lock_guard lock(mutex_);
+  tests_.add(tests);
+}
+
+void RunRecord::add(KeyframeRule rule) {
+  const std::lock_guard lock(mutex_);
+  ++counts_.keyframes_inserted;
+  ++counts_.keyframe_rules[name_of(rule)];
+}
+
+void RunRecord::add(const LoopInfo& loop) {
+  const std::lock_guard lock(mutex_);
+  loops_.push_back(loop);
+  ++(loop.merge ? counts_.merges : counts_.loops);
+}
+
+void RunRecord::set_map(const TrackingMap& map) {
+  const std::lock_guard lock(mutex_);
+  map_ = map;
+}
+
+void RunRecord::add_time(const std::string& stage, double ms) {
+  const std::lock_guard lock(mutex_);
+  times_.add(stage, ms);
+}
+
+void RunRecord::set_stages(const Statistics& of_stages, const StageTimes& times) {
+  const std::lock_guard lock(mutex_);
+  of_stages_ = of_stages;
+  times_.merge(times);
+}
+
+MapSnapshot RunRecord::map() const {
+  const std::lock_guard lock(mutex_);
+  return {map_.shared_view(), loops_};
+}
+
+std::vector<TrajectoryFrame> RunRecord::trajectory(bool online) const {
+  const std::lock_guard lock(mutex_);
+  const std::vector<KeyframeId> roots = map_.view().roots();
+  std::vector<TrajectoryFrame> frames;
+  frames.reserve(records_.size());
+  for (const Record& r : records_)
+    frames.push_back({r.frame, r.stamp_ns,
+                      online ? r.world_from_cam_online
+                             : (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse(),
+                      rank_of(roots, map_.root(r.reference))});
+  return frames;
+}
+
+std::vector<TrajectoryFrame> RunRecord::keyframes() const {
+  std::vector<TrajectoryFrame> frames;
+  for (const KeyframeInfo& k : map().keyframes()) frames.push_back({k.frame, k.stamp_ns, k.world_from_cam, k.map});
+  return frames;
+}
+
+Statistics RunRecord::statistics() const {
+  const std::lock_guard lock(mutex_);
+  Statistics s = counts_;
+  s.keyframe_tests = tests_.by_name();
+  s.keyframes = map_.view().live_keyframe_count();
+  s.maps = static_cast<int>(map_.view().roots().size());
+  s.map_points = map_.view().point_count();
+  s.points_created = of_stages_.points_created;
+  s.points_culled = of_stages_.points_culled;
+  s.points_fused = of_stages_.points_fused;
+  s.points_retracted = of_stages_.points_retracted;
+  s.keyframes_culled = of_stages_.keyframes_culled;
+  s.detector = of_stages_.detector;
+  s.detector_rate_hz = of_stages_.detector_rate_hz;
+  s.detector_latency_frames = of_stages_.detector_latency_frames;
+  s.stages = times_.summaries();
+  return s;
+}
+
+MapSnapshot::MapSnapshot() : map_(std::make_shared<const Map>()) {}
+MapSnapshot::MapSnapshot(std::shared_ptr<const Map> map, std::vector<LoopInfo> loops)
+    : map_(std::move(map)), loops_(std::move(loops)) {}
+
+size_t MapSnapshot::point_count() const {
+  return map_->point_count();
+}
+int MapSnapshot::keyframe_count() const {
+  return map_->live_keyframe_count();
+}
+
+std::vector<PointInfo> MapSnapshot::points() const {
+  std::vector<PointInfo> points;
+  points.reserve(map_->point_count());
+  for (PointId id : map_->live_points()) {
+    const MapPoint& p = *map_->point(id);
+    points.push_back({id, p.position, p.colour, static_cast<int>(p.observations.size())});
+  }
+  return points;
+}
+
+std::vector<KeyframeInfo> MapSnapshot::keyframes() const {
+  const std::vector<KeyframeId> roots = map_->roots();
+  std::vector<KeyframeInfo> keyframes;
+  for (KeyframeId id : map_->live_keyframes()) {
+    const Keyframe& k = *map_->keyframe(id);
+    KeyframeInfo info{id, ns_from_seconds(k.timestamp), k.frame, k.cam_from_world.inverse(), {}, 0};
+    info.map = rank_of(roots, map_->root(id));
+    for (const Covisible& c : k.covisible) info.covisible.push_back({c.keyframe, c.shared_points});
+    keyframes.push_back(std::move(info));
+  }
+  return keyframes;
+}
+
+}  // namespace dkb

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include "dkb/keyframes/keyframe_policy.h"
+#include "dkb/tracking/frame.h"
+#include "dkb/tracking/tracking_map.h"
+#include "dkb/util/timing.h"
+#include "dkb_slam/slam.h"
+
+namespace dkb {
+
+// What a run has brought so far. The pipeline writes on its thread; any thread reads.
+class RunRecord {
+ public:
+  // A frame, and the map by which it has its pose.
+  void add(const TrackedFrame& frame, const FrameResult& result, const TrackingMap& map);
+  void add(const KeyframeTests& tests);
+  void add(KeyframeRule rule);  // that made a keyframe
+  void add(const LoopInfo& loop);
+  void set_map(const TrackingMap& map);
+  void add_time(const std::string& stage, double ms);
+  // What the stages beside tracking have counted by now, and the durations since they were asked last.
+  void set_stages(const Statistics& of_stages, const StageTimes& times);
+
+  MapSnapshot map() const;
+  // A frame hangs on a keyframe, since the world may still move; or as it was published.
+  std::vector<TrajectoryFrame> trajectory(bool online) const;
+  std::vector<TrajectoryFrame> keyframes() const;
+  Statistics statistics() const;
+
+ private:
+  struct Record {
+    FrameIndex frame = 0;
+    int64_t stamp_ns = 0;
+    KeyframeId reference = kNoKeyframe;
+    Rigid3 cam_from_reference, world_from_cam_online;
+  };
+  mutable std::mutex mutex_;  // guards what follows
+  std::vector<Record> records_;
+  std::vector<LoopInfo> loops_;
+  TrackingMap map_;
+  Statistics counts_;
+  KeyframeTestCounts tests_;
+  Statistics of_stages_;
+  StageTimes times_;
+};
+
+}  // namespace dkb

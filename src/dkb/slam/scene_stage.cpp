@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/scene_stage.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "dkb/detection/mask_folder.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+void DynamicsOptions::check() const {
+  rivals.check();
+  motion.check();
+  carried.check();
+  require_option(support_cell >= 2 && support_cell <= 32, "dynamics.support_cell", support_cell, "2 ... 32 px");
+}
+
+SceneStage::SceneStage(const Camera& camera, const DynamicsOptions& options, const Detectors& detectors, bool threaded,
+                       bool realtime)
+    : camera_(camera),
+      options_(options),
+      schedule_(detectors.schedule),
+      prompt_(detectors.prompt),
+      slow_(detectors.slow),
+      carried_(camera, options.carried) {
+  options_.rivals.flow = options_.carried.flow;
+  options_.check();
+  schedule_.check();
+  if (options_.filter == FilterKind::none) return;
+  if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
+  segments_motion_ = detectors.motion;
+  // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
+  const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
+  if (!segments_motion_) options_.motion.cell = options_.support_cell;
+  if (segments_motion_ || supports) motion_.emplace(camera, options_.motion);
+  for (const auto& detector : prompt_) detector->reset();
+  if (slow_ == nullptr) return;
+  slow_->reset();
+  slow_stage_.emplace(*slow_, camera, schedule_, threaded, realtime);
+}
+
+std::vector<DueDetections> SceneStage::exchange(FrameIndex index, const Frame& frame) {
+  if (!slow_stage_) return {};
+  auto due = slow_stage_->exchange(index, frame);
+  for (std::string& warning : slow_stage_->take_warnings()) warnings_.push_back(std::move(warning));
+  return due;
+}
+
+void SceneStage::learn(const FrameOutcome& before) {
+  if (motion_) motion_->commit(before.cam_from_world);
+  if (before.keyframe && !past_.empty()) {
+    past_.back().keyframe = true;
+    if (motion_) past_.back().still_score = motion_->score();
+  }
+  if (motion_) motion_->move_world(before.new_world_from_old);
+}
+
+MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes) {
+  MoverMask given;
+  for (const auto& detector : prompt_) {
+    Detections found;
+    std::string wrong;
+    try {
+      found = detector->detect(detector_input(frame));
+      wrong = make_fit(found, camera_.width, camera_.height);
+    } catch (const std::exception& e) {
+      wrong = e.what();
+    }
+    if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
+    boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());
+    if (!found.mask.empty()) unite(given, {1, std::move(found.mask)}, camera_.width, camera_.height);
+  }
+  return given;
+}
+
+MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_from_world,
+                                     std::vector<Detection>& boxes) {
+  if (!motion_) return {};
+  const Stopwatch watch;
+  MoverMask moving;
+  if (segments_motion_)
+    moving = motion_->segment(image, cam_from_world);
+  else
+    motion_->observe(image, cam_from_world);
+  times_.add("motion", watch.ms());
+  if (rival_ && !moving.empty())  // the rivals know boxes only
+    for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
+      const float c = static_cast<float>(moving.cell);
+      boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
+    }
+  return moving;
+}
+
+MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& boxes, const MoverMask& given,
+                              const MoverMask& moving) const {
+  MoverMask mask = given.empty() ? silhouettes(image.depth, boxes, options_.carried.silhouette) : MoverMask{};
+  if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
+  unite(mask, given, camera_.width, camera_.height);
+  if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);
+  return mask;
+}
+
+void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid) {
+  PastFrame now{frame.index, frame.frame.image(), std::move(pyramid), {}, {}, false};
+  for (const Corner& c : frame.orb.corners) now.corners.emplace_back(c.x, c.y);
+  past_.push_back(std::move(now));
+  const size_t kept = slow_stage_ ? static_cast<size_t>(memory()) + 1 : 1;
+  while (past_.size() > kept) past_.pop_front();
+}
+
+Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
+                       const Expectation& expected, const std::optional<FrameOutcome>& before) {
+  if (before) learn(*before);
+  Scene scene;
+  scene.rejected.assign(frame.orb.corners.size(), FeatureReason::none);
+  scene.extracted = std::move(frame);
+  if (options_.filter == FilterKind::none) return scene;
+  const RgbdImage& image = scene.extracted.image();
+
+  Stopwatch watch;
+  std::shared_ptr<const ImagePyramid> pyramid;
+  if (slow_stage_ || (rival_ && rival_->needs_pyramid())) {
+    auto made = std::make_shared<ImagePyramid>(options_.carried.flow.pyramid());
+    made->build(image.grey);
+    pyramid = std::move(made);
+  }
+  if (slow_stage_) carried_.follow(past_, *pyramid);
+  for (const DueDetections& d : due) {
+    auto late =
+        carried_.receive(d.frame, d.detections, scene.extracted.index, past_, *pyramid, options_.motion.cell);
+    if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(scene.late_masks));
+  }
+  scene.boxes = carried_.boxes();
+  MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes);
+  if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
+  const MoverMask moving = segment_motion(image, expected.cam_from_world, scene.boxes);
+  times_.add("flow", watch.ms());
+
+  watch = Stopwatch();
+  const auto& corners = scene.extracted.orb.corners;
+  if (rival_) {
+    const auto dynamic = rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes,
+                                          past_.empty() ? nullptr : &past_.back(), pyramid.get(),
+                                          expected.current_from_previous, expected.keyframe_points_in_camera});
+    for (size_t i = 0; i < corners.size(); ++i)
+      if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
+  } else {
+    scene.mask = mask_of(image, scene.boxes, given, moving);
+    for (size_t i = 0; i < corners.size(); ++i)
+      if (scene.mask.at(corners[i].x, corners[i].y)) scene.rejected[i] = FeatureReason::on_mover;
+  }
+  times_.add("filter", watch.ms());
+  if (pyramid) remember(scene.extracted, std::move(pyramid));
+  return scene;
+}
+
+std::vector<std::string> SceneStage::take_warnings() {
+  return std::exchange(warnings_, {});
+}
+
+std::string SceneStage::detector_kind() const {
+  std::string kind = slow_ ? slow_->kind() : "";
+  if (segments_motion_) kind += kind.empty() ? "motion" : "+motion";
+  for (const auto& d : prompt_) kind += (kind.empty() ? "" : "+") + d->kind();
+  return kind.empty() ? "none" : kind;
+}
+
+StageTimes SceneStage::take_times() {
+  if (slow_stage_) times_.merge(slow_stage_->take_times());
+  return times_.take();
+}
+
+}  // namespace dkb

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/comparison/rival_filter.h"
+#include "dkb/dynamics/carried_objects.h"
+#include "dkb/dynamics/motion_segmenter.h"
+#include "dkb/slam/detection_stage.h"
+#include "dkb/slam/scene.h"
+#include "dkb/util/timing.h"
+
+namespace dkb {
+
+struct DynamicsOptions {
+  FilterKind filter = FilterKind::standard;
+  RivalFilterOptions rivals;
+  MotionOptions motion;
+  CarriedObjectsOptions carried;
+  int support_cell = 4;  // [px] cells of the motion segmentation when it only supports another detector, 2 ... 32
+  void check() const;
+};
+
+// What tracking knows before it looks at a frame.
+struct Expectation {
+  Rigid3 current_from_previous, cam_from_world;
+  std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes
+};
+
+// What became of the frame before: what the stage learns by it.
+struct FrameOutcome {
+  std::optional<Rigid3> cam_from_world;  // in the world of that time; nothing when lost
+  bool keyframe = false;
+  Rigid3 new_world_from_old;  // how the map was corrected since
+};
+
+// Says what of a frame moves (DKB section 3.1): detections made beside tracking are carried to the frame by flow, prompt
+// detectors are asked, depth is held against earlier views, and the chosen filter rejects corners. Deterministic.
+class SceneStage {
+ public:
+  // `threaded`, `realtime`: of the slow detector.
+  SceneStage(const Camera& camera, const DynamicsOptions& options, const Detectors& detectors, bool threaded,
+             bool realtime);
+
+  // What the slow detector has due at this frame. It may wait.
+  std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
+             const Expectation& expected, const std::optional<FrameOutcome>& before);
+
+  int keyframes_looked_at() const { return rival_ ? rival_->keyframes_looked_at() : 0; }
+  // [frames] after which no late mask of a keyframe can come any more.
+  int memory() const { return schedule_.latency + schedule_.every; }
+
+  std::vector<std::string> take_warnings();
+  std::string detector_kind() const;
+  double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
+  int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
+  // Durations of flow, motion, filter and of the detector since they were taken last.
+  StageTimes take_times();
+
+ private:
+  void learn(const FrameOutcome& before);
+  MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes);
+  MoverMask segment_motion(const RgbdImage& image, const Rigid3& cam_from_world, std::vector<Detection>& boxes);
+  MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& boxes, const MoverMask& given,
+                    const MoverMask& moving) const;
+  void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
+
+  Camera camera_;
+  DynamicsOptions options_;
+  DetectionSchedule schedule_;
+  std::vector<std::shared_ptr<Detector>> prompt_;
+  std::shared_ptr<Detector> slow_;
+  std::optional<DetectionStage> slow_stage_;
+  std::optional<RivalFilter> rival_;
+  std::optional<MotionSegmenter> motion_;
+  bool segments_motion_ = false;  // as a detector of its own
+  CarriedObjects carried_;        // of the slow detector
+  PastFrames past_;               // as many as the slow detector's latency needs
+  std::vector<std::string> warnings_;
+  StageTimes times_;
+};
+
+}  // namespace dkb

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+// The library's front door; what happens to a frame stands in pipeline.cpp.
+#include "dkb_slam/slam.h"
+
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <utility>
+
+#include "dkb/map/map_file.h"
+#include "dkb/slam/pipeline.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+const char* version() {
+  return DKB_SLAM_VERSION;
+}
+
+const char* name_of(Event::Kind kind) {
+  static constexpr const char* names[] = {"keyframe", "loop", "merge", "lost", "found", "new_map", "warning"};
+  return names[static_cast<size_t>(kind)];
+}
+
+Detectors Detectors::none() {
+  Detectors none;
+  none.motion = false;
+  return none;
+}
+
+void DetectionSchedule::check() const {
+  require_option(every >= 1, "detector.every", every, "at least 1 frame");
+  require_option(latency >= 0, "detector.latency", latency, "at least 0 frames");
+}
+
+namespace {
+
+constexpr size_t kMaxEvents = 10000;
+
+// The events that nobody has taken yet, and whoever is called for them.
+class EventOutlet {
+ public:
+  void deliver(std::vector<Event> events) {
+    if (events.empty()) return;
+    if (!callback_) {
+      const std::lock_guard lock(mutex_);
+      for (Event& e : events) waiting_.push_back(std::move(e));
+      while (waiting_.size() > kMaxEvents) waiting_.pop_front();
+      return;
+    }
+    for (const Event& e : events) {
+      if (executor_)
+        executor_([callback = callback_, e] { callback(e); });
+      else
+        callback_(e);
+    }
+  }
+  std::vector<Event> take() {
+    const std::lock_guard lock(mutex_);
+    std::vector<Event> events(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+    waiting_.clear();
+    return events;
+  }
+  void set(std::function<void(const Event&)> callback, Slam::Executor executor) {
+    callback_ = std::move(callback);
+    executor_ = std::move(executor);
+  }
+
+ private:
+  std::function<void(const Event&)> callback_;  // the feeding thread's
+  Slam::Executor executor_;
+  std::mutex mutex_;
+  std::deque<Event> waiting_;
+};
+
+SlamOptions options_of(const Options& options) {
+  SlamOptions values = options.internal();
+  values.pipeline.threaded = options.threaded;
+  values.pipeline.realtime = options.realtime;
+  values.dense_map = options.dense_map;
+  values.base_from_cam = options.base_from_cam;
+  return values;
+}
+
+}  // namespace
+
+class Slam::Impl {
+ public:
+  Impl(const Camera& camera, const Options& given, Detectors detectors, std::shared_ptr<KeyframePolicy> policy)
+      : options(given), context{camera, options_of(given), std::move(detectors), std::move(policy)} {
+    context.camera.check();
+    context.options.check();
+    context.detectors.schedule.check();
+    start({});
+  }
+
+  void start(Map map) {
+    failure = nullptr;
+    pipeline.reset();
+    auto fresh = std::make_shared<RunRecord>();
+    {
+      const std::lock_guard lock(record_mutex);
+      record = fresh;
+    }
+    pipeline = std::make_unique<Pipeline>(context, *fresh, std::move(map));
+    pipeline->localize_only(localize_only);
+    pipeline->explain_keyframes(explain_keyframes);
+  }
+
+  // What `work` throws ends this world: every call throws it until a new one is begun.
+  template <class Work>
+  auto guarded(const Work& work) {
+    if (failure) std::rethrow_exception(failure);
+    try {
+      return work();
+    } catch (const InputError&) {
+      failure = std::current_exception();
+    } catch (const std::exception& e) {
+      failure = std::make_exception_ptr(InputError(std::string("tracking failed: ") + e.what()));
+    }
+    std::rethrow_exception(failure);
+  }
+
+  MapFileContext map_context() const {
+    return {context.camera, context.options.features.scale, context.options.features.levels};
+  }
+
+  // The record of this world: readers on other threads keep it for as long as they read.
+  std::shared_ptr<const RunRecord> shared_record() const {
+    const std::lock_guard lock(record_mutex);
+    return record;
+  }
+
+  Options options;
+  PipelineContext context;
+  bool paused = false, localize_only = false, explain_keyframes = false;
+  EventOutlet events;
+  std::exception_ptr failure;
+  mutable std::mutex record_mutex;
+  std::shared_ptr<RunRecord> record;
+  std::unique_ptr<Pipeline> pipeline;
+};
+
+Slam::Slam(const Camera& camera, const Options& options, Detectors detectors, std::shared_ptr<KeyframePolicy> policy)
+    : impl_(std::make_unique<Impl>(camera, options, std::move(detectors), std::move(policy))) {}
+Slam::~Slam() = default;
+Slam::Slam(Slam&&) noexcept = default;
+Slam& Slam::operator=(Slam&&) noexcept = default;
+
+FrameResult Slam::process(const FrameInput& input) {
+  return process(Frame(impl_->context.camera, input));
+}
+
+FrameResult Slam::process(const Frame& frame) {
+  if (impl_->paused) {
+    FrameResult result;
+    result.stamp_ns = frame.stamp_ns();
+    result.state = TrackingState::paused;
+    return result;
+  }
+  impl_->pipeline->check(frame);
+  FrameResult result = impl_->guarded([&] { return impl_->pipeline->process(frame); });
+  impl_->events.deliver(impl_->pipeline->take_events());
+  return result;
+}
+
+void Slam::finish() {
+  impl_->guarded([&] { impl_->pipeline->finish(); });
+  impl_->events.deliver(impl_->pipeline->take_events());
+}
+
+void Slam::reset() {
+  impl_->start({});
+}
+void Slam::pause(bool on) {
+  impl_->paused = on;
+}
+void Slam::localize_only(bool on) {
+  impl_->localize_only = on;
+  impl_->pipeline->localize_only(on);
+}
+void Slam::explain_keyframes(bool on) {
+  impl_->explain_keyframes = on;
+  impl_->pipeline->explain_keyframes(on);
+}
+
+void Slam::save_map(const std::filesystem::path& path) const {
+  dkb::save_map(path, *impl_->shared_record()->map().map(), impl_->map_context());
+}
+
+void Slam::load_map(const std::filesystem::path& path) {
+  MapFile file = dkb::load_map(path);
+  check_same_optics(file.context, impl_->map_context(), path.string());
+  file.map.date_back();
+  impl_->start(std::move(file.map));
+}
+
+MapSnapshot Slam::map() const {
+  return impl_->shared_record()->map();
+}
+std::vector<TrajectoryFrame> Slam::trajectory() const {
+  return impl_->shared_record()->trajectory(false);
+}
+std::vector<TrajectoryFrame> Slam::online_trajectory() const {
+  return impl_->shared_record()->trajectory(true);
+}
+std::vector<TrajectoryFrame> Slam::keyframes() const {
+  return impl_->shared_record()->keyframes();
+}
+Statistics Slam::statistics() const {
+  return impl_->shared_record()->statistics();
+}
+DenseMap Slam::dense_map() const {
+  return impl_->pipeline->dense_map();
+}
+
+std::vector<Event> Slam::take_events() {
+  return impl_->events.take();
+}
+void Slam::on_event(std::function<void(const Event&)> callback, Executor executor) {
+  impl_->events.set(std::move(callback), std::move(executor));
+}
+
+const Camera& Slam::camera() const {
+  return impl_->context.camera;
+}
+const Options& Slam::options() const {
+  return impl_->options;
+}
+
+}  // namespace dkb

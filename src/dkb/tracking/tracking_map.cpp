@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/tracking_map.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace dkb {
+
+void TrackingMap::take_view(MapView view) {
+  view_ = std::move(view);
+  std::erase_if(pending_, [&](const Pending& p) { return view_->keyframe(p.id) != nullptr; });
+}
+
+void TrackingMap::add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference) {
+  pending_.push_back({id, reference, cam_from_reference});
+}
+
+const TrackingMap::Pending* TrackingMap::pending(KeyframeId id) const {
+  const auto at = std::find_if(pending_.begin(), pending_.end(), [id](const Pending& p) { return p.id == id; });
+  return at == pending_.end() ? nullptr : &*at;
+}
+
+const TrackingMap::Pending& TrackingMap::pending_or_throw(KeyframeId id) const {
+  const Pending* found = pending(id);
+  if (found == nullptr) throw std::logic_error("there is no keyframe " + std::to_string(id));
+  return *found;
+}
+
+Rigid3 TrackingMap::cam_from_world(KeyframeId id) const {
+  if (view_->keyframe(id) != nullptr) return view_->cam_from_world(id);
+  const Pending& p = pending_or_throw(id);
+  return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * cam_from_world(p.reference);
+}
+
+KeyframeId TrackingMap::root(KeyframeId id) const {
+  while (view_->keyframe(id) == nullptr) {
+    const Pending& p = pending_or_throw(id);
+    if (p.reference == kNoKeyframe) return id;
+    id = p.reference;
+  }
+  return view_->root(id);
+}
+
+}  // namespace dkb

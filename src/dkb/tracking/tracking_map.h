@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "dkb/map/map.h"
+
+namespace dkb {
+
+// The map as tracking knows it: the newest view of mapping's, and the keyframes made since. A value: copies share the
+// view.
+class TrackingMap {
+ public:
+  TrackingMap() : view_(std::make_shared<const Map>()) {}
+
+  const Map& view() const { return *view_; }
+  const MapView& shared_view() const { return view_; }
+  // Keyframes that are in the newer view are not pending any more.
+  void take_view(MapView view);
+  // A keyframe that mapping was just told of; without a reference `cam_from_reference` is its cam_from_world.
+  void add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference);
+
+  bool has(KeyframeId id) const { return view_->keyframe(id) != nullptr || pending(id) != nullptr; }
+  // Pose of a keyframe. Throws std::logic_error for one that was never made.
+  Rigid3 cam_from_world(KeyframeId id) const;
+  // The first keyframe of the map that a keyframe belongs to, likewise.
+  KeyframeId root(KeyframeId id) const;
+
+ private:
+  struct Pending {
+    KeyframeId id = kNoKeyframe, reference = kNoKeyframe;
+    Rigid3 cam_from_reference;
+  };
+  const Pending* pending(KeyframeId id) const;
+  const Pending& pending_or_throw(KeyframeId id) const;
+
+  MapView view_;
+  std::vector<Pending> pending_;  // by id
+};
+
+}  // namespace dkb

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace dkb {
+
+inline constexpr int64_t kNsPerSecond = 1'000'000'000;
+
+// The double nearest to the stamp, which is what reading its decimals gives: the fraction is exact to 6e-17 s, and no
+// decimal of nine digits lies nearer than that to the middle between two doubles without being one.
+inline double seconds_from_ns(int64_t ns) {
+  const int64_t fraction = ((ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
+  return static_cast<double>((ns - fraction) / kNsPerSecond) +
+         static_cast<double>(fraction) / static_cast<double>(kNsPerSecond);
+}
+
+// To the microsecond: what a double of today's dates can hold.
+inline int64_t ns_from_seconds(double seconds) {
+  return static_cast<int64_t>(std::llround(seconds * 1e6)) * 1000;
+}
+
+// A stamp written as decimal seconds ("1305031102.175304"), exactly; digits beyond the ninth are cut off. Nothing when
+// it is no such number, or beyond what 64 bits of nanoseconds hold.
+std::optional<int64_t> parse_stamp_ns(std::string_view text);
+
+// The stamp as decimal seconds, with six digits or, where these do not suffice, nine.
+std::string stamp_text(int64_t ns);
+
+}  // namespace dkb
