@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-
 #include "dkb/dense/tsdf_volume.h"
 #include "dkb_slam/map.h"
 
@@ -12,7 +11,7 @@ namespace dkb {
 // for every cut edge. So a vertex stands for an occupied voxel. Deterministic: by increasing block.
 SurfaceMesh extract_surface(const TsdfVolume& volume);
 
-// Without connected parts whose area [m^2] is below `least_area`, and without vertices of no triangle.
-SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double least_area);
+// Without connected parts whose area [m^2] is below `min_area`, and without vertices of no triangle.
+SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double min_area);
 
 }  // namespace dkb

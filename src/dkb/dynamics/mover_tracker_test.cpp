@@ -159,7 +159,7 @@ TEST(MoverTracker, ResetForgetsMoversAndGoesOnCounting) {
 }
 
 TEST(MoverTracker, OptionsAreChecked) {
-  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.sightings = 1}), InvalidOption);
+  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.min_observations = 1}), InvalidOption);
   EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.memory = 0}), InvalidOption);
   EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.observer = {.cell = 99}}), InvalidOption);
 }

@@ -54,10 +54,11 @@ class SquareWorld {
     for (const Square& s : squares_) {
       double cx = 0, cy = 0;
       move(m, s.x, s.y, cx, cy);
-      const double reach = (1.5 * s.half + 3) / size;
-      const int x0 = std::max(0, static_cast<int>(cx - reach)), x1 = std::min(width_ - 1, static_cast<int>(cx + reach));
-      const int y0 = std::max(0, static_cast<int>(cy - reach)),
-                y1 = std::min(height_ - 1, static_cast<int>(cy + reach));
+      const double half_size = (1.5 * s.half + 3) / size;
+      const int x0 = std::max(0, static_cast<int>(cx - half_size)),
+                x1 = std::min(width_ - 1, static_cast<int>(cx + half_size));
+      const int y0 = std::max(0, static_cast<int>(cy - half_size)),
+                y1 = std::min(height_ - 1, static_cast<int>(cy + half_size));
       for (int y = y0; y <= y1; ++y)
         for (int x = x0; x <= x1; ++x) {
           const double px = m.a * (x - centre_x()) - m.b * (y - centre_y()) + centre_x() + m.tx - s.x;

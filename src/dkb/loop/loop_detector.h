@@ -10,18 +10,18 @@ namespace dkb {
 
 // A place seen again: the newest keyframe and some around it show the area around an old one.
 struct LoopFinding {
-  struct Sighting {
+  struct Support {
     KeyframeId keyframe = kNoKeyframe;
     PlaceFit fit;
   };
-  std::vector<Sighting> sightings;   // the newest keyframe first
+  std::vector<Support> support;      // the newest keyframe first
   std::vector<KeyframeId> far_area;  // the old keyframe first
   bool merge = false;                // the two belong to maps that are not joined
 };
 
 // Length [m] of the shortest way from `from` to every keyframe, along covisibility and the spanning tree; infinite
 // where there is none.
-std::vector<double> ways_through_map(const Map& map, KeyframeId from);
+std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from);
 
 // Keyframes within so many steps along covisibility, `id` included; one flag per keyframe.
 std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps);

@@ -107,7 +107,7 @@ class Map {
   void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
   MapPoint& edit_point(PointId id);  // must exist
   // Recomputes the covisibility of `id` and mirrors the edges in its neighbours.
-  void update_covisibility(KeyframeId id, int least_shared_points);
+  void update_covisibility(KeyframeId id, int min_shared_points);
   // Removes a keyframe's observations; it and its children hang on its parent from now on.
   void cull_keyframe(KeyframeId id);
   // Moves the frames of all keyframes to before 0, the newest to -1: a session that begins counts its own from 0.

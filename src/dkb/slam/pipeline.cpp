@@ -19,11 +19,11 @@ FrameResult Pipeline::process(const Frame& frame) {
   const Stopwatch working;
   const Scene scene = scenes_.look(extract(frame), undistort_, detections, expect(frame), outcome_);  // DKB 3.1
   retract_late(scene.late_masks);
-  const UsableFeatures usable = usable_features(scene, options_.dynamics.motion.smoothing.reach, context_.camera.fx);
+  const UsableFeatures usable = usable_features(scene, options_.dynamics.motion.smoothing.distance, context_.camera.fx);
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
-  const KeyframeDecision decision = decide(scene, tracked);     // DKB 3.2
-  if (decision.insert) insert_keyframe(scene, tracked);         // DKB 3.3 happens there
+  const KeyframeDecision decision = decide(scene, tracked);  // DKB 3.2
+  if (decision.insert) insert_keyframe(scene, tracked);      // DKB 3.3 happens there
   result.features = report_features(scene, usable, tracked);
   publish(scene, tracked, decision, result);
   result.tracking_ms = working.ms();

@@ -8,7 +8,7 @@ namespace dkb {
 
 std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoint>& known,
                                                   const MatchableFeatures& matchable, const CameraModel& camera,
-                                                  const SensorNoise& noise, double scale_factor, int least_matches,
+                                                  const SensorNoise& noise, double scale_factor, int min_matches,
                                                   const RansacOptions& ransac) {
   const RgbdFeatures& features = matchable.features;
   std::vector<Descriptor> descriptors;
@@ -16,7 +16,7 @@ std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoi
   for (const DescribedPoint& k : known) descriptors.push_back(k.descriptor);
   std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
   std::erase_if(matches, [&](const DescriptorMatch& m) { return matchable.on_mover(static_cast<size_t>(m.b)); });
-  if (static_cast<int>(matches.size()) < least_matches) return std::nullopt;
+  if (static_cast<int>(matches.size()) < min_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   observations.reserve(matches.size());
   for (const DescriptorMatch& m : matches)

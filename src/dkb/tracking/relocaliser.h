@@ -15,21 +15,21 @@
 namespace dkb {
 
 struct RelocalisationOptions {
-  int candidates = 6;             // look-alike keyframes that are tried, >= 1
-  int neighbours = 4;             // covisible keyframes whose points are matched along with each one's, >= 0
-  int least_matches = 15;         // matches by descriptor alone that make a candidate worth a try, >= 6
-  int least_agreeing = 10;        // of these, that must agree on a pose, >= 6
-  double radius = 10.0;           // [px] first search around that pose; the second is within `radius_fine`, > 0
-  double radius_fine = 4.0;       // [px] > 0
-  int least_inliers = 40;         // points that the final pose rests on, >= 6
-  double least_share = 0.1;       // of the map's well-known points in view that must be found, 0 ... 1
-  double least_alike = 0.7;       // of those points that the image shows at all, that must look as they did, 0 ... 1
-  double least_alike_far = 0.9;   // the same for a place that the camera cannot have come to since its loss, 0 ... 1
-  double reach = 1.0;             // [m] such a place is farther than this from where the camera was lost, >= 0
-  double reach_per_second = 2.0;  // [m/s] and this for every second since, >= 0
-  double largest_position_sd = 0.01;  // [m] standard deviation of the camera's place, > 0
-  double ambiguity = 0.5;             // poses elsewhere with this share of the most inliers rival the best, 0 ... 1 ...
-  double clear_lead = 0.03;  // ... unless they look less alike by this share; rivals make all worthless, 0 ... 1
+  int candidates = 6;               // look-alike keyframes that are tried, >= 1
+  int neighbours = 4;               // covisible keyframes whose points are matched along with each one's, >= 0
+  int min_matches = 15;             // matches by descriptor alone that make a candidate worth a try, >= 6
+  int min_ransac_inliers = 10;      // of these, that must agree on a pose, >= 6
+  double radius = 10.0;             // [px] first search around that pose; the second is within `radius_fine`, > 0
+  double radius_fine = 4.0;         // [px] > 0
+  int min_inliers = 40;             // points that the final pose rests on, >= 6
+  double min_share = 0.1;           // of the map's well-known points in view that must be found, 0 ... 1
+  double min_similarity = 0.7;      // of those points that the image shows at all, that must look as they did, 0 ... 1
+  double min_similarity_far = 0.9;  // the same for a place that the camera cannot have come to since its loss, 0 ... 1
+  double max_distance = 1.0;        // [m] such a place is farther than this from where the camera was lost, >= 0
+  double max_speed = 2.0;           // [m/s] and this for every second since, >= 0
+  double max_position_sd = 0.01;    // [m] standard deviation of the camera's place, > 0
+  double ambiguity = 0.5;           // poses elsewhere with this share of the most inliers rival the best, 0 ... 1 ...
+  double clear_lead = 0.03;         // ... unless they look less alike by this share; rivals make all worthless, 0 ... 1
   void check() const;
 };
 
@@ -40,11 +40,11 @@ struct PoseProposal {
   std::vector<PointId> points;  // per feature: the map point that it shows, else kNoPoint
   int inliers = 0;
   int well_known = 0, found = 0;  // well-known map points that should be in view; of these, found
-  int alike = 0, changed = 0;     // of these, that look the same in the image; that look different, or are seen through
+  int similar = 0, changed = 0;   // of these, that look the same in the image; that look different, or are seen through
   double position_sd = 0;         // [m]
   bool verified = false;          // it meets the options
 
-  double alike_share() const { return alike + changed > 0 ? static_cast<double>(alike) / (alike + changed) : 1; }
+  double similarity() const { return alike + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
 };
 
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the

@@ -19,10 +19,10 @@ constexpr double kGuessFactor = 2.0;         // on the noise of points at a gues
 
 void TrackingOptions::check() const {
   require_option(initial_points >= 10, "initial_points", initial_points, "at least 10");
-  require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
-  require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
+  require_option(min_matches >= 6, "min_matches", min_matches, "at least 6");
+  require_option(min_inliers >= 6, "min_inliers", min_inliers, "at least 6");
   require_option(close_depth > 0, "close_depth", close_depth, "greater than 0 m");
-  require_option(least_new_points >= 0, "least_new_points", least_new_points, "at least 0");
+  require_option(min_new_points >= 0, "min_new_points", min_new_points, "at least 0");
   require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
   require_option(radius_wide > 0, "radius_wide", radius_wide, "greater than 0 px");
   require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
@@ -58,7 +58,7 @@ Rigid3 Tracker::take_view(MapView view) {
   std::erase_if(retracted_, [&](PointId id) {
     return map_.view().keyframe(birth_keyframe(id)) != nullptr && map_.view().point(id) == nullptr;
   });
-  if (sighting_) express_anew(*sighting_);
+  if (unconfirmed_) express_anew(*unconfirmed_);
   if (!last_) return {};
   return express_anew(*last_);
 }
@@ -168,7 +168,7 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.motion.resize(left);
 }
 
-bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
+bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                               TrackedFrame& frame) {
   refresh_candidates(points, frame.index);
   const RgbdFeatures& features = *frame.features;
@@ -201,8 +201,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   match.max_distance = options_.match_distance;
   match.ratio = static_cast<float>(options_.match_ratio);
   std::vector<uint8_t> visible(candidates.size(), 0);
-  const auto matches =
-      match_by_projection(candidates, frame.matchable(), camera_, initial, scale_factor_, levels_, match, &taken, &visible);
+  const auto matches = match_by_projection(candidates, frame.matchable(), camera_, initial, scale_factor_, levels_,
+                                           match, &taken, &visible);
   for (const auto& m : matches)
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
@@ -213,8 +213,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   if (options_.odometry_sigma_factor > 0 && last_) {
     for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
     const std::vector<Candidate> others = odometry_.candidates(*last_);
-    for (const auto& m :
-         match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match, &taken, nullptr)) {
+    for (const auto& m : match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match,
+                                             &taken, nullptr)) {
       const auto c = static_cast<size_t>(m.candidate);
       pairs.push_back(odometry_pair(m.feature, {others[c].position, odometry_.guessed(c)}));
     }
@@ -222,11 +222,11 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   const PoseEstimate pose = refine(initial, pairs, features);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
-  if (inliers < least_inliers) return false;
+  if (inliers < min_inliers) return false;
 
   for (size_t i = 0; i < candidates.size(); ++i)
-    if (visible[i]) ++sightings_[candidates[i].id].visible;
-  for (PointId id : matched) ++sightings_[id].visible;
+    if (visible[i]) ++visibility_[candidates[i].id].visible;
+  for (PointId id : matched) ++visibility_[id].visible;
   // A guessed depth is let pass more; not where a mover may be.
   const auto strays = [&](const Pair& pair) {
     const auto f = static_cast<size_t>(pair.feature);
@@ -245,7 +245,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
       frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
-      ++sightings_[points[f]].found;
+      ++visibility_[points[f]].found;
     } else if (strays(pairs[i])) {
       frame.outlier[f] = 1;
     } else {
@@ -300,7 +300,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features);
   if (!pose.ok) return;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
-  if (inliers < options_.least_inliers) return;
+  if (inliers < options_.min_inliers) return;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -315,30 +315,31 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
 }
 
 // Rooms that look alike are told apart by where the camera can have come to.
-bool Tracker::within_reach(const PoseProposal& found, double timestamp) const {
+bool Tracker::within_travel_distance(const PoseProposal& found, double timestamp) const {
   if (!last_) return true;
   if (map_.root(last_->reference) != map_.root(found.keyframe)) return false;
   const RelocalisationOptions& o = options_.relocalisation;
-  const double way = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
-  return way <= o.reach + o.reach_per_second * (timestamp - last_->timestamp);
+  const double distance = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
+  return distance <= o.max_distance + o.max_speed * (timestamp - last_->timestamp);
 }
 
 bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
   auto found = relocaliser_.find(
       map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
   if (!found) return false;
-  if (!within_reach(*found, frame.timestamp) && found->alike_share() < options_.relocalisation.least_alike_far)
+  if (!within_travel_distance(*found, frame.timestamp) &&
+      found->similarity() < options_.relocalisation.min_similarity_far)
     return false;
   candidates_made_ = -1;
-  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.least_inliers,
+  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.min_inliers,
                          found->points, frame);
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
 // rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
-bool Tracker::confirm_sighting(TrackedFrame& frame, const MotionPrior* prior) {
-  if (!sighting_) return false;
-  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(sighting_, std::nullopt));
+bool Tracker::confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior) {
+  if (!unconfirmed_) return false;
+  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_ = -1;
   if (last_->index + 1 == frame.index && track_from_last(frame, prior)) return true;
@@ -377,14 +378,14 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
 
   const bool has_map = state_ != TrackingState::initialising;
   bool followed = has_map && track_from_last(frame, input.prior);
-  bool found_again = has_map && !followed && confirm_sighting(frame, input.prior);
+  bool found_again = has_map && !followed && confirm_relocalisation(frame, input.prior);
   if (has_map && !followed && !found_again && relocalise(frame, input.appearance)) {
     // At once where it is but a step from the frame before; else when the next frame agrees.
-    followed = is_step_from_last(frame);
+    followed = moved_plausibly_from_last(frame);
     found_again = followed;
     if (!followed) {
       finish(frame);
-      sighting_ = frame;
+      unconfirmed_ = frame;
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
       velocity_.reset();
       frame.state = state_ = TrackingState::lost;
@@ -405,7 +406,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     return frame;
   }
   lost_frames_ = 0;
-  sighting_.reset();
+  unconfirmed_.reset();
   if (!last_ || frame.timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {
