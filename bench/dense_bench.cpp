@@ -26,9 +26,9 @@
 namespace dkb {
 namespace {
 
-constexpr int kFrameStep = 8;          // of the frames that are drawn again
-constexpr double kPersonReach = 0.15;  // [m] how far a walker gets within half of that, and more
-constexpr double kGhost = 0.06;        // [m] from all still surfaces
+constexpr int kFrameStep = 8;             // of the frames that are drawn again
+constexpr double kPersonDistance = 0.15;  // [m] how far a walker gets within half of that, and more
+constexpr double kGhost = 0.06;           // [m] from all still surfaces
 
 // Reads what mesh_ply() wrote.
 SurfaceMesh read_mesh(const std::string& file) {
@@ -127,7 +127,7 @@ void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::st
     errors.push_back(error);
     if (error < kGhost) continue;
     ++ghosts;
-    person += distance_to(people_tree, p) < kPersonReach ? 1 : 0;
+    person += distance_to(people_tree, p) < kPersonDistance ? 1 : 0;
   }
   const double count = std::max<double>(1, static_cast<double>(errors.size()));
   fmt::print("{} occupied voxels; surface error median {:.1f} mm, 90% {:.1f} mm, 99% {:.1f} mm\n", errors.size(),

@@ -23,9 +23,9 @@ class Bench : public ::testing::Test {
     write_text(temp_ / "tiny.yaml", text);
     return temp_ / "tiny.yaml";
   }
-  Finished bench(std::vector<std::string> arguments, long largest_file = -1) {
+  Finished bench(std::vector<std::string> arguments, long max_file_size = -1) {
     arguments.insert(arguments.begin(), {"bench", "--quiet"});
-    return run_program(arguments, largest_file);
+    return run_program(arguments, max_file_size);
   }
   std::string out(const std::string& name = "out") { return (temp_ / name).string(); }
   nlohmann::json results(const std::string& name = "out") {

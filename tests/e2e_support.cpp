@@ -36,7 +36,7 @@ size_t Finished::error_lines() const {
   return n;
 }
 
-Program::Program(const std::vector<std::string>& arguments, long largest_file) {
+Program::Program(const std::vector<std::string>& arguments, long max_file_size) {
   std::vector<std::string> words = {DKB_SLAM_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -50,8 +50,8 @@ Program::Program(const std::vector<std::string>& arguments, long largest_file) {
               err_fd = open(err.c_str(), O_CREAT | O_WRONLY, 0600);
     dup2(out_fd, STDOUT_FILENO);
     dup2(err_fd, STDERR_FILENO);
-    if (largest_file >= 0) {
-      const rlimit limit{static_cast<rlim_t>(largest_file), static_cast<rlim_t>(largest_file)};
+    if (max_file_size >= 0) {
+      const rlimit limit{static_cast<rlim_t>(max_file_size), static_cast<rlim_t>(max_file_size)};
       setrlimit(RLIMIT_FSIZE, &limit);
       std::signal(SIGXFSZ, SIG_IGN);
     }
@@ -81,8 +81,8 @@ Finished Program::wait() {
   return {WIFEXITED(status_) ? WEXITSTATUS(status_) : 1000 + WTERMSIG(status_), read_text(folder_ / "out"), err()};
 }
 
-Finished run_program(const std::vector<std::string>& arguments, long largest_file) {
-  return Program(arguments, largest_file).wait();
+Finished run_program(const std::vector<std::string>& arguments, long max_file_size) {
+  return Program(arguments, max_file_size).wait();
 }
 
 fs::path sequence() {

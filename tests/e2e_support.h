@@ -31,10 +31,10 @@ struct Finished {
   size_t error_lines() const;
 };
 
-// dkb-slam, started with these arguments. With `largest_file` [bytes] every write beyond fails, as on a full disk.
+// dkb-slam, started with these arguments. With `max_file_size` [bytes] every write beyond fails, as on a full disk.
 class Program {
  public:
-  explicit Program(const std::vector<std::string>& arguments, long largest_file = -1);
+  explicit Program(const std::vector<std::string>& arguments, long max_file_size = -1);
   ~Program();
   pid_t pid() const { return pid_; }
   std::string err() const;  // what it has printed so far
@@ -47,7 +47,7 @@ class Program {
   bool ended_ = false;
   int status_ = 0;
 };
-Finished run_program(const std::vector<std::string>& arguments, long largest_file = -1);
+Finished run_program(const std::vector<std::string>& arguments, long max_file_size = -1);
 
 // A simulated sequence of 40 frames at 640 x 480 in TUM layout, without people, the same for all tests. Made on demand.
 constexpr int kSequenceFrames = 40;

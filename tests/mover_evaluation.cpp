@@ -43,7 +43,8 @@ std::vector<TrueFrame> frames_of(const MoverRows& truth) {
   return frames;
 }
 
-void match(const std::vector<const Mover*>& estimates, const Rigid3& truth_from_world, double reach, TrueFrame* frame) {
+void match(const std::vector<const Mover*>& estimates, const Rigid3& truth_from_world, double match_distance,
+           TrueFrame* frame) {
   struct Pair {
     double distance;
     const Mover *truth, *estimate;
@@ -52,7 +53,7 @@ void match(const std::vector<const Mover*>& estimates, const Rigid3& truth_from_
   for (const Mover* e : estimates)
     for (const Mover* t : frame->movers) {
       const double distance = (truth_from_world * e->position_in_world - t->position_in_world).norm();
-      if (distance <= reach) pairs.push_back({distance, t, e});
+      if (distance <= match_distance) pairs.push_back({distance, t, e});
     }
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
   std::set<int> taken;
@@ -82,7 +83,7 @@ class CrossingCounter {
       const Mover *ma = frames_[i].find(a), *mb = frames_[i].find(b);
       const double now = frames_[i].timestamp;
       if (ma == nullptr || mb == nullptr) {
-        if (!meeting || now - last_both > options_.longest_hidden) last_side = 0;
+        if (!meeting || now - last_both > options_.max_hidden) last_side = 0;
         if (last_side == 0) meeting = false;
         continue;
       }
@@ -122,10 +123,10 @@ class CrossingCounter {
 }  // namespace
 
 void MoverEvaluationOptions::check() const {
-  require_option(reach > 0, "reach", reach, "greater than 0 m");
+  require_option(match_distance > 0, "match_distance", match_distance, "greater than 0 m");
   require_option(same_stamp >= 0, "same_stamp", same_stamp, "at least 0 s");
-  require_option(most_distance > 0, "most_distance", most_distance, "greater than 0 m");
-  require_option(longest_hidden > 0, "longest_hidden", longest_hidden, "greater than 0 s");
+  require_option(max_distance > 0, "max_distance", max_distance, "greater than 0 m");
+  require_option(max_hidden > 0, "max_hidden", max_hidden, "greater than 0 s");
   require_option(before_and_after > 0, "before_and_after", before_and_after, "greater than 0 s");
 }
 
@@ -143,11 +144,11 @@ MoverEvaluation evaluate_movers(const MoverRows& truth, const MoverRows& estimat
     std::vector<const Mover*> estimates;
     for (; row < estimate.size() && estimate[row].timestamp <= frame.timestamp + options.same_stamp; ++row)
       estimates.push_back(&estimate[row].mover);
-    match(estimates, truth_from_world, options.reach, &frame);
+    match(estimates, truth_from_world, options.match_distance, &frame);
     result.false_movers += frame.unmatched_estimates;
     for (const Mover* t : frame.movers) {
       true_ids.insert(t->id);
-      if (camera_in_truth && (camera_in_truth(frame.timestamp) - t->position_in_world).norm() > options.most_distance)
+      if (camera_in_truth && (camera_in_truth(frame.timestamp) - t->position_in_world).norm() > options.max_distance)
         continue;
       ++result.true_movers;
       const auto found = frame.estimate_of.find(t->id);

@@ -11,10 +11,10 @@
 namespace dkb {
 
 struct MoverEvaluationOptions {
-  double reach = 0.5;             // [m] an estimated mover belongs to the nearest true one within, > 0
+  double match_distance = 0.5;    // [m] an estimated mover belongs to the nearest true one within, > 0
   double same_stamp = 0.002;      // [s] stamps this near are one frame, >= 0
-  double most_distance = 4.0;     // [m] true movers farther from the camera are left out of the position error, > 0
-  double longest_hidden = 1.0;    // [s] crossings that hide a mover for longer are not counted, > 0
+  double max_distance = 4.0;      // [m] true movers farther from the camera are left out of the position error, > 0
+  double max_hidden = 1.0;        // [s] crossings that hide a mover for longer are not counted, > 0
   double before_and_after = 0.5;  // [s] a mover's id is looked for so long before and after a crossing, > 0
   void check() const;             // throws InvalidOption
 };

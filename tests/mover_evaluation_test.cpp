@@ -83,7 +83,7 @@ TEST(MoverEvaluation, HiddenMoversCrossTooUnlessTheyStayAwayForLong) {
   std::erase_if(truth, [](const MoverRow& r) { return r.mover.id == 2 && r.timestamp > 0.35 && r.timestamp < 0.45; });
   EXPECT_EQ(evaluate_movers(truth, truth, Rigid3(), {}).crossings, 2u);
   MoverEvaluationOptions strict;
-  strict.longest_hidden = 0.05;
+  strict.max_hidden = 0.05;
   EXPECT_EQ(evaluate_movers(truth, truth, Rigid3(), {}, strict).crossings, 0u);
 }
 
@@ -99,7 +99,7 @@ TEST(MoverEvaluation, NothingIsNoError) {
   const MoverEvaluation result = evaluate_movers({}, {}, Rigid3(), {});
   EXPECT_EQ(result.found, 0u);
   EXPECT_EQ(result.median_position_error, 0);
-  EXPECT_THROW(evaluate_movers({}, {}, Rigid3(), {}, {.reach = 0}), InvalidOption);
+  EXPECT_THROW(evaluate_movers({}, {}, Rigid3(), {}, {.match_distance = 0}), InvalidOption);
 }
 
 }  // namespace

@@ -74,16 +74,16 @@ class Reader {
     if (!node_.IsScalar()) fail("expected a text");
     return node_.Scalar();
   }
-  int64_t whole(int64_t least, int64_t most) const {
+  int64_t whole(int64_t min, int64_t max) const {
     int64_t value = 0;
-    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || value < least || value > most)
-      fail(fmt::format("expected a whole number from {} to {}", least, most));
+    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || value < min || value > max)
+      fail(fmt::format("expected a whole number from {} to {}", min, max));
     return value;
   }
-  double number(double least, double most) const {
+  double number(double min, double max) const {
     double value = 0;
-    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || !(value >= least && value <= most))
-      fail(fmt::format("expected a number from {:g} to {:g}", least, most));
+    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || !(value >= min && value <= max))
+      fail(fmt::format("expected a number from {:g} to {:g}", min, max));
     return value;
   }
   // Names become file names and columns of tables.
@@ -128,8 +128,8 @@ void read_keys(const Reader& map, const Readers& readers) {
 std::function<void(const Reader&)> to_text(std::string* field) {
   return [field](const Reader& r) { *field = r.text(); };
 }
-std::function<void(const Reader&)> to_whole(int64_t* field, int64_t least, int64_t most) {
-  return [field, least, most](const Reader& r) { *field = r.whole(least, most); };
+std::function<void(const Reader&)> to_whole(int64_t* field, int64_t min, int64_t max) {
+  return [field, min, max](const Reader& r) { *field = r.whole(min, max); };
 }
 
 std::vector<std::string> words_of(const Reader& r) {

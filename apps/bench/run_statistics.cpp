@@ -51,7 +51,7 @@ double spread_of_rank_sums(const std::vector<std::vector<double>>& ranks) {
 void BootstrapOptions::check() const {
   require_option(resamples >= 100, "bootstrap.resamples", resamples, "at least 100");
   require_option(confidence > 0 && confidence < 1, "bootstrap.confidence", confidence, "between 0 and 1");
-  require_option(least_values >= 2, "bootstrap.least_values", least_values, "at least 2");
+  require_option(min_values >= 2, "bootstrap.min_values", min_values, "at least 2");
 }
 
 double median_of(std::vector<double> values) {
@@ -63,7 +63,7 @@ double median_of(std::vector<double> values) {
 
 MedianInterval median_interval(const std::vector<double>& values, const BootstrapOptions& options) {
   options.check();
-  MedianInterval result{median_of(values), {}, values.size() >= static_cast<size_t>(options.least_values)};
+  MedianInterval result{median_of(values), {}, values.size() >= static_cast<size_t>(options.min_values)};
   if (!result.known) return result;
   Random random(options.seed);
   std::vector<double> medians, drawn(values.size());
@@ -84,7 +84,7 @@ MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const Bootst
   for (const PairedRuns& s : sequences) {
     if (s.ours.size() != s.reference.size() || s.ours.empty())
       throw InputError("mean_ratio: both systems need the same runs, at least one");
-    result.known = result.known && s.ours.size() >= static_cast<size_t>(options.least_values);
+    result.known = result.known && s.ours.size() >= static_cast<size_t>(options.min_values);
     sum += std::log(median_of(s.ours) / median_of(s.reference));
   }
   const auto n = static_cast<double>(sequences.size());

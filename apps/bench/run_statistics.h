@@ -19,8 +19,8 @@ struct BootstrapOptions {
   int resamples = 10000;     // >= 100
   double confidence = 0.95;  // in (0, 1)
   uint64_t seed = 1;
-  int least_values = 5;  // fewer say too little for an interval, >= 2
-  void check() const;    // throws InvalidOption
+  int min_values = 5;  // fewer say too little for an interval, >= 2
+  void check() const;  // throws InvalidOption
 };
 
 // What an interval is worth: `known` is false with too few values.
@@ -39,7 +39,7 @@ struct PairedRuns {
   std::vector<double> ours, reference;  // the same number, positive
 };
 // Geometric mean over sequences of median(ours) / median(reference), and its interval by drawing seeds anew, the same
-// for both systems, in every sequence. Unknown when a sequence has fewer than `least_values` runs, or there is none.
+// for both systems, in every sequence. Unknown when a sequence has fewer than `min_values` runs, or there is none.
 MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const BootstrapOptions& options = {});
 
 // Friedman's test by permutation (Friedman, "The Use of Ranks to Avoid the Assumption of Normality", JASA 1937):

@@ -98,13 +98,13 @@ std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
     const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
     if (!depth.contains(x, y)) continue;
     const double z = depth(x, y);
-    if (z > 0 && p.z() - z > options.depth_step) spots.push_back({at, z});
+    if (z > 0 && p.z() - z > options.depth_jump) spots.push_back({at, z});
   }
   std::vector<uint8_t> dynamic(features.size(), 0);
   for (size_t i = 0; i < features.size(); ++i)
     for (const Spot& s : spots) {
       if ((s.image_pixel - features[i].image_pixel).squaredNorm() > options.radius * options.radius) continue;
-      if (features[i].depth > 0 && std::abs(features[i].depth - s.depth) > 0.5 * options.depth_step) continue;
+      if (features[i].depth > 0 && std::abs(features[i].depth - s.depth) > 0.5 * options.depth_jump) continue;
       dynamic[i] = 1;
       break;
     }

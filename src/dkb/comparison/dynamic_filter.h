@@ -46,11 +46,11 @@ std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, st
                                      const EpipolarFilterOptions& options);
 
 struct MultiviewFilterOptions {
-  double depth_step = 0.4;  // [m] a surface must lie so far before what was seen there, > 0 (DynaSLAM, RA-L 2018)
+  double depth_jump = 0.4;  // [m] a surface must lie so far before what was seen there, > 0 (DynaSLAM, RA-L 2018)
   double radius = 15;       // [px] features so near to such a spot and at its depth are dynamic too, > 0
   int keyframes = 5;        // earlier keyframes compared, >= 1 (the same source)
   void check() const {
-    require_option(depth_step > 0, "depth_step", depth_step, "greater than 0 m");
+    require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0 m");
     require_option(radius > 0, "radius", radius, "greater than 0 px");
     require_option(keyframes >= 1, "keyframes", keyframes, "at least 1");
   }

@@ -9,7 +9,7 @@
 namespace dkb {
 namespace {
 
-constexpr double kLongestGap = 0.2;  // [s] between poses that motion is interpolated over
+constexpr double kMaxGap = 0.2;  // [s] between poses that motion is interpolated over
 
 // The camera's pose at a time between or shortly beside two poses of the trajectory, at constant velocity.
 std::optional<Rigid3> pose_at(std::span<const TimedPose> trajectory, double time) {
@@ -21,12 +21,13 @@ std::optional<Rigid3> pose_at(std::span<const TimedPose> trajectory, double time
   const TimedPose& b = *next;
   const TimedPose& a = next == trajectory.begin() ? b : *(next - 1);
   const TimedPose& nearest = std::abs(time - a.timestamp) <= std::abs(time - b.timestamp) ? a : b;
-  if (std::abs(time - nearest.timestamp) > kLongestGap) return std::nullopt;
+  if (std::abs(time - nearest.timestamp) > kMaxGap) return std::nullopt;
   const double gap = b.timestamp - a.timestamp;
-  if (!(gap > 0) || gap > kLongestGap) return nearest.world_from_cam;
+  if (!(gap > 0) || gap > kMaxGap) return nearest.world_from_cam;
   const double share = (time - a.timestamp) / gap;
-  const Eigen::Vector3d turn = vector_from_rotation(a.world_from_cam.rotation.conjugate() * b.world_from_cam.rotation);
-  return Rigid3((a.world_from_cam.rotation * rotation_from_vector(share * turn)).normalized(),
+  const Eigen::Vector3d rotation =
+      vector_from_rotation(a.world_from_cam.rotation.conjugate() * b.world_from_cam.rotation);
+  return Rigid3((a.world_from_cam.rotation * rotation_from_vector(share * rotation)).normalized(),
                 a.world_from_cam.translation + share * (b.world_from_cam.translation - a.world_from_cam.translation));
 }
 
@@ -55,7 +56,7 @@ DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed
   DenseMap map;
   map.views = static_cast<int>(placed.size());
   map.mesh = without_small_parts(extract_surface(TsdfVolume::fuse(placed, maker_.camera(), noise_, options_)),
-                                 options_.least_patch);
+                                 options_.min_patch);
   if (placed.empty() || up.norm() < 1e-6) return map;
   if (const auto floor = find_floor(map.mesh, up, seed)) {
     const Eigen::Vector3d forward = placed.front().cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();

@@ -13,9 +13,9 @@ void DenseOptions::check() const {
   require_option(pixel_step >= 1 && pixel_step <= 8, "dense.pixel_step", pixel_step, "1 ... 8 px");
   require_option(mover_margin >= 0 && mover_margin <= 100, "dense.mover_margin", mover_margin, "0 ... 100 px");
   require_option(edge_fraction > 0, "dense.edge_fraction", edge_fraction, "greater than 0");
-  require_option(least_views >= 1, "dense.least_views", least_views, "at least 1");
+  require_option(min_views >= 1, "dense.min_views", min_views, "at least 1");
   require_option(free_share >= 0 && free_share <= 1, "dense.free_share", free_share, "0 ... 1");
-  require_option(least_patch >= 0, "dense.least_patch", least_patch, "at least 0 m^2");
+  require_option(min_patch >= 0, "dense.min_patch", min_patch, "at least 0 m^2");
   require_option(grid_cell >= 0.01 && grid_cell <= 1, "dense.grid_cell", grid_cell, "0.01 ... 1 m");
   require_option(obstacle_low > 0, "dense.obstacle_low", obstacle_low, "greater than 0 m");
   require_option(obstacle_high > obstacle_low, "dense.obstacle_high", obstacle_high, "greater than dense.obstacle_low");

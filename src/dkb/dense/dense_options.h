@@ -10,10 +10,10 @@ struct DenseOptions {
   double max_depth = 4.0;       // [m] depths beyond tell of free space only, 0.5 ... 20
   int pixel_step = 2;           // [px] every how many pixels, in x and y, depth is kept of a keyframe, 1 ... 8
   int mover_margin = 10;        // [px] around movers that is left out as well, 0 ... 100
-  double edge_fraction = 0.05;  // [1] depths beside a step of this share are left out, > 0
-  int least_views = 2;          // keyframes that must see a surface, >= 1
+  double edge_fraction = 0.05;  // [1] depths beside a jump of this share are left out, > 0
+  int min_views = 2;            // keyframes that must see a surface, >= 1
   double free_share = 0.08;     // of a voxel's keyframes that may have seen through it, 0 ... 1
-  double least_patch = 0.03;    // [m^2] smaller connected surfaces are dropped, >= 0
+  double min_patch = 0.03;      // [m^2] smaller connected surfaces are dropped, >= 0
   double grid_cell = 0.05;      // [m] side of a cell of the occupancy grid, 0.01 ... 1
   double obstacle_low = 0.10;   // [m] above the floor: what is lower can be driven over, > 0
   double obstacle_high = 1.50;  // [m] what is higher can be driven under, > obstacle_low

@@ -20,7 +20,7 @@ bool on_one_surface(const DepthImage& depth, int x, int y, float fraction) {
 }  // namespace
 
 Image<float> facing(const DepthView& view, const ViewCamera& camera) {
-  constexpr int kReach = 3;  // [px] of the view
+  constexpr int kOffset = 3;  // [px] of the view
   Image<float> result(view.depth.width(), view.depth.height());
   const auto point = [&](int x, int y) {
     return (static_cast<double>(view.metres(x, y)) * camera.ray(x, y)).cast<float>().eval();
@@ -29,10 +29,10 @@ Image<float> facing(const DepthView& view, const ViewCamera& camera) {
     for (int x = 0; x < result.width(); ++x) {
       if (view.depth(x, y) == 0) continue;
       // From the left to the right and from above to below, or as much of it as there is.
-      const int left = x >= kReach && view.depth(x - kReach, y) > 0 ? x - kReach : x;
-      const int right = x + kReach < result.width() && view.depth(x + kReach, y) > 0 ? x + kReach : x;
-      const int above = y >= kReach && view.depth(x, y - kReach) > 0 ? y - kReach : y;
-      const int below = y + kReach < result.height() && view.depth(x, y + kReach) > 0 ? y + kReach : y;
+      const int left = x >= kOffset && view.depth(x - kOffset, y) > 0 ? x - kOffset : x;
+      const int right = x + kOffset < result.width() && view.depth(x + kOffset, y) > 0 ? x + kOffset : x;
+      const int above = y >= kOffset && view.depth(x, y - kOffset) > 0 ? y - kOffset : y;
+      const int below = y + kOffset < result.height() && view.depth(x, y + kOffset) > 0 ? y + kOffset : y;
       if (left == right || above == below) continue;
       const Eigen::Vector3f normal = (point(right, y) - point(left, y)).cross(point(x, below) - point(x, above));
       const float length = normal.norm();

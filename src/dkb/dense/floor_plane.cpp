@@ -12,10 +12,10 @@
 namespace dkb {
 namespace {
 
-constexpr double kLeastUp = 0.819;    // cos 35 degrees, of a normal to the guess
+constexpr double kMinUp = 0.819;      // cos 35 degrees, of a normal to the guess
 constexpr double kParallel = 0.966;   // cos 15 degrees, of normals in one plane
 constexpr double kThickness = 0.03;   // [m] half of it
-constexpr double kLeastArea = 0.25;   // [m^2]
+constexpr double kMinArea = 0.25;     // [m^2]
 constexpr double kLowerShare = 0.25;  // of the largest plane's area
 constexpr int kHypotheses = 200;
 constexpr size_t kSampleOfTriangles = 20000;  // enough to count areas by
@@ -31,7 +31,7 @@ std::vector<Facet> upward_facets(const SurfaceMesh& mesh, const Eigen::Vector3d&
     const auto at = [&](size_t i) { return mesh.vertices[static_cast<size_t>(t[i])].cast<double>().eval(); };
     const Eigen::Vector3d a = at(0), b = at(1), c = at(2), normal = (b - a).cross(c - a);
     const double length = normal.norm();
-    if (length < 1e-12 || normal.dot(up) < kLeastUp * length) continue;
+    if (length < 1e-12 || normal.dot(up) < kMinUp * length) continue;
     facets.push_back({(a + b + c) / 3, normal / length, 0.5 * length});
   }
   return facets;
@@ -84,17 +84,17 @@ std::optional<FloorPlane> find_floor(const SurfaceMesh& mesh, const Eigen::Vecto
     const double length = normal.norm();
     if (length < 1e-3) continue;
     normal *= (normal.dot(up_guess) < 0 ? -1 : 1) / length;
-    if (normal.dot(up_guess.normalized()) < kLeastUp) continue;
+    if (normal.dot(up_guess.normalized()) < kMinUp) continue;
     const double area = area_in(facets, stride, normal, normal.dot(a));
     if (area > best.area) best = {normal, normal.dot(a), area};
   }
-  if (best.area < kLeastArea) return std::nullopt;
+  if (best.area < kMinArea) return std::nullopt;
   best = refined(facets, best);
 
   // Lower ones, by steps of half a thickness from the lowest facet up.
   double lowest = best.height;
   for (const Facet& f : facets) lowest = std::min(lowest, best.up.dot(f.centre));
-  const double enough = std::max(kLeastArea, kLowerShare * best.area);
+  const double enough = std::max(kMinArea, kLowerShare * best.area);
   for (double height = lowest; height < best.height - 2 * kThickness; height += kThickness)
     if (area_in(facets, stride, best.up, height) >= enough) return refined(facets, {best.up, height, 0});
   return best;

@@ -171,7 +171,7 @@ SurfaceMesh extract_surface(const TsdfVolume& volume) {
   return mesh;
 }
 
-SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double least_area) {
+SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double min_area) {
   std::vector<int32_t> parent(mesh.vertices.size());
   std::iota(parent.begin(), parent.end(), 0);
   for (const auto& t : mesh.triangles)
@@ -188,7 +188,7 @@ SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double least_area) {
   SurfaceMesh result;
   std::vector<int32_t> renamed(mesh.vertices.size(), kNoVertex);
   for (const auto& t : mesh.triangles) {
-    if (area[static_cast<size_t>(find_root(parent, t[0]))] < least_area) continue;
+    if (area[static_cast<size_t>(find_root(parent, t[0]))] < min_area) continue;
     for (int32_t v : t) renamed[static_cast<size_t>(v)] = 0;
   }
   for (size_t v = 0; v < renamed.size(); ++v) {

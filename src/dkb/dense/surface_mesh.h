@@ -24,8 +24,8 @@ struct SurfaceMesh {
 // for every cut edge. So a vertex stands for an occupied voxel. Deterministic: by increasing block.
 SurfaceMesh extract_surface(const TsdfVolume& volume);
 
-// Without connected parts whose area [m^2] is below `least_area`, and without vertices of no triangle.
-SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double least_area);
+// Without connected parts whose area [m^2] is below `min_area`, and without vertices of no triangle.
+SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double min_area);
 
 // Stanford PLY, binary little-endian: x y z float, red green blue uchar; faces of three.
 std::string mesh_ply(const SurfaceMesh& mesh);

@@ -46,7 +46,7 @@ std::vector<VoxelIndex> blocks_at_surface(const PlacedView& placed, const ViewCa
   return result;
 }
 
-// Blocks that at least `least_views` views see, by increasing index.
+// Blocks that at least `min_views` views see, by increasing index.
 std::vector<VoxelIndex> blocks_to_fuse(std::span<const PlacedView> views, const ViewCamera& camera,
                                        const DenseOptions& options) {
   std::vector<std::pair<VoxelIndex, int>> counts, merged;
@@ -65,7 +65,7 @@ std::vector<VoxelIndex> blocks_to_fuse(std::span<const PlacedView> views, const 
   }
   std::vector<VoxelIndex> result;
   for (const auto& [index, count] : counts)
-    if (count >= options.least_views) result.push_back(index);
+    if (count >= options.min_views) result.push_back(index);
   return result;
 }
 
@@ -101,8 +101,8 @@ class BlockFuser {
     float weight = 0, distance = 0, red = 0, green = 0, blue = 0;
     int hits = 0, seen_through = 0;
   };
-  static constexpr double kWeightStep = 0.05;   // [m]
-  static constexpr float kLeastFacing = 0.15F;  // depths of surfaces seen at a flatter angle are not worth much
+  static constexpr double kWeightStep = 0.05;  // [m]
+  static constexpr float kMinFacing = 0.15F;   // depths of surfaces seen at a flatter angle are not worth much
 
   // Of one depth on a flat wall: what edges and registration add is left out here or averages out.
   static double sigma(const SensorNoise& noise, double z) {
@@ -126,7 +126,7 @@ class BlockFuser {
     const Eigen::Vector3f step_x = (rotation.col(0) * options_.voxel).cast<float>();
     const auto fx = static_cast<float>(camera_.fx), fy = static_cast<float>(camera_.fy);
     const auto cx = static_cast<float>(camera_.cx + 0.5), cy = static_cast<float>(camera_.cy + 0.5);
-    const auto truncation = static_cast<float>(options_.truncation), reach = static_cast<float>(options_.max_depth);
+    const auto truncation = static_cast<float>(options_.truncation), max_depth = static_cast<float>(options_.max_depth);
     const auto width = static_cast<float>(camera_.width), height = static_cast<float>(camera_.height);
     Sums* sums = sums_.data();
     for (int k = 0; k < kSide; ++k)
@@ -145,12 +145,12 @@ class BlockFuser {
           const float measured = view.metres(x, y);
           if (measured == 0) continue;
           const float distance = (measured - z) * facing_of(x, y);
-          if (facing_of(x, y) < kLeastFacing || distance < -truncation) continue;
+          if (facing_of(x, y) < kMinFacing || distance < -truncation) continue;
           if (distance > truncation) {
             sums->seen_through += distance > 1.5F * truncation ? 1 : 0;
             continue;
           }
-          if (measured > reach) continue;
+          if (measured > max_depth) continue;
           const float weight = weight_of_depth_[std::min(
               weight_of_depth_.size() - 1, static_cast<size_t>(measured * static_cast<float>(1 / kWeightStep)))];
           const Rgb colour = view.colour(x, y);
@@ -166,7 +166,7 @@ class BlockFuser {
 
   Voxel result(const Sums& s) const {
     Voxel voxel;
-    voxel.known = s.hits >= options_.least_views &&
+    voxel.known = s.hits >= options_.min_views &&
                   s.seen_through <= options_.free_share * static_cast<double>(s.hits + s.seen_through);
     if (!voxel.known) return voxel;
     voxel.distance = s.distance / s.weight;

@@ -17,9 +17,9 @@
 namespace dkb {
 namespace {
 
-constexpr int kStep = 32;       // [px] the largest stride: inputs are multiples of it
-constexpr int kLargest = 4096;  // [px]
-constexpr int kProbe = 96;      // [px] smallest input whose cell count is no usual number of channels
+constexpr int kStep = 32;            // [px] the largest stride: inputs are multiples of it
+constexpr int kMaxInputSize = 4096;  // [px]
+constexpr int kProbe = 96;           // [px] smallest input whose cell count is no usual number of channels
 constexpr int kYoloxInput = 416, kOtherInput = 640;  // [px] usual sizes of open graphs
 constexpr int kFloat = 1;                            // TensorProto.DataType
 
@@ -120,7 +120,8 @@ std::pair<int, int> declared_input(const OnnxInput& input, const std::string& na
     throw InputError(
         name + ": the graph's input is not one colour image (1 x 3 x height x width); export a detector for one image");
   if (input.dims[2] < 0 || input.dims[3] < 0) return {0, 0};
-  if (input.dims[2] > kLargest || input.dims[3] > kLargest || input.dims[2] % kStep != 0 || input.dims[3] % kStep != 0)
+  if (input.dims[2] > kMaxInputSize || input.dims[3] > kMaxInputSize || input.dims[2] % kStep != 0 ||
+      input.dims[3] % kStep != 0)
     throw InputError(name + ": the graph's input of " + std::to_string(input.dims[3]) + " x " +
                      std::to_string(input.dims[2]) + " px is no multiple of 32 up to 4096; export it for such a size");
   return {static_cast<int>(input.dims[3]), static_cast<int>(input.dims[2])};
@@ -129,7 +130,7 @@ std::pair<int, int> declared_input(const OnnxInput& input, const std::string& na
 }  // namespace
 
 void OnnxOptions::check() const {
-  require_option(input_size == 0 || (input_size >= kStep && input_size <= kLargest && input_size % kStep == 0),
+  require_option(input_size == 0 || (input_size >= kStep && input_size <= kMaxInputSize && input_size % kStep == 0),
                  "input_size", input_size, "0 or a multiple of 32 up to 4096");
   require_option(min_score > 0 && min_score < 1, "min_score", min_score, "within (0, 1)");
   require_option(max_overlap > 0 && max_overlap <= 1, "max_overlap", max_overlap, "within (0, 1]");

@@ -25,7 +25,7 @@ std::vector<int> assign(const Eigen::MatrixXd& cost, double unassigned) {
     do {
       at(visited, column) = 1;
       const int row = at(row_of, column);
-      double least = std::numeric_limits<double>::infinity();
+      double min_slack = std::numeric_limits<double>::infinity();
       int next = 0;
       for (int c = 1; c <= columns; ++c) {
         if (at(visited, c)) continue;
@@ -34,17 +34,17 @@ std::vector<int> assign(const Eigen::MatrixXd& cost, double unassigned) {
           at(slack, c) = reduced;
           at(previous, c) = column;
         }
-        if (at(slack, c) < least) {
-          least = at(slack, c);
+        if (at(slack, c) < min_slack) {
+          min_slack = at(slack, c);
           next = c;
         }
       }
       for (int c = 0; c <= columns; ++c) {
         if (at(visited, c)) {
-          at(row_potential, at(row_of, c)) += least;
-          at(column_potential, c) -= least;
+          at(row_potential, at(row_of, c)) += min_slack;
+          at(column_potential, c) -= min_slack;
         } else {
-          at(slack, c) -= least;
+          at(slack, c) -= min_slack;
         }
       }
       column = next;

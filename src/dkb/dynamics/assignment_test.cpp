@@ -21,12 +21,12 @@ double total(const Eigen::MatrixXd& cost, const std::vector<int>& column_of, dou
 }
 
 // The oracle: every way to give rows columns or none.
-double least_total(const Eigen::MatrixXd& cost, double unassigned, Eigen::Index row, unsigned used) {
+double min_total(const Eigen::MatrixXd& cost, double unassigned, Eigen::Index row, unsigned used) {
   if (row == cost.rows()) return 0;
-  double best = unassigned + least_total(cost, unassigned, row + 1, used);
+  double best = unassigned + min_total(cost, unassigned, row + 1, used);
   for (Eigen::Index c = 0; c < cost.cols(); ++c)
     if ((used >> c & 1u) == 0)
-      best = std::min(best, cost(row, c) + least_total(cost, unassigned, row + 1, used | 1u << c));
+      best = std::min(best, cost(row, c) + min_total(cost, unassigned, row + 1, used | 1u << c));
   return best;
 }
 
@@ -57,7 +57,7 @@ TEST(Assignment, CostsAsLittleAsTheBestOfAllWays) {
     for (Eigen::Index k = 0; k < cost.size(); ++k) cost.data()[k] = random.uniform(0, 10);
     const double unassigned = random.uniform(2, 12);
     const std::vector<int> found = assign(cost, unassigned);
-    EXPECT_NEAR(total(cost, found, unassigned), least_total(cost, unassigned, 0, 0), 1e-9);
+    EXPECT_NEAR(total(cost, found, unassigned), min_total(cost, unassigned, 0, 0), 1e-9);
     std::vector<int> taken;
     for (int c : found)
       if (c >= 0) taken.push_back(c);

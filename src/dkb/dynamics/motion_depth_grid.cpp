@@ -59,7 +59,7 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
 
 void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here,
                          MotionProjection& result) const {
-  constexpr float kNearest = 0.1f;  // [m] in front of the camera
+  constexpr float kMinDepth = 0.1f;  // [m] in front of the camera
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
@@ -82,13 +82,13 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
     const float px = z * (r00 * xs[i] + r01 * ys[i] + r02) + tx;
     const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
     const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
-    const float inverse = 1.0f / std::max(pz, kNearest), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
+    const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
     const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
     const float u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
     const float v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
     const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
     const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
-    const bool seen = (pz > kNearest) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);
+    const bool seen = (pz > kMinDepth) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);
     cells[i] = seen ? iy * width + ix : -1;
     depths[i] = pz;
   }

@@ -11,9 +11,9 @@
 namespace dkb {
 namespace {
 
-constexpr float kTooNear = 0.45f;                  // [m] taken for the depth of what is too near for the sensor
-constexpr float kMotionPerFrame = 0.03f;           // [m] that a surface comes nearer or goes away from frame to frame
-constexpr float kHighest = 3.0f, kLowest = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
+constexpr float kTooNear = 0.45f;         // [m] taken for the depth of what is too near for the sensor
+constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
+constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
@@ -87,10 +87,10 @@ std::unique_ptr<MotionDepthGrid> MotionSegmenter::take_spare() {
 
 // Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time.
 Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
-  constexpr double kLongestGap = 0.2;  // [s] over which motion is taken to be even
+  constexpr double kMaxGap = 0.2;  // [s] over which motion is taken to be even
   if (!last_) return {};
   const double interval = image_time_ - last_->time, offset = current_->time - image_time_;
-  if (!(interval > 0) || interval > kLongestGap || std::abs(offset) > interval) return {};
+  if (!(interval > 0) || interval > kMaxGap || std::abs(offset) > interval) return {};
   const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
   Vector6d part;
   part << step.translation, vector_from_rotation(step.rotation);
@@ -260,7 +260,7 @@ void MotionSegmenter::update_scores() {
     const float mean = weighted_.data()[i] / weight;
     float& score = current_->score.data()[i];
     const float before = known_.data()[i] != 0 ? score : mean;  // what is new is what it hangs together with
-    score = std::clamp(before + mean * std::min(1.0f, weight * gain), kLowest, kHighest);
+    score = std::clamp(before + mean * std::min(1.0f, weight * gain), kMinScore, kMaxScore);
   }
 }
 

@@ -303,12 +303,12 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
 
 TEST(MotionOptions, NamesTheFieldThatIsOutOfRange) {
   MotionOptions options;
-  options.smoothing.reach = 0;
+  options.smoothing.distance = 0;
   try {
     options.check();
     FAIL();
   } catch (const InvalidOption& e) {
-    EXPECT_NE(std::string(e.what()).find("reach"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("distance"), std::string::npos);
   }
   options = {};
   options.views = 1;

@@ -10,16 +10,16 @@
 namespace dkb {
 
 void MotionSmoothingOptions::check() const {
-  require_option(reach > 0, "motion.reach", reach, "greater than 0 m");
-  require_option(step_base >= 0, "motion.step_base", step_base, "at least 0 m");
-  require_option(step_slope >= 0, "motion.step_slope", step_slope, "at least 0");
+  require_option(distance > 0, "dynamics.motion.smoothing.distance", distance, "greater than 0 m");
+  require_option(depth_jump_base >= 0, "motion.depth_jump_base", depth_jump_base, "at least 0 m");
+  require_option(depth_jump_slope >= 0, "motion.depth_jump_slope", depth_jump_slope, "at least 0");
   require_option(crease > 0, "motion.crease", crease, "greater than 0 per metre");
   require_option(crease_link >= 0 && crease_link <= 1, "motion.crease_link", crease_link, "in 0 ... 1");
   require_option(near_range >= 0, "motion.near_range", near_range, "at least 0 m");
 }
 
 MotionSmoothing::MotionSmoothing(const CameraModel& camera, int cell, const MotionSmoothingOptions& options)
-    : options_(options), fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.reach))) {
+    : options_(options), fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.distance))) {
   options_.check();
   const int width = (camera.width + cell - 1) / cell, height = (camera.height + cell - 1) / cell;
   for (Image<float>* i : {&inverse_, &damping_, &left_, &up_}) *i = Image<float>(width, height);
@@ -49,7 +49,7 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
 void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t>& open) {
   find_creases(depth);
   const auto near = static_cast<float>(options_.near_range);
-  const auto base = static_cast<float>(options_.step_base), slope = static_cast<float>(options_.step_slope);
+  const auto base = static_cast<float>(options_.depth_jump_base), slope = static_cast<float>(options_.depth_jump_slope);
   const auto link = [&](size_t a, size_t b) {
     const float za = depth.data()[a], zb = depth.data()[b];
     const float low = std::min(za, zb), high = std::max(za, zb);

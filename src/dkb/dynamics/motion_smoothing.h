@@ -7,9 +7,9 @@
 namespace dkb {
 
 struct MotionSmoothingOptions {
-  double reach = 0.4;        // [m] along the surface over which cells of one object speak for each other, > 0
-  double step_base = 0.015;  // [m] depth step between neighbouring cells of one surface: this ...
-  double step_slope = 0.02;  // ... plus this share of their depth, >= 0
+  double distance = 0.4;           // [m] along the surface over which cells of one object speak for each other, > 0
+  double depth_jump_base = 0.015;  // [m] depth jump between neighbouring cells of one surface: this ...
+  double depth_jump_slope = 0.02;  // ... plus this share of their depth, >= 0
   double crease =
       0.012;  // [1/m] second difference of inverse depth in a fold between object and support (noise: 0.005), > 0
   double crease_link = 0.3;  // share of what is said that crosses such a fold, 0 ... 1
@@ -19,7 +19,7 @@ struct MotionSmoothingOptions {
 };
 
 // Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)
-// by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth steps and
+// by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth jumps and
 // concave folds. A fold is where inverse depth, which is linear in the image on every plane, bends away from the
 // viewer.
 class MotionSmoothing {

@@ -19,7 +19,7 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height) {
     }
 }
 
-MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, double reach, double focal) {
+MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, double max_distance, double focal) {
   MoverMask spread = mask;
   if (mask.empty()) return spread;
   const int cell = mask.cell, width = mask.cells.width(), height = mask.cells.height();
@@ -35,7 +35,7 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       if (const float z = depth_of(x, y); mask.cells(x, y) != 0 && z > 0)
-        front.push_back({x, y, static_cast<float>(reach) * per_metre / z});
+        front.push_back({x, y, static_cast<float>(max_distance) * per_metre / z});
   for (size_t k = 0; k < front.size(); ++k) {
     const auto [x, y, left] = front[k];
     if (left < 1) continue;

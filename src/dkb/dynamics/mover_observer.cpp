@@ -13,8 +13,8 @@
 namespace dkb {
 namespace {
 
-constexpr float kBin = 0.05f;        // [m] of depth histograms
-constexpr size_t kMostPoints = 300;  // per object, that medians are taken of
+constexpr float kBin = 0.05f;       // [m] of depth histograms
+constexpr size_t kMaxPoints = 300;  // per object, that medians are taken of
 
 // What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
 // sensor's noise.
@@ -26,14 +26,14 @@ double position_sd(double depth) {
 
 void MoverObserverOptions::check() const {
   require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
-  require_option(least_cells >= 1, "least_cells", least_cells, "at least 1");
-  require_option(least_region >= 1, "least_region", least_region, "at least 1");
+  require_option(min_cells >= 1, "min_cells", min_cells, "at least 1");
+  require_option(min_region >= 1, "min_region", min_region, "at least 1");
   require_option(margin >= 0, "margin", margin, "at least 0");
   require_option(layer > 0, "layer", layer, "greater than 0 m");
-  require_option(step > 0, "step", step, "greater than 0");
+  require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0");
   require_option(inner_share > 0 && inner_share <= 1, "inner_share", inner_share, "greater than 0, at most 1");
   require_option(gap >= 0, "gap", gap, "at least 0 cells");
-  require_option(step_merged > 0, "step_merged", step_merged, "greater than 0 m");
+  require_option(merge_depth > 0, "merge_depth", merge_depth, "greater than 0 m");
 }
 
 MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptions& options)
@@ -78,7 +78,7 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
 
 Eigen::Vector3d MoverObserver::median_position(std::span<const size_t> cells) const {
   const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
-  const size_t stride = (cells.size() + kMostPoints - 1) / kMostPoints;
+  const size_t stride = (cells.size() + kMaxPoints - 1) / kMaxPoints;
   std::array<std::vector<float>, 3> values;
   for (auto& v : values) v.reserve(cells.size() / stride + 1);
   for (size_t k = 0; k < cells.size(); k += stride) {
@@ -135,7 +135,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (depth_[i] > 0 && counts(i)) depths.push_back(depth_[i]);
     });
-    if (depths.size() < static_cast<size_t>(options_.least_cells)) return;
+    if (depths.size() < static_cast<size_t>(options_.min_cells)) return;
     const float depth = found[b] = main_layer(depths);
     for_each_cell(ranges[b], [&](size_t i, int, int) { explained[i] |= std::abs(depth_[i] - depth) < half; });
   };
@@ -151,7 +151,7 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
   const std::vector<float> depths = box_depths(boxes, ranges);
   const float half = static_cast<float>(options_.layer);
   // A cell in several boxes goes to the object at whose depth and in whose middle it is.
-  std::vector<float> least(rays_.size(), std::numeric_limits<float>::max());
+  std::vector<float> min_cost(rays_.size(), std::numeric_limits<float>::max());
   std::vector<int> owner(rays_.size(), -1);
   for (size_t b = 0; b < boxes.size(); ++b) {
     if (!(depths[b] > 0)) continue;
@@ -160,8 +160,8 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     for_each_cell(ranges[b], [&](size_t i, int x, int) {
       const float off = std::abs(depth_[i] - depths[b]) / half, aside = (static_cast<float>(x) - middle) / across;
       const float cost = off + 0.5f * aside * aside;
-      if (!(depth_[i] > 0) || off > 1 || cost >= least[i]) return;
-      least[i] = cost;
+      if (!(depth_[i] > 0) || off > 1 || cost >= min_cost[i]) return;
+      min_cost[i] = cost;
       owner[i] = static_cast<int>(b);
     });
   }
@@ -172,7 +172,7 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (owner[i] == static_cast<int>(b)) cells.push_back(i);
     });
-    if (cells.size() < static_cast<size_t>(options_.least_cells)) continue;
+    if (cells.size() < static_cast<size_t>(options_.min_cells)) continue;
     observations.push_back(
         {boxes[b].class_name, boxes[b].box, median_position(cells), position_sd(static_cast<double>(depths[b]))});
   }
@@ -206,7 +206,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
       const float d = depth_[i];
       depths.push_back(d);
       const auto visit = [&](bool there, size_t j) {
-        if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.step) * d) return;
+        if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.depth_jump) * d) return;
         free[j] = 0;
         part_of[j] = seed + 1;
         cells.push_back(j);
@@ -236,7 +236,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
     for (size_t b = a + 1; b < parts.size(); ++b) {
       const CellRange &p = parts[a].region.bounds, &q = parts[b].region.bounds;
       const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
-      if (gap > options_.gap || std::abs(parts[a].depth - parts[b].depth) > static_cast<float>(options_.step_merged))
+      if (gap > options_.gap || std::abs(parts[a].depth - parts[b].depth) > static_cast<float>(options_.merge_depth))
         continue;
       const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
       parts[high].merged_into = low;
@@ -251,7 +251,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
   }
   std::vector<Region> regions;
   for (size_t p = 0; p < parts.size(); ++p)
-    if (parts[p].merged_into == p && parts[p].region.cells.size() >= static_cast<size_t>(options_.least_region))
+    if (parts[p].merged_into == p && parts[p].region.cells.size() >= static_cast<size_t>(options_.min_region))
       regions.push_back(std::move(parts[p].region));
   return regions;
 }

@@ -24,14 +24,14 @@ void MoverTrackerOptions::check() const {
   require_option(agility > 0, "agility", agility, "greater than 0 m^2/s^3");
   require_option(speed_sd > 0, "speed_sd", speed_sd, "greater than 0 m/s");
   require_option(gate > 0, "gate", gate, "greater than 0");
-  require_option(reach > 0, "reach", reach, "greater than 0 m");
-  require_option(reach_growth >= 0, "reach_growth", reach_growth, "at least 0 m/s");
+  require_option(max_distance > 0, "max_distance", max_distance, "greater than 0 m");
+  require_option(max_distance_growth >= 0, "max_distance_growth", max_distance_growth, "at least 0 m/s");
   require_option(class_penalty >= 0, "class_penalty", class_penalty, "at least 0");
   require_option(box_weight >= 0, "box_weight", box_weight, "at least 0");
   require_option(box_memory > 0, "box_memory", box_memory, "greater than 0 s");
   require_option(memory > 0, "memory", memory, "greater than 0 s");
   require_option(doubt_memory > 0, "doubt_memory", doubt_memory, "greater than 0 s");
-  require_option(sightings >= 2, "sightings", sightings, "at least 2");
+  require_option(min_observations >= 2, "min_observations", min_observations, "at least 2");
   require_option(apart >= 0, "apart", apart, "at least 0 m");
   require_option(regions_apart >= 0, "regions_apart", regions_apart, "at least 0 m");
 }
@@ -65,13 +65,13 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const Eigen::Matrix3d information = spread.inverse();
     // A mover long unseen fits anywhere: half its log likelihood's width keeps it from taking what others fit better.
     const double width = 0.5 * std::log(spread.determinant() / noise_determinant);
-    const double unseen = time_ - t.seen, reach = options_.reach + options_.reach_growth * unseen;
+    const double unseen = time_ - t.seen, max_distance = options_.max_distance + options_.max_distance_growth * unseen;
     const double box_weight = options_.box_weight * std::max(0.0, 1 - unseen / options_.box_memory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
       const Eigen::Vector3d off = o.position_in_world - t.state.head<3>();
       const double distance = off.dot(information * off), aside = (off - off.dot(down) * down).norm();
-      if (distance > options_.gate || aside > reach) continue;
+      if (distance > options_.gate || aside > max_distance) continue;
       double penalty = box_weight * (1 - static_cast<double>(intersection_over_union(t.box, o.box)));
       if (!o.class_name.empty() && !t.class_name.empty() && o.class_name != t.class_name)
         penalty += options_.class_penalty;
@@ -91,7 +91,7 @@ void MoverTracker::correct(const MoverObservation& o, const Eigen::Matrix3d& noi
   t->seen = time_;
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
-  if (++t->sightings >= options_.sightings && t->id == 0) t->id = ++last_id_;
+  if (++t->observations >= options_.min_observations && t->id == 0) t->id = ++last_id_;
 }
 
 std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& depth, const MoverMask& mask,
@@ -142,7 +142,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     t.covariance.diagonal().tail<3>().setConstant(options_.speed_sd * options_.speed_sd);
     t.seen = time_;
     t.box = o.box;
-    t.sightings = 1;
+    t.observations = 1;
     tracks_.push_back(std::move(t));
   }
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
@@ -150,12 +150,12 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
 }
 
 void MoverTracker::rebase(const Rigid3& new_from_old) {
-  Covariance turn = Covariance::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = new_from_old.matrix3();
+  Covariance rotation = Covariance::Zero();
+  rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = new_from_old.matrix3();
   for (Track& t : tracks_) {
     t.state.head<3>() = new_from_old * t.state.head<3>();
     t.state.tail<3>() = new_from_old.rotation * t.state.tail<3>();
-    t.covariance = turn * t.covariance * turn.transpose();
+    t.covariance = rotation * t.covariance * rotation.transpose();
   }
 }
 

@@ -13,23 +13,23 @@ namespace dkb {
 
 struct MoverTrackerOptions {
   MoverObserverOptions observer = {};
-  double sd_across = 0.12;     // [m] standard deviation of an observed position along the image's rows, > 0
-  double sd_down = 0.45;       // [m] along its columns: clutter and other movers hide legs and bodies, > 0
-  double sd_deep = 0.12;       // [m] along the optical axis, > 0
-  double agility = 3.0;        // [m^2/s^3] spectral density of the white noise that acceleration is taken for, > 0
-  double speed_sd = 1.2;       // [m/s] standard deviation of the speed of something just found, > 0
-  double gate = 25.0;          // squared Mahalanobis distance within which an observation may belong to a track, > 0
-  double reach = 0.9;          // [m] nor may it lie farther from where it is expected than this, > 0 ...
-  double reach_growth = 1.5;   // [m/s] ... and this times the time unseen, >= 0
-  double class_penalty = 9.0;  // added to the squared distance when classes differ, >= 0
-  double box_weight = 2.0;     // times 1 - intersection over union with its last box: added too, >= 0
-  double box_memory = 0.3;     // [s] which counts less and less until so long ago, > 0
-  double memory = 1.2;         // [s] a mover unseen for longer is forgotten, > 0
-  double doubt_memory = 0.2;   // [s] the same before it is confirmed, > 0
-  int sightings = 3;           // that confirm a mover and give it its id, >= 2
-  double apart = 0.35;         // [m] nothing is found so near to a mover already seen in the frame, >= 0
-  double regions_apart = 0.6;  // [m] the same for regions without a box, across and along the optical axis, >= 0
-  void check() const;          // throws InvalidOption
+  double sd_across = 0.12;    // [m] standard deviation of an observed position along the image's rows, > 0
+  double sd_down = 0.45;      // [m] along its columns: clutter and other movers hide legs and bodies, > 0
+  double sd_deep = 0.12;      // [m] along the optical axis, > 0
+  double agility = 3.0;       // [m^2/s^3] spectral density of the white noise that acceleration is taken for, > 0
+  double speed_sd = 1.2;      // [m/s] standard deviation of the speed of something just found, > 0
+  double gate = 25.0;         // squared Mahalanobis distance within which an observation may belong to a track, > 0
+  double max_distance = 0.9;  // [m] nor may it lie farther from where it is expected than this, > 0 ...
+  double max_distance_growth = 1.5;  // [m/s] ... and this times the time unseen, >= 0
+  double class_penalty = 9.0;        // added to the squared distance when classes differ, >= 0
+  double box_weight = 2.0;           // times 1 - intersection over union with its last box: added too, >= 0
+  double box_memory = 0.3;           // [s] which counts less and less until so long ago, > 0
+  double memory = 1.2;               // [s] a mover unseen for longer is forgotten, > 0
+  double doubt_memory = 0.2;         // [s] the same before it is confirmed, > 0
+  int min_observations = 3;          // that confirm a mover and give it its id, >= 2
+  double apart = 0.35;               // [m] nothing is found so near to a mover already seen in the frame, >= 0
+  double regions_apart = 0.6;        // [m] the same for regions without a box, across and along the optical axis, >= 0
+  void check() const;                // throws InvalidOption
 };
 
 // Follows movers through a sequence: obstacles with a place, a velocity and a lasting identity. Observations of
@@ -61,7 +61,7 @@ class MoverTracker {
     Covariance covariance;
     Box box;          // [px] where it was last seen
     double seen = 0;  // [s]
-    int sightings = 0;
+    int observations = 0;
   };
   void predict(double seconds);
   std::vector<int> associate(const std::vector<MoverObservation>& observations, const Eigen::Matrix3d& noise,

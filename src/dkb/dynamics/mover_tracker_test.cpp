@@ -33,7 +33,7 @@ MoverTestScene one_person(double x, double z) {
   return scene;
 }
 
-TEST(MoverTracker, TheThirdSightingGivesAnId) {
+TEST(MoverTracker, TheThirdObservationGivesAnId) {
   MoverTracker tracker(MoverTestScene().camera, {});
   EXPECT_TRUE(show(&tracker, 0, one_person(0, 2)).empty());
   EXPECT_TRUE(show(&tracker, kStep, one_person(0, 2)).empty());
@@ -159,7 +159,7 @@ TEST(MoverTracker, ResetForgetsMoversAndGoesOnCounting) {
 }
 
 TEST(MoverTracker, OptionsAreChecked) {
-  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.sightings = 1}), InvalidOption);
+  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.min_observations = 1}), InvalidOption);
   EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.memory = 0}), InvalidOption);
   EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.observer = {.cell = 99}}), InvalidOption);
 }

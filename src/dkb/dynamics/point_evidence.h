@@ -10,9 +10,11 @@
 namespace dkb {
 
 struct PointEvidenceOptions {
-  int sightings =
+  int min_observations =
       10;  // times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1
-  void check() const { require_option(sightings >= 1, "dynamics.evidence.sightings", sightings, "at least 1"); }
+  void check() const {
+    require_option(min_observations >= 1, "dynamics.evidence_observations", min_observations, "at least 1");
+  }
 };
 
 // What the frames say of each map point over time: was it on a mover, or did it fit the still world?
@@ -28,7 +30,7 @@ class PointEvidence {
   std::vector<PointId> take_convicted() {
     std::vector<PointId> convicted;
     for (auto it = suspicion_.begin(); it != suspicion_.end();) {
-      if (it->second >= options_.sightings) {
+      if (it->second >= options_.min_observations) {
         convicted.push_back(it->first);
         it = suspicion_.erase(it);
       } else {

@@ -61,7 +61,7 @@ float object_depth(const Image<float>& grid, const CellRange& core, const Silhou
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.depth < b.depth; });
   // Slide a window of the layer's relative width from near to far; the first local maximum that is heavy enough wins.
   const float ratio = static_cast<float>((1 + options.layer) / (1 - options.layer));
-  const float needed = static_cast<float>(options.least_share) * total;
+  const float needed = static_cast<float>(options.min_share) * total;
   float weight = 0, best_weight = 0, best_depth = samples[samples.size() / 2].depth;
   size_t end = 0;
   for (size_t begin = 0; begin < samples.size(); ++begin) {
@@ -84,8 +84,8 @@ struct Cell {
 // What hangs together in depth within a range of cells. Each cell is given out once.
 class Surfaces {
  public:
-  Surfaces(const Image<float>& depth, const CellRange& cells, float step)
-      : range(cells), depth_(depth), step_(step), seen_(depth.width(), depth.height()) {}
+  Surfaces(const Image<float>& depth, const CellRange& cells, float depth_jump)
+      : range(cells), depth_(depth), depth_jump_(depth_jump), seen_(depth.width(), depth.height()) {}
 
   // The seeds and all that hangs together with them and is `wanted`.
   std::vector<Cell> grow(std::vector<Cell> cells, const auto& wanted) {
@@ -95,7 +95,8 @@ class Surfaces {
       const float d = depth_(x, y);
       for (const auto& [dx, dy] : kBeside) {
         const Cell n{x + dx, y + dy};
-        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || std::fabs(depth_(n.x, n.y) - d) > step_ * d) continue;
+        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || std::fabs(depth_(n.x, n.y) - d) > depth_jump_ * d)
+          continue;
         seen_(n.x, n.y) = 1;
         cells.push_back(n);
       }
@@ -110,13 +111,13 @@ class Surfaces {
 
  private:
   const Image<float>& depth_;
-  float step_;
+  float depth_jump_;
   Image<uint8_t> seen_;
 };
 
-// A limb stands before or behind the rest, so that depth steps between them. Unlike the background it ends within the
-// box: surfaces in reach that lie beside the object and do not go on beyond the box are part of it.
-void add_limbs(Surfaces& surfaces, const auto& in_reach, Image<uint8_t>& mine) {
+// A limb stands before or behind the rest, so that depth jumps between them. Unlike the background it ends within the
+// box: surfaces near its depth that lie beside the object and do not go on beyond the box are part of it.
+void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& mine) {
   const CellRange& r = surfaces.range;
   const auto at_side = [&](const Cell& c) {
     return (c.x == r.x0 && c.x > 0) || (c.y == r.y0 && c.y > 0) || (c.x == r.x1 - 1 && c.x < mine.width() - 1) ||
@@ -125,8 +126,8 @@ void add_limbs(Surfaces& surfaces, const auto& in_reach, Image<uint8_t>& mine) {
   std::vector<Cell> limbs;
   for (int y = r.y0; y < r.y1; ++y)
     for (int x = r.x0; x < r.x1; ++x) {
-      if (surfaces.seen(x, y) || !in_reach(x, y)) continue;
-      const std::vector<Cell> surface = surfaces.grow({{x, y}}, in_reach);
+      if (surfaces.seen(x, y) || !within_depth(x, y)) continue;
+      const std::vector<Cell> surface = surfaces.grow({{x, y}}, within_depth);
       if (std::any_of(surface.begin(), surface.end(), at_side)) continue;
       const bool beside = std::any_of(surface.begin(), surface.end(), [&](const Cell& c) {
         return std::any_of(Surfaces::kBeside.begin(), Surfaces::kBeside.end(), [&](const Cell& d) {
@@ -144,10 +145,10 @@ void add_limbs(Surfaces& surfaces, const auto& in_reach, Image<uint8_t>& mine) {
 void SilhouetteOptions::check() const {
   require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
   require_option(core > 0 && core <= 1, "core", core, "greater than 0, at most 1");
-  require_option(least_share > 0 && least_share <= 1, "least_share", least_share, "greater than 0, at most 1");
+  require_option(min_share > 0 && min_share <= 1, "min_share", min_share, "greater than 0, at most 1");
   require_option(layer > 0 && layer < 1, "layer", layer, "between 0 and 1");
-  require_option(step > 0, "step", step, "greater than 0");
-  require_option(reach > 0, "reach", reach, "greater than 0 m");
+  require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0");
+  require_option(max_depth_offset > 0, "max_depth_offset", max_depth_offset, "greater than 0 m");
   require_option(margin >= 0, "margin", margin, "at least 0");
   require_option(rim >= 0, "rim", rim, "at least 0");
 }
@@ -173,17 +174,17 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
       continue;
     }
     Image<uint8_t> mine(columns, rows);
-    Surfaces surfaces{grid, range, static_cast<float>(options.step)};
+    Surfaces surfaces{grid, range, static_cast<float>(options.depth_jump)};
     const auto near_layer = [&](int x, int y, double tolerance) {
       return grid(x, y) > 0 && std::fabs(grid(x, y) - layer) <= static_cast<float>(tolerance);
     };
-    const auto in_reach = [&](int x, int y) { return near_layer(x, y, options.reach); };
+    const auto within_depth = [&](int x, int y) { return near_layer(x, y, options.max_depth_offset); };
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
         if (near_layer(x, y, options.layer * layer)) seeds.push_back({x, y});
-    for (const Cell& c : surfaces.grow(std::move(seeds), in_reach)) mine(c.x, c.y) = 255;
-    add_limbs(surfaces, in_reach, mine);
+    for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
+    add_limbs(surfaces, within_depth, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.
     for (int y = range.y0; y < range.y1; ++y)

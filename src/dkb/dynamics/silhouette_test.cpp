@@ -77,17 +77,17 @@ TEST(Silhouette, ALimbMayBeCutByTheBorderOfTheImage) {
   EXPECT_TRUE(silhouette_in(depth, {90, 10, 70, 100}).at(156, 50));
 }
 
-TEST(Silhouette, WhatLiesBeyondTheReachIsNotPartOfThePerson) {
+TEST(Silhouette, WhatLiesFartherInDepthIsNotPartOfThePerson) {
   DepthImage depth = person_before_wall();
   // A ramp behind the person's side: its steps are as small as those of one surface, but it leads away.
   for (int x = 100; x < 150; ++x) fill(&depth, x, 20, x + 1, 100, 1.5f + 0.0069f * static_cast<float>(x - 99));
   SilhouetteOptions options;
   options.rim = 0;
-  options.reach = 0.2;
+  options.max_depth_offset = 0.2;
   const MoverMask mask = silhouette_in(depth, {20, 10, 120, 100}, options);
   EXPECT_TRUE(mask.at(122, 60));   // 0.16 m behind the front
   EXPECT_FALSE(mask.at(142, 60));  // 0.30 m
-  options.reach = 0.6;
+  options.max_depth_offset = 0.6;
   EXPECT_TRUE(silhouette_in(depth, {20, 10, 120, 100}, options).at(142, 60));
 }
 

@@ -35,9 +35,9 @@ class SquareWorld {
   SquareWorld(int width, int height, int squares, uint64_t seed) : width_(width), height_(height) {
     Random random(seed);
     for (int i = 0; i < squares; ++i) {
-      const double turn = random.uniform(0, 6.3);
-      squares_.push_back({random.uniform(-60, width + 60), random.uniform(-60, height + 60), std::cos(turn),
-                          std::sin(turn), random.uniform(5, 22), random.uniform(20, 235)});
+      const double angle = random.uniform(0, 6.3);
+      squares_.push_back({random.uniform(-60, width + 60), random.uniform(-60, height + 60), std::cos(angle),
+                          std::sin(angle), random.uniform(5, 22), random.uniform(20, 235)});
     }
   }
 
@@ -54,10 +54,11 @@ class SquareWorld {
     for (const Square& s : squares_) {
       double cx = 0, cy = 0;
       move(m, s.x, s.y, cx, cy);
-      const double reach = (1.5 * s.half + 3) / size;
-      const int x0 = std::max(0, static_cast<int>(cx - reach)), x1 = std::min(width_ - 1, static_cast<int>(cx + reach));
-      const int y0 = std::max(0, static_cast<int>(cy - reach)),
-                y1 = std::min(height_ - 1, static_cast<int>(cy + reach));
+      const double half_size = (1.5 * s.half + 3) / size;
+      const int x0 = std::max(0, static_cast<int>(cx - half_size)),
+                x1 = std::min(width_ - 1, static_cast<int>(cx + half_size));
+      const int y0 = std::max(0, static_cast<int>(cy - half_size)),
+                y1 = std::min(height_ - 1, static_cast<int>(cy + half_size));
       for (int y = y0; y <= y1; ++y)
         for (int x = x0; x <= x1; ++x) {
           const double px = m.a * (x - centre_x()) - m.b * (y - centre_y()) + centre_x() + m.tx - s.x;

@@ -28,13 +28,14 @@ std::optional<int> PatchDescriber::distance(float x, float y, int octave, const 
     return std::nullopt;
   const int cx = static_cast<int>(column), cy = static_cast<int>(line);
   const GreyImage& smooth = blurred_[static_cast<size_t>(octave)];
-  int least = 256;
+  int min_distance = 256;
   for (int py = cy - 1; py <= cy + 1; ++py)
     for (int px = cx - 1; px <= cx + 1; ++px) {
       const float angle = orientation_angle(centroid_moments(pixels.row(py) + px, pixels.width()));
-      least = std::min(least, hamming_distance(sought, brief_.describe(smooth.row(py) + px, pixels.width(), angle)));
+      min_distance =
+          std::min(min_distance, hamming_distance(sought, brief_.describe(smooth.row(py) + px, pixels.width(), angle)));
     }
-  return least;
+  return min_distance;
 }
 
 }  // namespace dkb

@@ -10,7 +10,7 @@ namespace dkb {
 
 // How far corners and depths may be off.
 struct SensorNoise {
-  static constexpr int kMostLevels = 32;  // of an image pyramid
+  static constexpr int kMaxLevels = 32;  // of an image pyramid
 
   double pixel_sigma = 1.0;          // [px] of a corner on the finest pyramid level, > 0
   double scale_exponent = 0.5;       // how it grows with the scale of the level: sigma ~ scale^exponent, 0 ... 1
@@ -32,8 +32,8 @@ struct SensorNoise {
   }
   // The same for every level that a pyramid may have.
   std::vector<double> corner_sigmas(double scale_factor) const {
-    std::vector<double> sigmas(kMostLevels);
-    for (int octave = 0; octave < kMostLevels; ++octave)
+    std::vector<double> sigmas(kMaxLevels);
+    for (int octave = 0; octave < kMaxLevels; ++octave)
       sigmas[static_cast<size_t>(octave)] = corner_sigma(octave, scale_factor);
     return sigmas;
   }

@@ -25,8 +25,8 @@ double median_depth(const KeyframeQuery& q) {
 void AdaptiveKeyframeOptions::check() const {
   parallax.check();
   require_option(visibility_levels >= 2 && visibility_levels <= 18, "visibility_levels", visibility_levels, "2 ... 18");
-  require_option(least_frames_between >= 1, "least_frames_between", least_frames_between, "at least 1 frame");
-  require_option(floor_least_tracked >= 0, "floor_least_tracked", floor_least_tracked, "at least 0");
+  require_option(min_frames_between >= 1, "min_frames_between", min_frames_between, "at least 1 frame");
+  require_option(floor_min_tracked >= 0, "floor_min_tracked", floor_min_tracked, "at least 0");
   require_option(floor_few_close >= 0, "floor_few_close", floor_few_close, "at least 0");
   require_option(floor_many_creatable >= 0, "floor_many_creatable", floor_many_creatable, "at least 0");
   require_option(floor_reference_ratio >= 0 && floor_reference_ratio <= 1, "floor_reference_ratio",
@@ -122,7 +122,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
 
   KeyframeDecision decision;
   KeyframeTests& tests = decision.tests;
-  tests.waited = q.frame - q.last_keyframe_frame >= options_.least_frames_between;
+  tests.waited = q.frame - q.last_keyframe_frame >= options_.min_frames_between;
   const Parallax parallax = parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world,
                                              units_per_metre(options_.parallax.translation_unit, median_depth(q)));
   tests.parallax = gate_.passes(parallax);
@@ -141,7 +141,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
     tests.visibility = visibility.votes;
     tests.spread = spread.votes;
   }
-  tests.few_points = q.tracked_points < options_.floor_least_tracked;
+  tests.few_points = q.tracked_points < options_.floor_min_tracked;
   tests.close_points =
       q.tracked_close_points < options_.floor_few_close && q.creatable_close_points >= options_.floor_many_creatable;
   tests.view_left = q.tracked_points < options_.floor_reference_ratio * q.reference_points ||
@@ -156,7 +156,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   decision.explanation = fmt::format(
       "{} frames since the last keyframe (at least {}: {}); parallax {:.2f} deg + {:.2f} against T {:.2f} (F {:.3f}): "
       "{}; ",
-      q.frame - q.last_keyframe_frame, options_.least_frames_between, yes_or_no(tests.waited), parallax.rotation_deg,
+      q.frame - q.last_keyframe_frame, options_.min_frames_between, yes_or_no(tests.waited), parallax.rotation_deg,
       parallax.translation, gate_.threshold(), gate_.factor(), yes_or_no(tests.parallax));
   if (!tests.votes_asked)
     decision.explanation +=
@@ -173,7 +173,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeQuery& q, const Ma
   decision.explanation += fmt::format(
       "tracked {} (at least {}: {}), at least {} of the reference's {} and {} of {} after the last keyframe: {}; close "
       "{} (+{}), not below {} with +{}: {}",
-      q.tracked_points, options_.floor_least_tracked, yes_or_no(!tests.few_points), options_.floor_reference_ratio,
+      q.tracked_points, options_.floor_min_tracked, yes_or_no(!tests.few_points), options_.floor_reference_ratio,
       q.reference_points, options_.floor_kept_ratio, reference_.tracked_points, yes_or_no(!tests.view_left),
       q.tracked_close_points, q.creatable_close_points, options_.floor_few_close, options_.floor_many_creatable,
       yes_or_no(!tests.close_points));

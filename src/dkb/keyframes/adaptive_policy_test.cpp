@@ -163,7 +163,7 @@ TEST(AdaptiveKeyframes, LeaveItToTheFloorUntilTheLastKeyframeIsMapped) {
 TEST(AdaptiveKeyframes, HaveNoVoteWithoutMatches) {
   Wall wall;
   AdaptiveKeyframeOptions options = all_levels();
-  options.floor_least_tracked = 0;
+  options.floor_min_tracked = 0;
   options.floor_few_close = 0;
   options.floor_reference_ratio = 0;
   AdaptiveKeyframePolicy policy(options, 640, 480);
@@ -293,8 +293,8 @@ TEST(AdaptiveKeyframes, AnOptionOutOfRangeIsNamed) {
   };
   EXPECT_NE(message([](auto& o) { o.parallax.window = 0; }).find("window"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.visibility_levels = 1; }).find("visibility_levels"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.least_frames_between = 0; }).find("least_frames_between"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.floor_least_tracked = -1; }).find("floor_least_tracked"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.min_frames_between = 0; }).find("min_frames_between"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.floor_min_tracked = -1; }).find("floor_min_tracked"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_few_close = -1; }).find("floor_few_close"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_many_creatable = -1; }).find("floor_many_creatable"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.floor_kept_ratio = -0.1; }).find("floor_kept_ratio"), std::string::npos);

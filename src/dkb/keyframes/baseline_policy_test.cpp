@@ -93,7 +93,7 @@ TEST(BaselineKeyframes, EveryNumberIsAnOption) {
   const Map map;
   EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);  // 169 of 200 is more than half
   options = {};
-  options.least_tracked = 170;
+  options.min_tracked = 170;
   EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);
   options = {};
   options.frames_between = 5;
@@ -114,7 +114,7 @@ TEST(BaselineKeyframes, AnOptionOutOfRangeIsNamed) {
     return "";
   };
   EXPECT_NE(message([](auto& o) { o.frames_between = 0; }).find("frames_between"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.least_tracked = -1; }).find("least_tracked"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.min_tracked = -1; }).find("min_tracked"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.reference_ratio = 1.1; }).find("reference_ratio"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.few_close = -1; }).find("few_close"), std::string::npos);
   EXPECT_NE(message([](auto& o) { o.many_creatable = -1; }).find("many_creatable"), std::string::npos);

@@ -71,7 +71,7 @@ class KeyframePolicy {
 // The rule published with ORB-SLAM2 (T-RO 2017) for RGB-D cameras, as restated in DKB section 3.2.
 struct BaselineKeyframeOptions {
   int frames_between = 20;  // [frames] longest wait while mapping is busy; also the wait after a relocalisation, >= 1
-  int least_tracked = 50;   // [points] fewer tracked points make no keyframe, >= 0
+  int min_tracked = 50;     // [points] fewer tracked points make no keyframe, >= 0
   // Insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1. Published: 0.9, for
   // another matcher; with ours 0.85 gives as many keyframes as ORB-SLAM3 makes (35 to 39 on fr1_xyz's first 9 s).
   double reference_ratio = 0.85;

@@ -72,7 +72,7 @@ std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
   std::vector<LoopEdge> edges;
   const KeyframeId far = finding.far_area.front();
   const Rigid3 world_from_far = map.keyframe(far)->cam_from_world.inverse();
-  for (const LoopFinding::Sighting& s : finding.sightings)
+  for (const LoopFinding::Support& s : finding.support)
     edges.push_back({far, s.keyframe, s.fit.cam_from_world * world_from_far, static_cast<int>(s.fit.matches.size())});
   return edges;
 }
@@ -82,7 +82,7 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
   MapCorrection correction;
   correction.kind = finding.merge ? MapCorrection::Kind::merge : MapCorrection::Kind::loop;
   correction.far_side = finding.far_area;
-  for (const LoopFinding::Sighting& s : finding.sightings) {
+  for (const LoopFinding::Support& s : finding.support) {
     correction.near_side.push_back(s.keyframe);
     const Keyframe& k = *map.keyframe(s.keyframe);
     for (const auto& [feature, point] : s.fit.matches) {
@@ -90,7 +90,7 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
       if (own != kNoPoint && own != point) correction.same.emplace_back(own, point);
     }
   }
-  const KeyframeId near = finding.sightings.front().keyframe, far = finding.far_area.front();
+  const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
   if (!finding.merge) {
     std::vector<LoopEdge> all = edges;
     const auto added = loop_edges(map, finding);
@@ -98,7 +98,7 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
     move_by_pose_graph(map, all, map.root(near), options, correction);
     return correction;
   }
-  Rigid3 moved_from_world = finding.sightings.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;
+  Rigid3 moved_from_world = finding.support.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;
   correction.near_joint = near;
   correction.far_joint = far;
   if (map.root(near) < map.root(far)) {  // the older map stays

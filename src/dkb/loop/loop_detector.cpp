@@ -10,17 +10,17 @@ namespace {
 
 constexpr double kDegrees = 57.295779513082321;
 
-// How far the camera is from where it would be, and turned, if the world moved as `moved_from_map`.
-bool agrees(const Rigid3& cam_from_world, const PlaceFit& fit, const Rigid3& fit_world_from_world, double translation,
-            double rotation) {
+// How far the camera is from where it would be, and rotated, if the world moved as `moved_from_map`.
+bool supports(const Rigid3& cam_from_world, const PlaceFit& fit, const Rigid3& fit_world_from_world, double translation,
+              double rotation) {
   const Rigid3 expected = cam_from_world * fit_world_from_world.inverse();
   const Rigid3 difference = fit.cam_from_world * expected.inverse();
   return difference.translation.norm() <= translation &&
          kDegrees * vector_from_rotation(difference.rotation).norm() <= rotation;
 }
 
-// Keyframes around `id` that may tell the same: covisible ones and those made just before.
-std::vector<KeyframeId> witnesses(const Map& map, KeyframeId id, int count) {
+// Keyframes that may support what `id` shows: covisible ones and those made just before.
+std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id, int count) {
   std::vector<KeyframeId> chosen;
   const auto add = [&](KeyframeId k) {
     if (static_cast<int>(chosen.size()) < count && k != id && map.live_keyframe(k) != nullptr &&
@@ -34,7 +34,7 @@ std::vector<KeyframeId> witnesses(const Map& map, KeyframeId id, int count) {
 
 }  // namespace
 
-std::vector<double> ways_through_map(const Map& map, KeyframeId from) {
+std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from) {
   const auto count = static_cast<size_t>(map.keyframe_count());
   std::vector<double> length(count, std::numeric_limits<double>::infinity());
   std::vector<std::vector<KeyframeId>> children(count);
@@ -45,13 +45,13 @@ std::vector<double> ways_through_map(const Map& map, KeyframeId from) {
   length[static_cast<size_t>(from)] = 0;
   open.emplace(0.0, from);
   while (!open.empty()) {
-    const auto [way, at] = open.top();
+    const auto [path_length, at] = open.top();
     open.pop();
-    if (way > length[static_cast<size_t>(at)]) continue;
+    if (path_length > length[static_cast<size_t>(at)]) continue;
     const Keyframe& k = *map.keyframe(at);
     const Eigen::Vector3d centre = centre_in_world(k.cam_from_world);
     const auto go = [&](KeyframeId next) {
-      const double there = way + (centre_in_world(map.keyframe(next)->cam_from_world) - centre).norm();
+      const double there = path_length + (centre_in_world(map.keyframe(next)->cam_from_world) - centre).norm();
       if (there >= length[static_cast<size_t>(next)]) return;
       length[static_cast<size_t>(next)] = there;
       open.emplace(there, next);
@@ -87,20 +87,21 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   const std::vector<uint8_t> near = neighbourhood_of(map, id, options.neighbourhood);
   const KeyframeId root = map.root(id);
   const auto eligible = [&](KeyframeId k) {
-    return !near[static_cast<size_t>(k)] && (k <= id - options.least_keyframes_between || map.root(k) != root);
+    return !near[static_cast<size_t>(k)] && (k <= id - options.min_keyframes_between || map.root(k) != root);
   };
   const std::vector<KeyframeId> live = map.live_keyframes();
   if (std::none_of(live.begin(), live.end(), eligible)) return std::nullopt;
 
   std::vector<KeyframeId> candidates;
   float neighbour_score = 0;
-  std::vector<uint8_t> covered(near.size(), 0);  // by the area of a candidate that is more alike
-  const auto alike = map.similar_keyframes(newest->features->descriptors, live.size());
-  for (const PlaceMatch& m : alike)
+  std::vector<uint8_t> covered(near.size(), 0);  // by the area of a more similar candidate
+  const auto similar = map.similar_keyframes(newest->features->descriptors, live.size());
+  for (const PlaceMatch& m : similar)
     if (m.id != id && near[static_cast<size_t>(m.id)]) neighbour_score = std::max(neighbour_score, m.score);
-  for (const PlaceMatch& m : alike) {
+  for (const PlaceMatch& m : similar) {
     if (!eligible(m.id) || covered[static_cast<size_t>(m.id)]) continue;
-    if (m.score < options.least_likeness * neighbour_score || static_cast<int>(candidates.size()) >= options.candidates)
+    if (m.score < options.min_relative_similarity * neighbour_score ||
+        static_cast<int>(candidates.size()) >= options.candidates)
       break;
     candidates.push_back(m.id);
     const auto& covisible = map.keyframe(m.id)->covisible;
@@ -108,7 +109,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
       covered[static_cast<size_t>(covisible[i].keyframe)] = 1;
   }
 
-  std::vector<double> ways;
+  std::vector<double> path_lengths;
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
@@ -116,34 +117,34 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     const auto located = locate_in_area(map, id, area, optics, options, seed + static_cast<uint64_t>(id));
     if (!located) continue;
     if (!merge) {
-      if (ways.empty()) ways = ways_through_map(map, id);
-      const double way = ways[static_cast<size_t>(far)];
+      if (path_lengths.empty()) path_lengths = path_lengths_through_map(map, id);
+      const double path_length = path_lengths[static_cast<size_t>(far)];
       const double shift = (centre_in_world(*located) - centre_in_world(newest->cam_from_world)).norm();
-      const double turn =
+      const double rotation =
           kDegrees * vector_from_rotation(located->rotation.conjugate() * newest->cam_from_world.rotation).norm();
-      if (shift > options.drift_translation_base + options.drift_translation_share * way ||
-          turn > options.drift_rotation_base + options.drift_rotation_per_metre * way)
+      if (shift > options.drift_translation_base + options.drift_translation_share * path_length ||
+          rotation > options.drift_rotation_base + options.drift_rotation_per_metre * path_length)
         continue;
     }
     const auto fit = fit_to_area(map, id, *located, area, optics, options);
-    if (!fit || static_cast<int>(fit->matches.size()) < (merge ? options.merge_least_inliers : options.least_inliers) ||
-        fit->share() < (merge ? options.merge_least_share : options.least_share))
+    if (!fit || static_cast<int>(fit->matches.size()) < (merge ? options.merge_min_inliers : options.min_inliers) ||
+        fit->share() < (merge ? options.merge_min_share : options.min_share))
       continue;
-    if (best && best->sightings.front().fit.matches.size() >= fit->matches.size()) continue;
+    if (best && best->support.front().fit.matches.size() >= fit->matches.size()) continue;
 
     const Rigid3 far_world_from_world = fit->cam_from_world.inverse() * newest->cam_from_world;
     LoopFinding finding;
     finding.merge = merge;
     finding.far_area = area.keyframes;
-    finding.sightings.push_back({id, *fit});
-    for (KeyframeId witness : witnesses(map, id, options.support_keyframes)) {
-      const Rigid3& own = map.keyframe(witness)->cam_from_world;
-      auto seen = fit_to_area(map, witness, own * far_world_from_world.inverse(), area, optics, options);
+    finding.support.push_back({id, *fit});
+    for (KeyframeId supporter : support_candidates(map, id, options.support_keyframes)) {
+      const Rigid3& own = map.keyframe(supporter)->cam_from_world;
+      auto seen = fit_to_area(map, supporter, own * far_world_from_world.inverse(), area, optics, options);
       if (seen && static_cast<int>(seen->matches.size()) >= options.support_inliers &&
-          agrees(own, *seen, far_world_from_world, options.agree_translation, options.agree_rotation))
-        finding.sightings.push_back({witness, std::move(*seen)});
+          supports(own, *seen, far_world_from_world, options.support_translation, options.support_rotation))
+        finding.support.push_back({supporter, std::move(*seen)});
     }
-    if (static_cast<int>(finding.sightings.size()) > options.least_support) best = std::move(finding);
+    if (static_cast<int>(finding.support.size()) > options.min_support) best = std::move(finding);
   }
   return best;
 }

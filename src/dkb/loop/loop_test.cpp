@@ -38,11 +38,11 @@ TEST(LoopDetection, FindsTheStartAgainAfterARound) {
   const auto found = find_loop(world.map, last, world.optics(), {}, 1);
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->merge);
-  EXPECT_EQ(found->sightings.front().keyframe, last);
-  EXPECT_GE(found->sightings.size(), 3U);
+  EXPECT_EQ(found->support.front().keyframe, last);
+  EXPECT_GE(found->support.size(), 3U);
   EXPECT_LE(found->far_area.front(), 6);
   const Rigid3 truth = world.truths[static_cast<size_t>(last)];
-  EXPECT_LT(distance_between(found->sightings.front().fit.cam_from_world, truth), 0.05) << "in the world of the start";
+  EXPECT_LT(distance_between(found->support.front().fit.cam_from_world, truth), 0.05) << "in the world of the start";
   EXPECT_GT(world.error(world.map, last), 0.1) << "where drift has brought it";
 }
 
@@ -50,7 +50,7 @@ TEST(LoopDetection, KeyframesThatAreConnectedMakeNoLoop) {
   RoundTrip world;
   world.go(12);
   LoopOptions eager;
-  eager.least_keyframes_between = 0;
+  eager.min_keyframes_between = 0;
   eager.neighbourhood = 8;
   EXPECT_FALSE(find_loop(world.map, 11, world.optics(), eager, 1));
 }
@@ -137,10 +137,10 @@ TEST(LoopDetection, ALookAlikeRoomIsNotTheSameRoom) {
 
 TEST(LoopDetection, WaysLeadThroughTheMap) {
   const Twins world;
-  const auto ways = ways_through_map(world.map, 30);
-  EXPECT_EQ(ways[30], 0);
-  EXPECT_NEAR(ways[0], 9, 1e-6);
-  EXPECT_NEAR(ways[20], 3, 1e-6);
+  const auto path_lengths = path_lengths_through_map(world.map, 30);
+  EXPECT_EQ(path_lengths[30], 0);
+  EXPECT_NEAR(path_lengths[0], 9, 1e-6);
+  EXPECT_NEAR(path_lengths[20], 3, 1e-6);
 }
 
 TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {

@@ -10,7 +10,7 @@ namespace dkb {
 namespace {
 
 constexpr int kReliableObservers = 3;
-constexpr int kLeastForPose = 10;
+constexpr int kMinPoseMatches = 10;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const 
   match.max_distance = options.match_distance;
   match.ratio = static_cast<float>(options.match_ratio);
   const auto matches = match_brute_force(ours, theirs, match);
-  if (static_cast<int>(matches.size()) < options.least_ransac_inliers) return std::nullopt;
+  if (static_cast<int>(matches.size()) < options.min_ransac_inliers) return std::nullopt;
   std::vector<Eigen::Vector3d> in_world, in_cam;
   std::vector<double> sigma;
   for (const DescriptorMatch& m : matches) {
@@ -55,7 +55,7 @@ std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const 
   }
   RansacOptions ransac;
   ransac.chi2 = 7.815;
-  ransac.min_inliers = options.least_ransac_inliers;
+  ransac.min_inliers = options.min_ransac_inliers;
   ransac.seed = seed;
   const RansacPose found = estimate_rigid_motion(in_world, in_cam, sigma, ransac);
   if (!found.ok) return std::nullopt;
@@ -75,14 +75,14 @@ std::optional<PlaceFit> fit_to_area(const Map& map, KeyframeId keyframe, const R
     std::vector<uint8_t> visible(area.points.size(), 0);
     const auto matches = match_by_projection(area.points, features, optics.camera, fit.cam_from_world,
                                              optics.scale_factor, optics.levels, match, nullptr, &visible);
-    if (static_cast<int>(matches.size()) < kLeastForPose) return std::nullopt;
+    if (static_cast<int>(matches.size()) < kMinPoseMatches) return std::nullopt;
     std::vector<PoseObservation> observations;
     for (const ProjectionMatch& m : matches)
       observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
                                               area.points[static_cast<size_t>(m.candidate)].position, optics.noise,
                                               optics.scale_factor));
     const PoseEstimate pose = optimise_pose(optics.camera, fit.cam_from_world, observations);
-    if (!pose.ok || pose.inliers < kLeastForPose) return std::nullopt;
+    if (!pose.ok || pose.inliers < kMinPoseMatches) return std::nullopt;
     fit.cam_from_world = pose.cam_from_world;
     fit.covariance = pose.covariance;
     fit.matches.clear();

@@ -58,8 +58,8 @@ std::string_view ByteReader::raw(size_t size) {
   return taken;
 }
 
-size_t ByteReader::count(uint64_t claimed, size_t least_bytes) const {
-  if (claimed > rest_.size() / least_bytes) fail("claims more items than it can hold");
+size_t ByteReader::count(uint64_t claimed, size_t min_bytes) const {
+  if (claimed > rest_.size() / min_bytes) fail("claims more items than it can hold");
   return static_cast<size_t>(claimed);
 }
 

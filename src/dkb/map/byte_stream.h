@@ -62,8 +62,8 @@ class ByteReader {
     return static_cast<int64_t>(v >> 1) ^ -static_cast<int64_t>(v & 1);
   }
   std::string_view raw(size_t size);
-  // A number of items that follow, each of at least `least_bytes` bytes (> 0): more cannot be there.
-  size_t count(uint64_t claimed, size_t least_bytes) const;
+  // A number of items that follow, each of at least `min_bytes` bytes (> 0): more cannot be there.
+  size_t count(uint64_t claimed, size_t min_bytes) const;
 
   size_t left() const { return rest_.size(); }
   void expect_end() const;

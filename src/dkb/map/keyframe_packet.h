@@ -22,12 +22,13 @@ struct ProvisionalPoint {
 };
 
 // How often a map point was in view and was matched since the last report to mapping.
-struct PointSighting {
+struct PointVisibility {
   PointId point = kNoPoint;
   int visible = 0, found = 0;
 };
 
-// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of sightings and retractions.
+// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of visibility and
+// retractions.
 struct KeyframePacket {
   KeyframeId id = kNoKeyframe;
   FrameIndex frame = 0;
@@ -37,8 +38,8 @@ struct KeyframePacket {
   Rigid3 cam_from_reference;           // cam_from_world for the first keyframe of a map
   std::vector<PointId> points;         // per feature
   std::vector<ProvisionalPoint> new_points;
-  std::vector<PointSighting> sightings;  // by increasing point id
-  std::vector<PointId> retracted;        // points that turned out to move
+  std::vector<PointVisibility> visibility;  // by increasing point id
+  std::vector<PointId> retracted;           // points that turned out to move
 };
 
 }  // namespace dkb

@@ -232,23 +232,23 @@ void Map::fuse(PointId from, PointId into) {
   survivor.visible += visible;
 }
 
-void Map::update_covisibility(KeyframeId id, int least_shared_points) {
+void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   const Keyframe* self = live_keyframe(id);
   if (self == nullptr) return;
-  std::vector<KeyframeId> sightings;
+  std::vector<KeyframeId> observers;
   for (PointId p : self->points)
     if (const MapPoint* seen = point(p))
       for (const Observation& o : seen->observations)
-        if (o.keyframe != id) sightings.push_back(o.keyframe);
-  std::sort(sightings.begin(), sightings.end());
+        if (o.keyframe != id) observers.push_back(o.keyframe);
+  std::sort(observers.begin(), observers.end());
   std::vector<Covisible> found;
   Covisible best;
-  for (size_t i = 0; i < sightings.size();) {
+  for (size_t i = 0; i < observers.size();) {
     size_t j = i;
-    while (j < sightings.size() && sightings[j] == sightings[i]) ++j;
-    const Covisible c{sightings[i], static_cast<int>(j - i)};
+    while (j < observers.size() && observers[j] == observers[i]) ++j;
+    const Covisible c{observers[i], static_cast<int>(j - i)};
     if (c.shared_points > best.shared_points) best = c;
-    if (c.shared_points >= least_shared_points) found.push_back(c);
+    if (c.shared_points >= min_shared_points) found.push_back(c);
     i = j;
   }
   if (found.empty() && best.keyframe != kNoKeyframe) found.push_back(best);

@@ -14,7 +14,7 @@
 
 namespace dkb {
 
-// One sighting of a map point.
+// One observation of a map point.
 struct Observation {
   KeyframeId keyframe = kNoKeyframe;
   int32_t feature = 0;
@@ -85,7 +85,7 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
-  // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
+  // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
   // The points that these keyframes show, which must exist: increasing, each once.
@@ -107,7 +107,7 @@ class Map {
   void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
   MapPoint& edit_point(PointId id);  // must exist
   // Recomputes the covisibility of `id` and mirrors the edges in its neighbours.
-  void update_covisibility(KeyframeId id, int least_shared_points);
+  void update_covisibility(KeyframeId id, int min_shared_points);
   // Removes a keyframe's observations; it and its children hang on its parent from now on.
   void cull_keyframe(KeyframeId id);
   // Moves the frames of all keyframes to before 0, the newest to -1: a session that begins counts its own from 0.

@@ -13,9 +13,9 @@ namespace dkb {
 namespace {
 
 constexpr size_t kDescriptorBytes = sizeof(Descriptor);
-constexpr size_t kLeastKeyframeBytes = 1 + 4 + 8 + 4 + 7 * 8 + 2;
-constexpr size_t kLeastPointBytes = 1 + 3 * 8;
-constexpr size_t kLongestVarint = 10;
+constexpr size_t kMinKeyframeBytes = 1 + 4 + 8 + 4 + 7 * 8 + 2;
+constexpr size_t kMinPointBytes = 1 + 3 * 8;
+constexpr size_t kMaxVarintBytes = 10;
 
 int64_t signed_of(uint64_t zigzag) {
   return static_cast<int64_t>(zigzag >> 1) ^ -static_cast<int64_t>(zigzag & 1);
@@ -52,9 +52,9 @@ float stepped(float prediction, uint32_t step) {
   return std::bit_cast<float>(std::bit_cast<uint32_t>(prediction) + (step >> 1 ^ (0u - (step & 1))));
 }
 
-std::string read_sized_packed(ByteReader& in, size_t items, size_t most_bytes_each) {
+std::string read_sized_packed(ByteReader& in, size_t items, size_t max_bytes_each) {
   const uint64_t size = in.u64();
-  if (size > static_cast<uint64_t>(items) * most_bytes_each) in.fail("claims more than its items can be");
+  if (size > static_cast<uint64_t>(items) * max_bytes_each) in.fail("claims more than its items can be");
   return read_packed(in, static_cast<size_t>(size));
 }
 
@@ -97,9 +97,9 @@ struct Keyframes {
 Keyframes read_keyframes(std::string_view bytes, size_t descriptor_bytes) {
   ByteReader in(bytes, "section KEYF");
   Keyframes result;
-  const size_t count = in.count(in.varint(), kLeastKeyframeBytes);
+  const size_t count = in.count(in.varint(), kMinKeyframeBytes);
   if (count > static_cast<size_t>(birth_keyframe(kNoPoint))) in.fail("has more keyframes than a map can hold");
-  const size_t most_features = descriptor_bytes / kDescriptorBytes;
+  const size_t max_features = descriptor_bytes / kDescriptorBytes;
   result.all.reserve(count);
   for (size_t id = 0; id < count; ++id) {
     Keyframe k;
@@ -115,7 +115,7 @@ Keyframes read_keyframes(std::string_view bytes, size_t descriptor_bytes) {
       k.cam_from_parent = read_pose(in);
     } else {
       const uint64_t features = in.varint();
-      if (features > static_cast<uint64_t>(kMaxFeaturesPerFrame) || features > most_features - result.features)
+      if (features > static_cast<uint64_t>(kMaxFeaturesPerFrame) || features > max_features - result.features)
         in.fail("has a keyframe with more features than there are descriptors");
       result.features += static_cast<size_t>(features);
       result.feature_counts.push_back(static_cast<size_t>(features));
@@ -179,7 +179,7 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
 }
 
 void read_points_seen(ByteReader& in, Keyframes& keyframes) {
-  const std::string age_bytes = read_sized_packed(in, keyframes.features, kLongestVarint);
+  const std::string age_bytes = read_sized_packed(in, keyframes.features, kMaxVarintBytes);
   ByteReader ages(age_bytes, "section FEAT");
   size_t seen = 0;
   for (Keyframe& k : keyframes.all) {
@@ -240,7 +240,7 @@ PointId next_id(ByteReader& in, PointId before, bool first) {
 Points read_points(std::string_view bytes) {
   ByteReader in(bytes, "section POIN");
   Points points;
-  const size_t n = in.count(in.varint(), kLeastPointBytes);
+  const size_t n = in.count(in.varint(), kMinPointBytes);
   points.live.resize(n);
   points.descriptor_sources.resize(n);
   PointId before = 0;
@@ -252,7 +252,7 @@ Points read_points(std::string_view bytes) {
   const auto nx = read_packed_floats(in, n), ny = read_packed_floats(in, n), nz = read_packed_floats(in, n);
   const auto distance = read_packed_floats(in, n), scale = read_packed_floats(in, n);
   const ColourColumns colour(in, n);
-  const std::string number_bytes = read_sized_packed(in, n, 4 * kLongestVarint + kDescriptorBytes);
+  const std::string number_bytes = read_sized_packed(in, n, 4 * kMaxVarintBytes + kDescriptorBytes);
   ByteReader numbers(number_bytes, "section POIN");
   for (size_t i = 0; i < n; ++i) {
     MapPoint& p = points.live[i];

@@ -12,7 +12,7 @@ namespace dkb {
 namespace {
 
 // Far beyond any image, near enough to be turned into an integer.
-constexpr float kFarthestPixel = 1e6f;
+constexpr float kMaxPixel = 1e6f;
 
 bool sound(const Rigid3& pose) {
   return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
@@ -20,7 +20,7 @@ bool sound(const Rigid3& pose) {
 }
 
 bool sound(const Eigen::Vector2f& pixel) {
-  return std::abs(pixel.x()) <= kFarthestPixel && std::abs(pixel.y()) <= kFarthestPixel;  // false for NaN
+  return std::abs(pixel.x()) <= kMaxPixel && std::abs(pixel.y()) <= kMaxPixel;  // false for NaN
 }
 
 // How far `pixel` lies from its prediction, counted in floats; 0 when they are equal, small when they are near.

@@ -11,10 +11,10 @@
 namespace dkb {
 
 void MappingOptions::check() const {
-  require_option(least_shared_points >= 1, "least_shared_points", least_shared_points, "at least 1");
-  require_option(least_found_ratio >= 0 && least_found_ratio <= 1, "least_found_ratio", least_found_ratio, "0 ... 1");
+  require_option(min_shared_points >= 1, "min_shared_points", min_shared_points, "at least 1");
+  require_option(min_found_ratio >= 0 && min_found_ratio <= 1, "min_found_ratio", min_found_ratio, "0 ... 1");
   require_option(probation_keyframes >= 1, "probation_keyframes", probation_keyframes, "at least 1");
-  require_option(least_observers >= 2, "least_observers", least_observers, "at least 2");
+  require_option(min_observers >= 2, "min_observers", min_observers, "at least 2");
   require_option(redundant_share >= 0 && redundant_share <= 1, "redundant_share", redundant_share, "0 ... 1");
   require_option(redundant_observers >= 1, "redundant_observers", redundant_observers, "at least 1");
   require_option(fusion_keyframes >= 0, "fusion_keyframes", fusion_keyframes, "at least 0");
@@ -48,7 +48,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   report_.points_created += static_cast<int>(triangulated.size());
   refresh(triangulated);
   fuse_neighbours(packet.id);
-  map_.update_covisibility(packet.id, options_.least_shared_points);
+  map_.update_covisibility(packet.id, options_.min_shared_points);
   if (map_.live_keyframe_count() > 1) {
     const Stopwatch ba;
     const LocalBaReport adjusted =
@@ -79,7 +79,7 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
   for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), options_.seam_tolerance);
   near.insert(near.end(), far.begin(), far.end());
   refresh(map_.points_of(near));
-  for (KeyframeId k : near) map_.update_covisibility(k, options_.least_shared_points);
+  for (KeyframeId k : near) map_.update_covisibility(k, options_.min_shared_points);
   times_.add("map_correction", whole.ms());
   return map_.snapshot();
 }
@@ -91,7 +91,7 @@ void LocalMapper::apply_reports(const KeyframePacket& packet) {
     map_.remove_point(id);
     ++report_.points_retracted;
   }
-  for (const PointSighting& s : packet.sightings) {
+  for (const PointVisibility& s : packet.visibility) {
     const PointId id = map_.resolve(s.point);
     if (id == kNoPoint) continue;
     MapPoint& p = map_.edit_point(id);
@@ -126,7 +126,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   report_.points_created += static_cast<int>(born.size());
   young_.insert(young_.end(), born.begin(), born.end());
   refresh(map_.points_of({packet.id}));
-  map_.update_covisibility(packet.id, options_.least_shared_points);
+  map_.update_covisibility(packet.id, options_.min_shared_points);
   const auto& covisible = map_.keyframe(packet.id)->covisible;
   if (!covisible.empty())
     map_.set_parent(packet.id, covisible.front().keyframe);
@@ -140,9 +140,9 @@ void LocalMapper::cull_points(KeyframeId newest) {
     const MapPoint* p = map_.point(id);
     if (p == nullptr) continue;
     const int age = newest - p->born_at;
-    const bool rarely_found = p->found < options_.least_found_ratio * p->visible;
+    const bool rarely_found = p->found < options_.min_found_ratio * p->visible;
     const bool rarely_seen =
-        age >= options_.probation_keyframes && static_cast<int>(p->observations.size()) < options_.least_observers;
+        age >= options_.probation_keyframes && static_cast<int>(p->observations.size()) < options_.min_observers;
     if (rarely_found || rarely_seen) {
       map_.remove_point(id);
       ++report_.points_culled;
@@ -256,13 +256,13 @@ void refresh_point(Map& map, PointId id, double scale_factor) {
   // The descriptor with the least median distance to the others stands for all.
   size_t chosen = 0;
   if (descriptors.size() > 2) {
-    int least = 257;
+    int min_median = 257;
     std::vector<int> distances(descriptors.size());
     for (size_t i = 0; i < descriptors.size(); ++i) {
       for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
       const int median = upper_median(distances);
-      if (median < least) {
-        least = median;
+      if (median < min_median) {
+        min_median = median;
         chosen = i;
       }
     }

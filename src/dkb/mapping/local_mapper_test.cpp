@@ -77,7 +77,7 @@ TEST_F(Mapping, PointsThatAreRarelyFoundWhereTheyShouldBeAreDropped) {
   const auto points = first->live_points();
   KeyframePacket second = packet(at(1));
   // A point begins with found = visible = 1: 1 + 1 of 1 + 8 is below a quarter, 1 + 1 of 1 + 7 is not.
-  second.sightings = {{points[10], 8, 1}, {points[11], 7, 1}};
+  second.visibility = {{points[10], 8, 1}, {points[11], 7, 1}};
   const MapView view = mapper.process(second);
   EXPECT_EQ(view->point(points[10]), nullptr);
   EXPECT_NE(view->point(points[11]), nullptr);
@@ -191,7 +191,7 @@ TEST_F(Mapping, RetractedPointsLeaveTheMap) {
   EXPECT_EQ(mapper.report().points_retracted, 1);
   KeyframePacket report;  // no keyframe, only what tracking has to say
   report.retracted = {points[5], points[4]};
-  report.sightings = {{points[6], 3, 2}};
+  report.visibility = {{points[6], 3, 2}};
   const int visible = view->point(points[6])->visible, found = view->point(points[6])->found;
   view = mapper.process(report);
   EXPECT_EQ(view->point(points[5]), nullptr);
@@ -254,10 +254,10 @@ TEST(MappingOptions, AreChecked) {
     change(options);
     EXPECT_THROW(options.check(), InvalidOption);
   };
-  rejects([](auto& o) { o.least_shared_points = 0; });
-  rejects([](auto& o) { o.least_found_ratio = 1.5; });
+  rejects([](auto& o) { o.min_shared_points = 0; });
+  rejects([](auto& o) { o.min_found_ratio = 1.5; });
   rejects([](auto& o) { o.probation_keyframes = 0; });
-  rejects([](auto& o) { o.least_observers = 1; });
+  rejects([](auto& o) { o.min_observers = 1; });
   rejects([](auto& o) { o.redundant_share = -0.1; });
   rejects([](auto& o) { o.fusion_radius = 0; });
   rejects([](auto& o) { o.creation.neighbours = -1; });

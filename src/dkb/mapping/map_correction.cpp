@@ -7,12 +7,12 @@
 namespace dkb {
 namespace {
 
-// Makes `joint` the root of its tree: the way up from it is turned round.
+// Makes `joint` the root of its tree: the path up from it is reversed.
 void hang_tree(Map& map, KeyframeId joint, KeyframeId parent) {
-  std::vector<KeyframeId> way;
-  for (KeyframeId k = joint; k != kNoKeyframe; k = map.keyframe(k)->parent) way.push_back(k);
+  std::vector<KeyframeId> path;
+  for (KeyframeId k = joint; k != kNoKeyframe; k = map.keyframe(k)->parent) path.push_back(k);
   map.set_parent(joint, parent);
-  for (size_t i = 1; i < way.size(); ++i) map.set_parent(way[i], way[i - 1]);
+  for (size_t i = 1; i < path.size(); ++i) map.set_parent(path[i], path[i - 1]);
 }
 
 KeyframeId live_ancestor(const Map& map, KeyframeId id) {
@@ -35,13 +35,13 @@ void move_map(Map& map, const MapCorrection& correction) {
   // The others move as the nearest ancestor does that has a correction; trees without one stay.
   std::vector<uint8_t> done(count, 0);
   for (size_t k = 0; k < count; ++k) {
-    std::vector<size_t> way;
+    std::vector<size_t> path;
     KeyframeId at = static_cast<KeyframeId>(k);
     while (at != kNoKeyframe && !motion[static_cast<size_t>(at)] && !done[static_cast<size_t>(at)]) {
-      way.push_back(static_cast<size_t>(at));
+      path.push_back(static_cast<size_t>(at));
       at = map.keyframe(at)->parent;
     }
-    for (size_t w : way) {
+    for (size_t w : path) {
       done[w] = 1;
       if (at != kNoKeyframe) motion[w] = motion[static_cast<size_t>(at)];
     }
@@ -68,7 +68,7 @@ void move_map(Map& map, const MapCorrection& correction) {
   for (KeyframeId id : map.live_keyframes())
     if (motion[static_cast<size_t>(id)])
       map.set_pose(id, map.keyframe(id)->cam_from_world * motion[static_cast<size_t>(id)]->inverse());
-  for (const MapCorrection::Sighting& s : correction.outliers) map.forget(map.resolve(s.point), s.keyframe);
+  for (const MapCorrection::Outlier& s : correction.outliers) map.forget(map.resolve(s.point), s.keyframe);
   if (correction.near_joint != kNoKeyframe) {
     const KeyframeId near = live_ancestor(map, correction.near_joint), far = live_ancestor(map, correction.far_joint);
     if (map.root(near) != map.root(far)) hang_tree(map, near, far);

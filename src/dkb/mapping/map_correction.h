@@ -19,7 +19,7 @@ struct MapCorrection {
     PointId point = kNoPoint;
     Eigen::Vector3d before, after;  // [m] likewise
   };
-  struct Sighting {
+  struct Outlier {
     PointId point = kNoPoint;
     KeyframeId keyframe = kNoKeyframe;
   };
@@ -28,7 +28,7 @@ struct MapCorrection {
   Kind kind = Kind::adjustment;
   std::vector<Pose> poses;                        // by increasing keyframe
   std::vector<Position> positions;                // by increasing point; other points follow a keyframe that sees them
-  std::vector<Sighting> outliers;                 // to be forgotten
+  std::vector<Outlier> outliers;                  // to be forgotten
   std::vector<std::pair<PointId, PointId>> same;  // pairs of points that are one
   // Keyframes on either side of the seam, whose points are to be looked for on the other side and fused.
   std::vector<KeyframeId> near_side, far_side;

@@ -46,7 +46,7 @@ struct DescriptorMatch {
   int feature = -1, distance = 0;
 };
 
-// The most alike of the free features near a line [px], of those within `max_distance` bits.
+// The most similar of the free features near a line [px], of those within `max_distance` bits.
 DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& descriptor,
                              const std::vector<FreeFeature>& free, const RgbdFeatures& features, int max_distance) {
   DescriptorMatch best{-1, max_distance + 1};
@@ -65,7 +65,7 @@ DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& desc
 
 void PointCreationOptions::check() const {
   require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
-  require_option(least_parallax_deg > 0, "least_parallax_deg", least_parallax_deg, "greater than 0 degrees");
+  require_option(min_parallax_deg > 0, "min_parallax_deg", min_parallax_deg, "greater than 0 degrees");
   require_option(max_distance >= 0 && max_distance <= 256, "max_distance", max_distance, "0 ... 256 bits");
   require_option(chi2_epipolar > 0, "chi2_epipolar", chi2_epipolar, "greater than 0");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "greater than 0");
@@ -76,7 +76,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
                                             const PointCreationOptions& options) {
   std::vector<PointId> made;
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
-  const double most_cosine = std::cos(options.least_parallax_deg * M_PI / 180);
+  const double max_cosine = std::cos(options.min_parallax_deg * M_PI / 180);
   const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
   for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
     const Keyframe& a = *map.keyframe(newest);
@@ -107,7 +107,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const Eigen::Vector3d world_ray_a = (world_from_a.rotation * ray_a).normalized();
       const Eigen::Vector3d world_ray_b =
           (world_from_b.rotation * camera.unproject(kb.pixel.cast<double>(), 1.0)).normalized();
-      if (world_ray_a.dot(world_ray_b) > most_cosine) continue;
+      if (world_ray_a.dot(world_ray_b) > max_cosine) continue;
       const auto point = meet(world_from_a.translation, world_ray_a, world_from_b.translation, world_ray_b);
       if (!point) continue;
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {

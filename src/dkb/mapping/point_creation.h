@@ -10,11 +10,11 @@
 namespace dkb {
 
 struct PointCreationOptions {
-  int neighbours = 6;               // covisible keyframes to triangulate with, >= 0 (0 = depth alone makes points)
-  double least_parallax_deg = 1.0;  // [deg] between the rays of a new point, > 0
-  int max_distance = 50;            // [bits] largest Hamming distance of an epipolar match, 0 ... 256
-  double chi2_epipolar = 3.84;      // squared distance to the epipolar line over sigma^2, > 0 (1 d.o.f., 95 %)
-  double chi2_pixel = 5.991;        // squared reprojection error over sigma^2, > 0
+  int neighbours = 6;             // covisible keyframes to triangulate with, >= 0 (0 = depth alone makes points)
+  double min_parallax_deg = 1.0;  // [deg] between the rays of a new point, > 0
+  int max_distance = 50;          // [bits] largest Hamming distance of an epipolar match, 0 ... 256
+  double chi2_epipolar = 3.84;    // squared distance to the epipolar line over sigma^2, > 0 (1 d.o.f., 95 %)
+  double chi2_pixel = 5.991;      // squared reprojection error over sigma^2, > 0
   void check() const;
 };
 

@@ -92,10 +92,10 @@ TEST_F(PointCreation, WithoutParallaxThereIsNothingToTriangulate) {
   EXPECT_TRUE(create().empty());
 }
 
-TEST_F(PointCreation, RaysMustMeetAtTheLeastParallax) {
+TEST_F(PointCreation, RaysMustMeetAtTheMinimumParallax) {
   build(TestScene::camera_at({0.2, 0, 0}));
   PointCreationOptions options;
-  options.least_parallax_deg = 20;  // 0.2 m seen from 1.5 m and more: 7.6 degrees at most
+  options.min_parallax_deg = 20;  // 0.2 m seen from 1.5 m and more: 7.6 degrees at most
   EXPECT_TRUE(create(options).empty());
 }
 
@@ -145,7 +145,7 @@ TEST(PointCreationOptions, AreChecked) {
     EXPECT_THROW(options.check(), InvalidOption);
   };
   rejects([](auto& o) { o.neighbours = -1; });
-  rejects([](auto& o) { o.least_parallax_deg = 0; });
+  rejects([](auto& o) { o.min_parallax_deg = 0; });
   rejects([](auto& o) { o.max_distance = 257; });
   rejects([](auto& o) { o.chi2_epipolar = 0; });
   rejects([](auto& o) { o.chi2_pixel = -1; });

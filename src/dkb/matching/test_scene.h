@@ -49,8 +49,8 @@ class TestScene {
   static Descriptor random_descriptor(Random& random) {
     return {random.next(), random.next(), random.next(), random.next()};
   }
-  static Rigid3 camera_at(const Eigen::Vector3d& centre, const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
-    return Rigid3(rotation_from_vector(turn), centre).inverse();
+  static Rigid3 camera_at(const Eigen::Vector3d& centre, const Eigen::Vector3d& rotation = Eigen::Vector3d::Zero()) {
+    return Rigid3(rotation_from_vector(rotation), centre).inverse();
   }
 
   // The level on which a point is found from a distance [m].
@@ -112,7 +112,7 @@ class TestScene {
 };
 
 // Degrees between two rotations, metres between two cameras.
-inline double turn_between(const Rigid3& a, const Rigid3& b) {
+inline double rotation_between(const Rigid3& a, const Rigid3& b) {
   return vector_from_rotation((a * b.inverse()).rotation).norm() * 180 / M_PI;
 }
 inline double distance_between(const Rigid3& a, const Rigid3& b) {

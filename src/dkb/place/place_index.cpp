@@ -13,7 +13,7 @@ namespace dkb {
 namespace {
 
 constexpr size_t kTrees = 2;
-constexpr size_t kMostSlots = 1 << 16;
+constexpr size_t kMaxSlots = 1 << 16;
 
 // Each tree has bits of its own, drawn once and for all.
 std::vector<DescriptorTree> make_trees() {
@@ -40,14 +40,14 @@ std::vector<PlaceIndex::IdSlot>::const_iterator PlaceIndex::find(int32_t id) con
 }
 
 uint16_t PlaceIndex::take_slot() {
-  if (free_.empty() && slots_.size() == kMostSlots) sweep();
+  if (free_.empty() && slots_.size() == kMaxSlots) sweep();
   if (!free_.empty()) {
     const uint16_t slot = free_.back();
     free_.pop_back();
     return slot;
   }
-  if (slots_.size() == kMostSlots)
-    throw std::length_error("place index: more than " + std::to_string(kMostSlots) + " keyframes");
+  if (slots_.size() == kMaxSlots)
+    throw std::length_error("place index: more than " + std::to_string(kMaxSlots) + " keyframes");
   slots_.emplace_back();
   return static_cast<uint16_t>(slots_.size() - 1);
 }

@@ -63,13 +63,13 @@ std::vector<Listed> rgb_list(const fs::path& folder) {
 std::array<double, 3> position_at(const fs::path& folder, double stamp) {
   std::ifstream in(folder / "groundtruth.txt");
   std::array<double, 3> best{};
-  double least = 1e9;
+  double min_difference = 1e9;
   for (std::string line; std::getline(in, line);) {
     if (line.empty() || line[0] == '#') continue;
     std::istringstream row(line);
     double t, x, y, z;
-    if (row >> t >> x >> y >> z && std::abs(t - stamp) < least) {
-      least = std::abs(t - stamp);
+    if (row >> t >> x >> y >> z && std::abs(t - stamp) < min_difference) {
+      min_difference = std::abs(t - stamp);
       best = {x, y, z};
     }
   }

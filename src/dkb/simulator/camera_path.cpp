@@ -62,13 +62,13 @@ CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {
   }
   auto smooth = std::make_shared<Samples>();
   smooth->start = start;
-  const int reach = static_cast<int>(std::ceil(3 * sigma / kStep));
+  const int half_window = static_cast<int>(std::ceil(3 * sigma / kStep));
   for (int i = 0; i < static_cast<int>(n); ++i) {
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     Eigen::Vector4d q = Eigen::Vector4d::Zero();
     double sum = 0;
     // Symmetric also at the ends, where the window shrinks: no lag.
-    const int r = std::min({reach, i, static_cast<int>(n) - 1 - i});
+    const int r = std::min({half_window, i, static_cast<int>(n) - 1 - i});
     for (int k = -r; k <= r; ++k) {
       const double x = k * kStep / sigma, w = std::exp(-0.5 * x * x);
       p += w * raw.p[static_cast<size_t>(i + k)];

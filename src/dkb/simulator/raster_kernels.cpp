@@ -103,7 +103,7 @@ DKB_TARGET_AVX2 int patch_pixels_avx2(const PatchSpan& s, int count, float* dept
 
 DKB_TARGET_AVX2 int quadric_pixels_avx2(const QuadricSpan& s, int count, float* depth, int32_t* ids) {
   const __m256 sign = _mm256_set1_ps(s.sign), taper = _mm256_set1_ps(s.taper), zero = _mm256_setzero_ps();
-  const __m256 least = _mm256_set1_ps(1e-12F);
+  const __m256 min_norm2 = _mm256_set1_ps(1e-12F);
   int i = 0;
   for (; i + 8 <= count; i += 8) {
     const __m256 t = numbers_from(i), old = _mm256_loadu_ps(depth + i);
@@ -118,12 +118,12 @@ DKB_TARGET_AVX2 int quadric_pixels_avx2(const QuadricSpan& s, int count, float* 
     const __m256 c = _mm256_sub_ps(_mm256_add_ps(product_sum(mx, mx, my, my), _mm256_mul_ps(_mm256_mul_ps(sign, e), e)),
                                    _mm256_set1_ps(s.tau));
     const __m256 root2 = _mm256_sub_ps(_mm256_mul_ps(b, b), _mm256_mul_ps(a, c));
-    __m256 in = _mm256_and_ps(_mm256_cmp_ps(root2, zero, _CMP_GT_OQ), _mm256_cmp_ps(a, least, _CMP_GT_OQ));
+    __m256 in = _mm256_and_ps(_mm256_cmp_ps(root2, zero, _CMP_GT_OQ), _mm256_cmp_ps(a, min_norm2, _CMP_GT_OQ));
     if (_mm256_movemask_ps(in) == 0) continue;
     const __m256 minus_b = _mm256_xor_ps(b, _mm256_set1_ps(-0.0F));
     // max(x, y) is y when x is not greater: the same choice as the scalar code's.
     const __m256 z =
-        _mm256_div_ps(_mm256_sub_ps(minus_b, _mm256_sqrt_ps(_mm256_max_ps(root2, zero))), _mm256_max_ps(a, least));
+        _mm256_div_ps(_mm256_sub_ps(minus_b, _mm256_sqrt_ps(_mm256_max_ps(root2, zero))), _mm256_max_ps(a, min_norm2));
     const __m256 height = _mm256_add_ps(mz, _mm256_mul_ps(dz, z));
     const __m256 distance = _mm256_add_ps(_mm256_set1_ps(s.pivot), z);
     const __m256 inverse = _mm256_div_ps(_mm256_set1_ps(1.0F), _mm256_max_ps(distance, _mm256_set1_ps(0.01F)));

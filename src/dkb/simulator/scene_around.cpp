@@ -40,8 +40,8 @@ struct View {
 // Where the camera meets the height of a desk, or what lies 1.6 m ahead if it looks level or up.
 Vector2d looked_at(const View& v) {
   const double drop = v.eye.z() - kDeskHeight;
-  const double reach = v.axis.z() < -0.05 ? std::min(2.2, drop / -v.axis.z()) : 1.6;
-  return v.eye.head<2>() + reach * v.axis.head<2>();
+  const double distance = v.axis.z() < -0.05 ? std::min(2.2, drop / -v.axis.z()) : 1.6;
+  return v.eye.head<2>() + distance * v.axis.head<2>();
 }
 
 void place_desks(const std::vector<View>& views, const Footprint& room, Furnisher* furnisher) {

@@ -175,8 +175,8 @@ void read_objects(const std::string& file, const Section& top, uint64_t seed, Sc
       s.add_ellipsoid(Vector3d::Zero(), Eigen::Matrix3d::Identity(), 0.5 * Vector3d(size[0], size[1], size[2]), look);
     }
     scene->furnishing.surfaces.append(s.moved(placed(p[0], p[1], p[2], yaw)));
-    const double reach = 0.5 * std::hypot(size[0], size[1]);
-    scene->furnishing.footprints.push_back({p[0] - reach, p[1] - reach, p[0] + reach, p[1] + reach});
+    const double radius = 0.5 * std::hypot(size[0], size[1]);
+    scene->furnishing.footprints.push_back({p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius});
   }
 }
 

@@ -21,11 +21,11 @@ float in_units(float z, const CameraModel& camera) {
   return units <= 0 || units > 65535 ? 0.0F : static_cast<float>(static_cast<double>(units) / camera.depth_factor);
 }
 
-// Whether a window of 2 reach + 1 pixels around (x, y) sees a depth step.
-bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int reach) {
+// Whether a window of 2 half_window + 1 pixels around (x, y) sees a depth jump.
+bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int half_window) {
   const float inverse = inverse_depth(x, y), step = 0.06F * inverse;
-  const int left = std::max(x - reach, 0), right = std::min(x + reach, inverse_depth.width() - 1);
-  for (const int dy : {-reach, 0, reach}) {
+  const int left = std::max(x - half_window, 0), right = std::min(x + half_window, inverse_depth.width() - 1);
+  for (const int dy : {-half_window, 0, half_window}) {
     const float* row = inverse_depth.row(std::clamp(y + dy, 0, inverse_depth.height() - 1));
     if ((std::abs(row[left] - inverse) > step) | (std::abs(row[x] - inverse) > step) |
         (std::abs(row[right] - inverse) > step))

@@ -8,7 +8,7 @@
 namespace dkb {
 namespace {
 
-constexpr size_t kMostLate = 4;  // searches outstanding in a real-time run
+constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
 
 }  // namespace
 
@@ -61,7 +61,7 @@ void LoopStage::offer(const MapView& view, FrameIndex now, bool may_skip) {
   const int keyframes = view->live_keyframe_count();
   for (; next_ < view->keyframe_count(); ++next_) {
     if (!options_.loop.enabled || view->live_keyframe(next_) == nullptr) continue;
-    if (may_skip && search_.outstanding() >= kMostLate) continue;
+    if (may_skip && search_.outstanding() >= kMaxLate) continue;
     search_.push({view, next_, generation_}, now + options_.loop_latency(keyframes));
   }
   if (adjustment_wanted_ && adjustment_.outstanding() == 0) {

@@ -22,7 +22,7 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
   };
   LocalMapper mapper(optics.camera, optics.noise, optics.scale_factor, optics.levels, options.mapping, std::move(both));
   LoopOptions loop = options.loop_closing.loop;
-  loop.least_support = std::min(loop.least_support, second.live_keyframe_count() - 1);  // short maps have few witnesses
+  loop.min_support = std::min(loop.min_support, second.live_keyframe_count() - 1);  // short maps have few witnesses
   LoopCloser closer(optics, loop, options.seed);
   // The second map's keyframes one by one, as if its camera had just come by.
   for (KeyframeId id = first.keyframe_count(); id < mapper.map().keyframe_count(); ++id) {

@@ -84,7 +84,7 @@ TEST_F(MappingStageTest, DrainingTakesAllWhateverIsDueWhen) {
   EXPECT_FALSE(stage.drain());
   stage.push(next(), 12);
   KeyframePacket report;  // the last word of tracking is due at once
-  report.sightings = {{id_of[0], 1, 1}};
+  report.visibility = {{id_of[0], 1, 1}};
   stage.push(report, 11);
   const auto view = stage.drain();
   ASSERT_TRUE(view);

@@ -78,10 +78,10 @@ void bind_settings(Settings& s, SlamOptions& o) {
 
   TrackingOptions& t = o.tracking;
   s.bind("tracking.initial_points", &t.initial_points, "features with depth that the first frame needs");
-  s.bind("tracking.least_matches", &t.least_matches, "matches with the last frame that make a pose worth trying");
-  s.bind("tracking.least_inliers", &t.least_inliers, "inliers of a pose; fewer: lost");
+  s.bind("tracking.min_matches", &t.min_matches, "matches with the last frame that make a pose worth trying");
+  s.bind("tracking.min_inliers", &t.min_inliers, "inliers of a pose; fewer: lost");
   s.bind("tracking.close_depth", &t.close_depth, "[m] depths below make map points at once");
-  s.bind("tracking.least_new_points", &t.least_new_points, "nearest depths that make points whatever close_depth says");
+  s.bind("tracking.min_new_points", &t.min_new_points, "nearest depths that make points whatever close_depth says");
   s.bind("tracking.radius_last_frame", &t.radius_last_frame, "[px] search around the predicted position");
   s.bind("tracking.radius_wide", &t.radius_wide, "[px] second try");
   s.bind("tracking.radius_local_map", &t.radius_local_map, "[px] search for local map points");
@@ -96,19 +96,18 @@ void bind_settings(Settings& s, SlamOptions& o) {
   RelocalisationOptions& r = t.relocalisation;
   s.bind("tracking.relocalisation.candidates", &r.candidates, "look-alike keyframes that a lost tracker tries");
   s.bind("tracking.relocalisation.neighbours", &r.neighbours, "covisible keyframes matched along with each");
-  s.bind("tracking.relocalisation.least_matches", &r.least_matches, "by descriptor alone that make one worth a try");
-  s.bind("tracking.relocalisation.least_agreeing", &r.least_agreeing, "of these, that must agree on a pose");
+  s.bind("tracking.relocalisation.min_matches", &r.min_matches, "by descriptor alone that make one worth a try");
+  s.bind("tracking.relocalisation.min_ransac_inliers", &r.min_ransac_inliers, "of these, that must agree on a pose");
   s.bind("tracking.relocalisation.radius", &r.radius, "[px] first search around that pose");
   s.bind("tracking.relocalisation.radius_fine", &r.radius_fine, "[px] second search");
-  s.bind("tracking.relocalisation.least_inliers", &r.least_inliers, "points that the final pose rests on");
-  s.bind("tracking.relocalisation.least_share", &r.least_share, "of well-known points in view that must be found");
-  s.bind("tracking.relocalisation.least_alike", &r.least_alike, "share of these that must look as they did");
-  s.bind("tracking.relocalisation.least_alike_far", &r.least_alike_far,
+  s.bind("tracking.relocalisation.min_inliers", &r.min_inliers, "points that the final pose rests on");
+  s.bind("tracking.relocalisation.min_share", &r.min_share, "of well-known points in view that must be found");
+  s.bind("tracking.relocalisation.min_similarity", &r.min_similarity, "share of these that must look as they did");
+  s.bind("tracking.relocalisation.min_similarity_far", &r.min_similarity_far,
          "the same where the camera cannot have come to");
-  s.bind("tracking.relocalisation.reach", &r.reach, "[m] from where it was lost to there ...");
-  s.bind("tracking.relocalisation.reach_per_second", &r.reach_per_second, "[m/s] ... and its growth with time");
-  s.bind("tracking.relocalisation.largest_position_sd", &r.largest_position_sd,
-         "[m] standard deviation of the camera's place");
+  s.bind("tracking.relocalisation.max_distance", &r.max_distance, "[m] from where it was lost to there ...");
+  s.bind("tracking.relocalisation.max_speed", &r.max_speed, "[m/s] ... and its growth with time");
+  s.bind("tracking.relocalisation.max_position_sd", &r.max_position_sd, "[m] standard deviation of the camera's place");
   s.bind("tracking.relocalisation.ambiguity", &r.ambiguity,
          "share of the most inliers that makes a pose elsewhere a rival ...");
   s.bind("tracking.relocalisation.clear_lead", &r.clear_lead, "... unless it looks less alike by this share");
@@ -138,8 +137,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("keyframes.normals", &a.normals, {{"oriented", NormalSum::oriented}, {"plain", NormalSum::plain}},
          "cross products turned toward the camera or summed as printed (DKB eq. 28)");
   s.bind("keyframes.visibility_levels", &a.visibility_levels, "of 10 degrees each; the paper has 4 (DKB eq. 32)");
-  s.bind("keyframes.least_frames_between", &a.least_frames_between, "[frames] from a keyframe to the next");
-  s.bind("keyframes.floor_least_tracked", &a.floor_least_tracked, "[points] fewer make a keyframe whatever the votes");
+  s.bind("keyframes.min_frames_between", &a.min_frames_between, "[frames] from a keyframe to the next");
+  s.bind("keyframes.floor_min_tracked", &a.floor_min_tracked, "[points] fewer make a keyframe whatever the votes");
   s.bind("keyframes.floor_few_close", &a.floor_few_close, "[points] fewer tracked close points ...");
   s.bind("keyframes.floor_many_creatable", &a.floor_many_creatable, "[points] ... with so many to be made do so too");
   s.bind("keyframes.floor_reference_ratio", &a.floor_reference_ratio,
@@ -148,7 +147,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
 
   BaselineKeyframeOptions& b = o.baseline_keyframes;
   s.bind("keyframes.baseline.frames_between", &b.frames_between, "[frames] longest wait while mapping is busy");
-  s.bind("keyframes.baseline.least_tracked", &b.least_tracked, "[points] fewer make no keyframe");
+  s.bind("keyframes.baseline.min_tracked", &b.min_tracked, "[points] fewer make no keyframe");
   s.bind("keyframes.baseline.reference_ratio", &b.reference_ratio,
          "share of the reference's points below which a keyframe is due");
   s.bind("keyframes.baseline.few_close", &b.few_close, "[points] fewer tracked close points ...");
@@ -156,10 +155,10 @@ void bind_settings(Settings& s, SlamOptions& o) {
          "[points] ... with so many to be made call for a keyframe");
 
   MappingOptions& m = o.mapping;
-  s.bind("mapping.least_shared_points", &m.least_shared_points, "[points] that make two keyframes covisible");
-  s.bind("mapping.least_found_ratio", &m.least_found_ratio, "found / visible below which a young point is dropped");
+  s.bind("mapping.min_shared_points", &m.min_shared_points, "[points] that make two keyframes covisible");
+  s.bind("mapping.min_found_ratio", &m.min_found_ratio, "found / visible below which a young point is dropped");
   s.bind("mapping.probation_keyframes", &m.probation_keyframes, "[keyframes] that a point is on probation");
-  s.bind("mapping.least_observers", &m.least_observers, "keyframes that must see a point by then");
+  s.bind("mapping.min_observers", &m.min_observers, "keyframes that must see a point by then");
   s.bind("mapping.redundant_share", &m.redundant_share,
          "share of points seen elsewhere that makes a keyframe redundant");
   s.bind("mapping.redundant_observers", &m.redundant_observers, "by at least so many other keyframes");
@@ -167,8 +166,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
          "covisible keyframes whose points are fused with a new one's");
   s.bind("mapping.fusion_radius", &m.fusion_radius, "[px] search for the same point");
   s.bind("mapping.creation.neighbours", &m.creation.neighbours, "covisible keyframes to triangulate with");
-  s.bind("mapping.creation.least_parallax_deg", &m.creation.least_parallax_deg,
-         "[deg] between the rays of a new point");
+  s.bind("mapping.creation.min_parallax_deg", &m.creation.min_parallax_deg, "[deg] between the rays of a new point");
   s.bind("mapping.creation.max_distance", &m.creation.max_distance, "[bits] of an epipolar match");
   s.bind("mapping.creation.chi2_epipolar", &m.creation.chi2_epipolar, "squared epipolar distance over sigma^2");
   s.bind("mapping.creation.chi2_pixel", &m.creation.chi2_pixel, "squared reprojection error over sigma^2");
@@ -190,29 +188,30 @@ void bind_settings(Settings& s, SlamOptions& o) {
   LoopOptions& l = o.loop_closing.loop;
   s.bind("loop.enabled", &l.enabled, "close loops and merge maps");
   s.bind("loop.candidates", &l.candidates, "most alike keyframes that are verified");
-  s.bind("loop.least_likeness", &l.least_likeness, "of a candidate, as a share of the most alike neighbour's score");
+  s.bind("loop.min_relative_similarity", &l.min_relative_similarity,
+         "of a candidate, as a share of the most alike neighbour's score");
   s.bind("loop.neighbourhood", &l.neighbourhood, "steps along covisibility within which nothing is a loop");
-  s.bind("loop.least_keyframes_between", &l.least_keyframes_between, "[keyframes] younger ones are no candidates");
+  s.bind("loop.min_keyframes_between", &l.min_keyframes_between, "[keyframes] younger ones are no candidates");
   s.bind("loop.area_keyframes", &l.area_keyframes, "keyframes around a candidate whose points are matched");
   s.bind("loop.rest_keyframes", &l.rest_keyframes, "[keyframes] without a search after a loop");
   s.bind("loop.match_distance", &l.match_distance, "[bits] of a descriptor match");
   s.bind("loop.match_ratio", &l.match_ratio, "best over second best distance of such a match");
-  s.bind("loop.least_ransac_inliers", &l.least_ransac_inliers, "pairs of points that one rigid motion explains");
+  s.bind("loop.min_ransac_inliers", &l.min_ransac_inliers, "pairs of points that one rigid motion explains");
   s.bind("loop.radius_first", &l.radius_first, "[px] guided search under that motion");
   s.bind("loop.radius", &l.radius, "[px] the same under the refined pose");
-  s.bind("loop.least_inliers", &l.least_inliers, "map points that the refined pose rests on");
-  s.bind("loop.least_share", &l.least_share, "of the well-known points that ought to be in view");
-  s.bind("loop.least_support", &l.least_support, "keyframes around the newest that must see the same");
+  s.bind("loop.min_inliers", &l.min_inliers, "map points that the refined pose rests on");
+  s.bind("loop.min_share", &l.min_share, "of the well-known points that ought to be in view");
+  s.bind("loop.min_support", &l.min_support, "keyframes around the newest that must see the same");
   s.bind("loop.support_keyframes", &l.support_keyframes, "of them asked at most");
   s.bind("loop.support_inliers", &l.support_inliers, "points of the area that such a keyframe must show");
-  s.bind("loop.agree_translation", &l.agree_translation, "[m] by which they may differ");
-  s.bind("loop.agree_rotation", &l.agree_rotation, "[deg] likewise");
+  s.bind("loop.support_translation", &l.support_translation, "[m] by which they may differ");
+  s.bind("loop.support_rotation", &l.support_rotation, "[deg] likewise");
   s.bind("loop.drift_translation_base", &l.drift_translation_base, "[m] largest plausible drift of no way ...");
   s.bind("loop.drift_translation_share", &l.drift_translation_share, "... and its growth with the way's length");
   s.bind("loop.drift_rotation_base", &l.drift_rotation_base, "[deg] the same of the direction");
   s.bind("loop.drift_rotation_per_metre", &l.drift_rotation_per_metre, "[deg/m] and its growth");
-  s.bind("loop.merge_least_inliers", &l.merge_least_inliers, "least_inliers between maps that are not joined");
-  s.bind("loop.merge_least_share", &l.merge_least_share, "least_share between maps that are not joined");
+  s.bind("loop.merge_min_inliers", &l.merge_min_inliers, "min_inliers between maps that are not joined");
+  s.bind("loop.merge_min_share", &l.merge_min_share, "min_share between maps that are not joined");
   s.bind("loop.essential_shared_points", &l.essential_shared_points,
          "[points] shared by keyframes that make an edge of the pose graph");
   s.bind("loop.edge_position_sd", &l.edge_position_sd, "[m] of such an edge ...");
@@ -233,7 +232,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
 
   s.bind("readout.estimate", &o.readout.estimate, "learn the rolling shutter's readout where the camera's is unknown");
   s.bind("readout.step_sd", &o.readout.step_sd, "[s] uncertainty of a step below which it is taken");
-  s.bind("readout.longest", &o.readout.longest, "[s] largest readout believed in");
+  s.bind("readout.max_readout", &o.readout.max_readout, "[s] largest readout believed in");
 
   DynamicsOptions& d = o.dynamics;
   s.bind("dynamics.filter", &d.filter,
@@ -247,16 +246,17 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.paper.flow_threshold", &d.paper.flow_threshold, "[px] d_th (DKB eq. 9)");
   s.bind("dynamics.paper.compensate", &d.paper.compensate, "flow against the camera's own motion; false = raw eq. 9");
   s.bind("dynamics.epipolar.threshold", &d.epipolar.threshold, "[px] distance to the epipolar line");
-  s.bind("dynamics.multiview.depth_step", &d.multiview.depth_step, "[m] before what earlier keyframes saw");
+  s.bind("dynamics.multiview.depth_jump", &d.multiview.depth_jump, "[m] before what earlier keyframes saw");
   s.bind("dynamics.multiview.radius", &d.multiview.radius, "[px] around such a spot");
   s.bind("dynamics.multiview.keyframes", &d.multiview.keyframes, "earlier keyframes compared");
   s.bind("dynamics.silhouette.cell", &d.silhouette.cell, "[px] grid on which depth is looked at");
   s.bind("dynamics.silhouette.core", &d.silhouette.core, "share of a box in which the object is sought");
-  s.bind("dynamics.silhouette.least_share", &d.silhouette.least_share,
+  s.bind("dynamics.silhouette.min_share", &d.silhouette.min_share,
          "of the core's weight that the object's depth layer needs");
   s.bind("dynamics.silhouette.layer", &d.silhouette.layer, "half-width of that layer relative to its depth");
-  s.bind("dynamics.silhouette.step", &d.silhouette.step, "relative depth step within one surface");
-  s.bind("dynamics.silhouette.reach", &d.silhouette.reach, "[m] parts of an object before or behind its layer");
+  s.bind("dynamics.silhouette.depth_jump", &d.silhouette.depth_jump, "relative depth step within one surface");
+  s.bind("dynamics.silhouette.max_depth_offset", &d.silhouette.max_depth_offset,
+         "[m] parts of an object before or behind its layer");
   s.bind("dynamics.silhouette.margin", &d.silhouette.margin, "share by which boxes are widened");
   s.bind("dynamics.silhouette.rim", &d.silhouette.rim, "[cells] by which silhouettes are widened");
   s.bind("dynamics.motion.cell", &d.motion.cell, "[px] grid of the motion segmentation");
@@ -268,11 +268,12 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.motion.interior", &d.motion.interior,
          "weight of a surface being where a view had it, beside that of one in space seen empty, which is 1");
   s.bind("dynamics.motion.contour", &d.motion.contour, "the same of an outline");
-  s.bind("dynamics.motion.smoothing.reach", &d.motion.smoothing.reach,
+  s.bind("dynamics.motion.smoothing.distance", &d.motion.smoothing.distance,
          "[m] along a surface over which cells of one object speak for each other");
-  s.bind("dynamics.motion.smoothing.step_base", &d.motion.smoothing.step_base,
+  s.bind("dynamics.motion.smoothing.depth_jump_base", &d.motion.smoothing.depth_jump_base,
          "[m] depth step between neighbouring cells of one surface: this ...");
-  s.bind("dynamics.motion.smoothing.step_slope", &d.motion.smoothing.step_slope, "... and this share of their depth");
+  s.bind("dynamics.motion.smoothing.depth_jump_slope", &d.motion.smoothing.depth_jump_slope,
+         "... and this share of their depth");
   s.bind("dynamics.motion.smoothing.crease", &d.motion.smoothing.crease,
          "[1/m] second difference of inverse depth in a fold between object and support");
   s.bind("dynamics.motion.smoothing.crease_link", &d.motion.smoothing.crease_link,
@@ -286,7 +287,8 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.points_per_box", &d.points_per_box, "features followed to carry a box");
   s.bind("dynamics.missed_results", &d.missed_results,
          "detector results that may miss an object before its box is dropped");
-  s.bind("dynamics.evidence_sightings", &o.evidence.sightings, "times on a mover before a map point is retracted");
+  s.bind("dynamics.evidence_observations", &o.evidence.min_observations,
+         "times on a mover before a map point is retracted");
 
   DenseOptions& v = o.dense;
   s.bind("dense.voxel", &v.voxel, "[m] side of a voxel of the dense map (--dense)");
@@ -295,9 +297,9 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dense.pixel_step", &v.pixel_step, "[px] every how many pixels depth is kept of a keyframe");
   s.bind("dense.mover_margin", &v.mover_margin, "[px] around movers that is left out as well");
   s.bind("dense.edge_fraction", &v.edge_fraction, "[1] depths beside a step of this share are left out");
-  s.bind("dense.least_views", &v.least_views, "keyframes that must see a surface");
+  s.bind("dense.min_views", &v.min_views, "keyframes that must see a surface");
   s.bind("dense.free_share", &v.free_share, "of a voxel's keyframes that may have seen through it");
-  s.bind("dense.least_patch", &v.least_patch, "[m^2] smaller connected surfaces are dropped");
+  s.bind("dense.min_patch", &v.min_patch, "[m^2] smaller connected surfaces are dropped");
   s.bind("dense.grid_cell", &v.grid_cell, "[m] side of a cell of the occupancy grid");
   s.bind("dense.obstacle_low", &v.obstacle_low, "[m] above the floor: what is lower can be driven over");
   s.bind("dense.obstacle_high", &v.obstacle_high, "[m] what is higher can be driven under");

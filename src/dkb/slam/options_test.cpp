@@ -44,13 +44,13 @@ TEST(SlamOptions, SettingsReachTheirFields) {
   settings.set_assignment("mapping.ba.weighted=false", "--set");
   settings.set_assignment("pipeline.mapper_latency=3", "--set");
   settings.set_assignment("dynamics.motion.settle=0.75", "--set");
-  settings.set_assignment("dynamics.motion.smoothing.reach=0.3", "--set");
+  settings.set_assignment("dynamics.motion.smoothing.distance=0.3", "--set");
   EXPECT_EQ(options.features.count, 777);
   EXPECT_EQ(options.tracking.close_depth, 2.5);
   EXPECT_FALSE(options.mapping.ba.weighted);
   EXPECT_EQ(options.pipeline.mapper_latency, 3);
   EXPECT_EQ(options.dynamics.motion.settle, 0.75);
-  EXPECT_EQ(options.dynamics.motion.smoothing.reach, 0.3);
+  EXPECT_EQ(options.dynamics.motion.smoothing.distance, 0.3);
 }
 
 TEST(SlamOptions, AMisspeltSettingNamesTheNearestOne) {
@@ -71,9 +71,9 @@ TEST(SlamOptions, ValuesOutOfRangeAreRejectedWhereverTheyStand) {
   rejects([](auto& o) { o.features.count = 0; });
   rejects([](auto& o) { o.depth.edge_fraction = 0; });
   rejects([](auto& o) { o.noise.pixel_sigma = 0; });
-  rejects([](auto& o) { o.tracking.least_inliers = 0; });
+  rejects([](auto& o) { o.tracking.min_inliers = 0; });
   rejects([](auto& o) { o.baseline_keyframes.frames_between = 0; });
-  rejects([](auto& o) { o.mapping.least_observers = 0; });
+  rejects([](auto& o) { o.mapping.min_observers = 0; });
   rejects([](auto& o) { o.pipeline.mapper_latency = 0; });
   rejects([](auto& o) { o.pipeline.mapper_queue = 0; });
 }

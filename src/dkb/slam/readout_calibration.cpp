@@ -8,12 +8,12 @@
 
 namespace dkb {
 namespace {
-constexpr int kLeastMatches = 30;
+constexpr int kMinMatches = 30;
 }  // namespace
 
 void ReadoutOptions::check() const {
   require_option(step_sd > 0, "readout.step_sd", step_sd, "greater than 0 s");
-  require_option(longest > 0, "readout.longest", longest, "greater than 0 s");
+  require_option(max_readout > 0, "readout.max_readout", max_readout, "greater than 0 s");
 }
 
 ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
@@ -61,14 +61,14 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     readout_gradient += weight * late.dot(error);
     ++matches;
   }
-  if (matches < kLeastMatches) return;
+  if (matches < kMinMatches) return;
   const Eigen::LDLT<Matrix6d> factor(pose_pose);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return;
   const Vector6d explained = factor.solve(pose_readout);
   information_ += std::max(0.0, readout_readout - explained.dot(pose_readout));
   gradient_ += readout_gradient - explained.dot(pose_gradient);
   if (information_ * options_.step_sd * options_.step_sd < 1) return;
-  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, options_.longest);
+  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, options_.max_readout);
   information_ = gradient_ = 0;
 }
 

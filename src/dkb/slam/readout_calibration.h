@@ -12,9 +12,9 @@
 namespace dkb {
 
 struct ReadoutOptions {
-  bool estimate = true;    // when the camera's file does not tell the readout
-  double step_sd = 5e-4;   // [s] uncertainty of a step below which it is taken, > 0
-  double longest = 0.033;  // [s] largest readout believed in, > 0
+  bool estimate = true;        // when the camera's file does not tell the readout
+  double step_sd = 5e-4;       // [s] uncertainty of a step below which it is taken, > 0
+  double max_readout = 0.033;  // [s] largest readout believed in, > 0
   void check() const;
 };
 

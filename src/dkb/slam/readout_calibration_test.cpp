@@ -53,7 +53,7 @@ TEST(ReadoutCalibration, NeverLeavesWhatIsBelievable) {
   EXPECT_EQ(calibrated(0.06), 0.033);
   EXPECT_EQ(calibrated(-0.01), 0.0);
   ReadoutOptions options;
-  options.longest = 0;
+  options.max_readout = 0;
   EXPECT_THROW(calibrated(0.01, options), InvalidOption);
 }
 

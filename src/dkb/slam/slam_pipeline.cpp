@@ -112,7 +112,7 @@ void SlamSystem::Impl::filter_dynamic(std::shared_ptr<const RgbdImage> image) {
   suspect_.clear();
   by_mover_.clear();
   const MoverMask around =
-      spread_into_holes(scene_.mask, image_->depth, options_.dynamics.motion.smoothing.reach, camera_.fx);
+      spread_into_holes(scene_.mask, image_->depth, options_.dynamics.motion.smoothing.distance, camera_.fx);
   for (size_t i = 0; i < orb_.corners.size(); ++i) {
     feature_reports_[i] = {orb_.corners[i].x, orb_.corners[i].y,
                            scene_.dynamic[i] ? FeatureState::dynamic : FeatureState::unused};

@@ -11,7 +11,7 @@ namespace dkb::solver {
 namespace {
 
 // Below this a window is nearly full, and an ordering would not pay.
-constexpr int kSmallestOrdered = 48;
+constexpr int kMinOrdered = 48;
 
 // Lower Cholesky factor of a 6x6 block in place (column by column), with the inverses of its diagonal.
 bool factorise_block(double* a, double* pivots) {
@@ -53,7 +53,7 @@ BlockCholesky::BlockCholesky(const BlockPattern& pattern, const SolverKernels& k
 void BlockCholesky::order(const BlockPattern& pattern) {
   new_of_old_.resize(size_);
   std::iota(new_of_old_.begin(), new_of_old_.end(), 0);
-  if (size_ < kSmallestOrdered) return;
+  if (size_ < kMinOrdered) return;
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(2 * pattern.rows.size());
   for (int column = 0; column < size_; ++column) {

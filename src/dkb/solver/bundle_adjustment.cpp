@@ -157,7 +157,7 @@ class BundleAdjuster {
     system_ = camera_blocks_;
     for (int i = 0; i < layout_.free_cameras(); ++i) {
       double* block = system_.data() + kBlockSize * static_cast<size_t>(layout_.pattern.first[i]);
-      for (int k = 0; k < 6; ++k) block[7 * k] += damping * std::max(block[7 * k], kSmallestDiagonal);
+      for (int k = 0; k < 6; ++k) block[7 * k] += damping * std::max(block[7 * k], kMinDiagonal);
     }
     camera_step_ = gradient_;
     const solver::SchurInput in{layout_.points,
@@ -176,7 +176,7 @@ class BundleAdjuster {
       for (int k = 0; k < 6; ++k) {
         double& d = camera_step_[6 * i + k];
         d = -d;
-        const double diagonal = std::max(diagonal_block(i)(k, k), kSmallestDiagonal);
+        const double diagonal = std::max(diagonal_block(i)(k, k), kMinDiagonal);
         predicted += damping * diagonal * d * d - gradient_[6 * i + k] * d;
       }
     }
@@ -247,7 +247,7 @@ class BundleAdjuster {
     return present;
   }
 
-  static constexpr double kSmallestDiagonal = 1e-6;
+  static constexpr double kMinDiagonal = 1e-6;
 
   BaProblem& problem_;
   const BaOptions& options_;

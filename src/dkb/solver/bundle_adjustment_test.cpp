@@ -17,7 +17,7 @@ BaOptions to_convergence() {
   return options;
 }
 
-double largest_pose_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
+double max_pose_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
   double largest = 0;
   for (size_t c = 0; c < a.size(); ++c) {
     const Rigid3 d = a[c] * b[c].inverse();
@@ -43,7 +43,7 @@ TEST(BundleAdjustment, ReachesTheMinimumThatCeresReaches) {
     const BaResult result = bundle_adjust(ours, to_convergence());
     const CeresBa oracle = ceres_bundle_adjust(theirs, {});
     EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
-    EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-5);
+    EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-5);
   }
 }
 
@@ -54,7 +54,7 @@ TEST(BundleAdjustment, WeightsCountAsCeresScalesTheLoss) {  // DKB eq. 48, witho
   const BaResult result = bundle_adjust(ours, to_convergence());
   const CeresBa oracle = ceres_bundle_adjust(theirs, {});
   EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
-  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+  EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
 }
 
 TEST(BundleAdjustment, ManyCamerasTakeTheSparseWayToTheSameMinimum) {
@@ -63,7 +63,7 @@ TEST(BundleAdjustment, ManyCamerasTakeTheSparseWayToTheSameMinimum) {
   const BaResult result = bundle_adjust(ours, to_convergence());
   const CeresBa oracle = ceres_bundle_adjust(theirs, {.solver = ceres::SPARSE_SCHUR});
   EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
-  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+  EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
 }
 
 TEST(BundleAdjustment, RecoversTheWorldWithoutNoise) {
@@ -72,7 +72,7 @@ TEST(BundleAdjustment, RecoversTheWorldWithoutNoise) {
   const BaResult result = bundle_adjust(world.problem, to_convergence());
   EXPECT_LT(result.final_cost, 1e-8);
   EXPECT_EQ(result.outliers, 0);
-  EXPECT_LT(largest_pose_difference(world.problem.cam_from_world, world.cam_from_world), 1e-7);
+  EXPECT_LT(max_pose_difference(world.problem.cam_from_world, world.cam_from_world), 1e-7);
   for (size_t p = 0; p < world.points.size(); ++p) {
     if (!std::count_if(world.problem.observations.begin(), world.problem.observations.end(),
                        [&](const BaObservation& o) { return o.point == static_cast<int>(p) && o.depth > 0; })) {
@@ -104,7 +104,7 @@ TEST(BundleAdjustment, FindsTheOutliers) {
   EXPECT_LT(missed, 0.01 * outliers);
   EXPECT_LT(wrongly, 0.05 * (world.outlier.size() - outliers));
   EXPECT_EQ(result.outliers, std::count(result.outlier.begin(), result.outlier.end(), 1));
-  EXPECT_LT(largest_pose_difference(world.problem.cam_from_world, world.cam_from_world), 0.01);
+  EXPECT_LT(max_pose_difference(world.problem.cam_from_world, world.cam_from_world), 0.01);
 }
 
 TEST(BundleAdjustment, RemovingOutliersIsLeastSquaresOfTheRestOnceNoneAreLeft) {
@@ -116,7 +116,7 @@ TEST(BundleAdjustment, RemovingOutliersIsLeastSquaresOfTheRestOnceNoneAreLeft) {
   const BaResult result = bundle_adjust(ours, options);
   BaProblem theirs = ours;
   ceres_bundle_adjust(theirs, {.robust = false}, result.outlier);
-  EXPECT_LT(largest_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
+  EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
 }
 
 TEST(BundleAdjustment, PrefilterKeepsWhatIsBeyondTheLimitOut) {  // DKB section 3.3
@@ -145,7 +145,7 @@ TEST(BundleAdjustment, RepeatedObservationsCountTwice) {
   options.chi2_pixel = options.chi2_depth = 1e9;  // least squares
   const BaResult a = bundle_adjust(twice, options), b = bundle_adjust(doubled, options);
   EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * b.final_cost);
-  EXPECT_LT(largest_pose_difference(twice.cam_from_world, doubled.cam_from_world), 1e-8);
+  EXPECT_LT(max_pose_difference(twice.cam_from_world, doubled.cam_from_world), 1e-8);
 }
 
 TEST(BundleAdjustment, APointOnOneRayMovesOnlyAcrossIt) {
@@ -176,7 +176,7 @@ TEST(BundleAdjustment, ObservationsBehindTheirCameraAreOutliersAndDoNoHarm) {
   BaProblem without = world.problem;
   const BaResult a = bundle_adjust(with), b = bundle_adjust(without);
   expect_finite(with, a);
-  EXPECT_LT(largest_pose_difference(with.cam_from_world, without.cam_from_world), 1e-9);
+  EXPECT_LT(max_pose_difference(with.cam_from_world, without.cam_from_world), 1e-9);
   EXPECT_NEAR(a.final_cost, b.final_cost, 1e-9 * b.final_cost);
   for (size_t i = world.problem.observations.size(); i < with.observations.size(); ++i) EXPECT_TRUE(a.outlier[i]);
 }

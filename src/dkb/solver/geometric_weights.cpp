@@ -13,8 +13,8 @@ namespace dkb {
 namespace {
 
 // Three centres are always in a plane.
-constexpr int kFewestObservers = 4;
-constexpr double kSmallestTheta = 1e-8;  // [m^2]
+constexpr int kMinObservers = 4;
+constexpr double kMinTheta = 1e-8;  // [m^2]
 
 double smallest_eigenvalue(std::span<const Eigen::Vector3d> centres, std::span<const int> observers) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -109,14 +109,14 @@ GeometricWeights classify_points(std::span<const Eigen::Vector3d> centres_in_wor
   if (points == 0) return weights;
   for (size_t p = 0; p < points; ++p) {
     const auto own = observers.subspan(first[p], first[p + 1] - first[p]);
-    if (own.size() >= kFewestObservers) weights.lambda3[p] = smallest_eigenvalue(centres_in_world, own);
+    if (own.size() >= kMinObservers) weights.lambda3[p] = smallest_eigenvalue(centres_in_world, own);
   }
   const double n = static_cast<double>(points);
   const double mean = std::accumulate(weights.lambda3.begin(), weights.lambda3.end(), 0.0) / n;
   double variance = 0;
   for (const double lambda : weights.lambda3) variance += (lambda - mean) * (lambda - mean) / n;
   weights.theta_planar = mean + std::sqrt(variance);
-  if (weights.theta_planar < kSmallestTheta) return weights;
+  if (weights.theta_planar < kMinTheta) return weights;
   for (size_t p = 0; p < points; ++p) {
     if (weights.lambda3[p] <= weights.theta_planar) continue;
     weights.shape[p] = PointShape::edge;

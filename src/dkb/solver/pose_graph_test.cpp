@@ -56,7 +56,7 @@ struct Circle {
   }
 };
 
-double largest_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
+double max_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
   double largest = 0;
   for (size_t k = 0; k < a.size(); ++k) {
     const Rigid3 d = a[k] * b[k].inverse();
@@ -125,7 +125,7 @@ TEST(PoseGraph, ClosesTheLoopExactlyWithoutNoise) {
   Circle circle(100, 0, 1);
   const PoseGraphResult result = optimise_pose_graph(circle.graph);
   EXPECT_LT(result.final_cost, 1e-6 * result.initial_cost);
-  EXPECT_LT(largest_difference(circle.graph.cam_from_world, circle.truth), 1e-5);
+  EXPECT_LT(max_difference(circle.graph.cam_from_world, circle.truth), 1e-5);
 }
 
 TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
@@ -144,7 +144,7 @@ TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
     const PoseGraphResult result = optimise_pose_graph(circle.graph, options);
     const double cost = ceres_pose_graph(theirs, options.huber_chi2);
     EXPECT_NEAR(result.final_cost, cost, 1e-6 * cost) << robust;
-    EXPECT_LT(largest_difference(circle.graph.cam_from_world, theirs.cam_from_world), 1e-4) << robust;
+    EXPECT_LT(max_difference(circle.graph.cam_from_world, theirs.cam_from_world), 1e-4) << robust;
   }
 }
 
@@ -160,8 +160,8 @@ TEST(PoseGraph, AWrongRobustEdgeBendsLittle) {
   options.iterations = 100;
   optimise_pose_graph(plain, options);
   optimise_pose_graph(robust, options);
-  EXPECT_LT(largest_difference(robust.cam_from_world, circle.truth),
-            0.2 * largest_difference(plain.cam_from_world, circle.truth));
+  EXPECT_LT(max_difference(robust.cam_from_world, circle.truth),
+            0.2 * max_difference(plain.cam_from_world, circle.truth));
 }
 
 TEST(PoseGraph, DegenerateGraphsStayFinite) {

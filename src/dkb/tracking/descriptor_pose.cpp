@@ -8,7 +8,7 @@ namespace dkb {
 
 std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoint>& known,
                                                   const RgbdFeatures& features, const CameraModel& camera,
-                                                  const SensorNoise& noise, double scale_factor, int least_matches,
+                                                  const SensorNoise& noise, double scale_factor, int min_matches,
                                                   const RansacOptions& ransac) {
   std::vector<Descriptor> descriptors;
   descriptors.reserve(known.size());
@@ -16,7 +16,7 @@ std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoi
   std::vector<DescriptorMatch> matches = match_brute_force(descriptors, features.descriptors);
   std::erase_if(matches,
                 [&](const DescriptorMatch& m) { return features.keypoints[static_cast<size_t>(m.b)].suspect; });
-  if (static_cast<int>(matches.size()) < least_matches) return std::nullopt;
+  if (static_cast<int>(matches.size()) < min_matches) return std::nullopt;
   std::vector<PoseObservation> observations;
   observations.reserve(matches.size());
   for (const DescriptorMatch& m : matches)

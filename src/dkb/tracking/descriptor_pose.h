@@ -29,10 +29,10 @@ struct DescriptorPose {
 
 // Pose of the camera that sees `features`, without any idea of where it is: `known` points, each id once, are matched
 // by descriptor alone, and RANSAC seeks the pose that most matches agree on. Features that may lie on movers take no
-// part. Nothing with fewer than `least_matches` matches or where RANSAC finds no pose. Deterministic for a seed.
+// part. Nothing with fewer than `min_matches` matches or where RANSAC finds no pose. Deterministic for a seed.
 std::optional<DescriptorPose> pose_by_descriptors(const std::vector<DescribedPoint>& known,
                                                   const RgbdFeatures& features, const CameraModel& camera,
-                                                  const SensorNoise& noise, double scale_factor, int least_matches,
+                                                  const SensorNoise& noise, double scale_factor, int min_matches,
                                                   const RansacOptions& ransac);
 
 }  // namespace dkb

@@ -14,8 +14,8 @@ class DescriptorPoseTest : public ::testing::Test {
     for (size_t i = 0; i < scene.points.size(); ++i)
       known.push_back({make_point_id(3, static_cast<int>(i)), scene.points[i], scene.descriptors[i]});
   }
-  std::optional<DescriptorPose> find(const RgbdFeatures& features, int least_matches = 20) const {
-    return pose_by_descriptors(known, features, scene.camera, {}, TestScene::kScaleFactor, least_matches, {});
+  std::optional<DescriptorPose> find(const RgbdFeatures& features, int min_matches = 20) const {
+    return pose_by_descriptors(known, features, scene.camera, {}, TestScene::kScaleFactor, min_matches, {});
   }
 
   TestScene scene{300};
@@ -28,7 +28,7 @@ TEST_F(DescriptorPoseTest, NamesThePointThatEachFeatureShows) {
   const auto found = find(*view.features);
   ASSERT_TRUE(found);
   EXPECT_LT(distance_between(found->cam_from_world, truth), 0.02);
-  EXPECT_LT(turn_between(found->cam_from_world, truth), 0.5);
+  EXPECT_LT(rotation_between(found->cam_from_world, truth), 0.5);
   ASSERT_EQ(found->points.size(), view.features->size());
   int shown = 0;
   for (size_t f = 0; f < found->points.size(); ++f) {

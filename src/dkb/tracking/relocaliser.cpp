@@ -23,19 +23,20 @@ bool same_place(const Rigid3& a, const Rigid3& b) {
 void RelocalisationOptions::check() const {
   require_option(candidates >= 1, "candidates", candidates, "at least 1");
   require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
-  require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
-  require_option(least_agreeing >= 6, "least_agreeing", least_agreeing, "at least 6");
+  require_option(min_matches >= 6, "min_matches", min_matches, "at least 6");
+  require_option(min_ransac_inliers >= 6, "min_ransac_inliers", min_ransac_inliers, "at least 6");
   require_option(radius > 0, "radius", radius, "greater than 0 px");
   require_option(radius_fine > 0, "radius_fine", radius_fine, "greater than 0 px");
-  require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
-  require_option(least_share >= 0 && least_share <= 1, "least_share", least_share, "0 ... 1");
-  require_option(least_alike >= 0 && least_alike <= 1, "least_alike", least_alike, "0 ... 1");
-  require_option(largest_position_sd > 0, "largest_position_sd", largest_position_sd, "greater than 0 m");
-  require_option(least_alike_far >= 0 && least_alike_far <= 1, "least_alike_far", least_alike_far, "0 ... 1");
+  require_option(min_inliers >= 6, "min_inliers", min_inliers, "at least 6");
+  require_option(min_share >= 0 && min_share <= 1, "min_share", min_share, "0 ... 1");
+  require_option(min_similarity >= 0 && min_similarity <= 1, "min_similarity", min_similarity, "0 ... 1");
+  require_option(max_position_sd > 0, "max_position_sd", max_position_sd, "greater than 0 m");
+  require_option(min_similarity_far >= 0 && min_similarity_far <= 1, "min_similarity_far", min_similarity_far,
+                 "0 ... 1");
   require_option(ambiguity >= 0 && ambiguity <= 1, "ambiguity", ambiguity, "0 ... 1");
   require_option(clear_lead >= 0 && clear_lead <= 1, "clear_lead", clear_lead, "0 ... 1");
-  require_option(reach >= 0, "reach", reach, "at least 0 m");
-  require_option(reach_per_second >= 0, "reach_per_second", reach_per_second, "at least 0 m/s");
+  require_option(max_distance >= 0, "max_distance", max_distance, "at least 0 m");
+  require_option(max_speed >= 0, "max_speed", max_speed, "at least 0 m/s");
 }
 
 Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
@@ -56,14 +57,14 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const RgbdFeatures
   int most = 0;
   for (const PoseProposal& p : proposals) most = std::max(most, p.inliers);
   std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < options_.ambiguity * most; });
-  // Of look-alike places the true one differs least from what is seen.
-  const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.alike_share() > b.alike_share(); };
+  // Of similar places the true one differs least from what is seen.
+  const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.similarity() > b.similarity(); };
   std::stable_sort(proposals.begin(), proposals.end(), better);
   if (proposals.empty() || !proposals.front().verified) return std::nullopt;
   PoseProposal& best = proposals.front();
   for (const PoseProposal& other : proposals)
     if (!same_place(other.cam_from_world, best.cam_from_world) &&
-        other.alike_share() > best.alike_share() - options_.clear_lead)
+        other.similarity() > best.similarity() - options_.clear_lead)
       return std::nullopt;
   return std::move(best);
 }
@@ -82,7 +83,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const RgbdFeature
       const auto shared = std::count_if(p.points.begin(), p.points.end(), [&](PointId id) {
         return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
       });
-      return shared >= options_.least_matches;
+      return shared >= options_.min_matches;
     });
     if (explained) continue;
     if (auto proposal = propose_from(map, like.id, features, ignores, looks_the_same))
@@ -99,11 +100,11 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
   if (!coarse) return std::nullopt;
   proposal.cam_from_world = *coarse;
-  std::vector<Candidate> around = local_map_candidates(proposal.points, map, local_map_);
-  std::erase_if(around, [&](const Candidate& c) { return ignores(c.id); });
-  if (!search(around, options_.radius, features, proposal)) return std::nullopt;
-  if (!search(around, options_.radius_fine, features, proposal)) return std::nullopt;
-  verify(map, around, features, looks_the_same, proposal);
+  std::vector<Candidate> nearby = local_map_candidates(proposal.points, map, local_map_);
+  std::erase_if(nearby, [&](const Candidate& c) { return ignores(c.id); });
+  if (!search(nearby, options_.radius, features, proposal)) return std::nullopt;
+  if (!search(nearby, options_.radius_fine, features, proposal)) return std::nullopt;
+  verify(map, nearby, features, looks_the_same, proposal);
   return proposal;
 }
 
@@ -128,55 +129,55 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
 
   RansacOptions ransac;
   ransac.seed = seed_ + static_cast<uint64_t>(id);
-  ransac.min_inliers = options_.least_agreeing;
-  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.least_matches, ransac);
+  ransac.min_inliers = options_.min_ransac_inliers;
+  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.min_matches, ransac);
   if (!found) return std::nullopt;
   points = std::move(found->points);
   return found->cam_from_world;
 }
 
-// Matches the map around anew under the proposal's pose and refines it.
-bool Relocaliser::search(const std::vector<Candidate>& around, double radius, const RgbdFeatures& features,
+// Matches the points nearby anew under the proposal's pose and refines it.
+bool Relocaliser::search(const std::vector<Candidate>& nearby, double radius, const RgbdFeatures& features,
                          PoseProposal& proposal) const {
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
-  const auto matches = match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
+  const auto matches = match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
                                            match, nullptr, nullptr);
   std::vector<PoseObservation> observations;
   for (const ProjectionMatch& m : matches)
     observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
-                                            around[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
+                                            nearby[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
   const PoseEstimate pose = optimise_pose(camera_, proposal.cam_from_world, observations);
-  if (!pose.ok || pose.inliers < options_.least_agreeing) return false;
+  if (!pose.ok || pose.inliers < options_.min_ransac_inliers) return false;
   proposal.cam_from_world = pose.cam_from_world;
   proposal.inliers = pose.inliers;
   proposal.position_sd = std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
   proposal.points.assign(features.size(), kNoPoint);
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
-      proposal.points[static_cast<size_t>(matches[i].feature)] = around[static_cast<size_t>(matches[i].candidate)].id;
+      proposal.points[static_cast<size_t>(matches[i].feature)] = nearby[static_cast<size_t>(matches[i].candidate)].id;
   return true;
 }
 
-// What the map would have in view from there must be found, or at least look as it did. In a room that only looks alike
+// What the map would have in view from there must be found, or at least look as it did. In a room that is only similar
 // most things do, but some are others, and those are told by the points that no feature was matched with.
-void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const RgbdFeatures& features,
+void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, const RgbdFeatures& features,
                          const LooksTheSame& looks_the_same, PoseProposal& proposal) const {
   std::vector<PointId> matched;
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());
-  std::vector<uint8_t> visible(around.size(), 0);
-  match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
+  std::vector<uint8_t> visible(nearby.size(), 0);
+  match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
                       &visible);
   const Eigen::Vector3d centre = centre_in_world(proposal.cam_from_world);
-  for (size_t i = 0; i < around.size(); ++i) {
-    const Candidate& c = around[i];
+  for (size_t i = 0; i < nearby.size(); ++i) {
+    const Candidate& c = nearby[i];
     if (!visible[i] || map.point(c.id)->observations.size() < kWellKnownObservers) continue;
     ++proposal.well_known;
     if (std::binary_search(matched.begin(), matched.end(), c.id)) {
       ++proposal.found;
-      ++proposal.alike;
+      ++proposal.similar;
       continue;
     }
     if (!looks_the_same) continue;
@@ -186,11 +187,11 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, c
         std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(scale_factor_))), 0, levels_ - 1);
     const auto same = looks_the_same(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
     if (!same) continue;
-    ++(*same ? proposal.alike : proposal.changed);
+    ++(*same ? proposal.similar : proposal.changed);
   }
   proposal.verified =
-      proposal.inliers >= options_.least_inliers && proposal.found >= options_.least_share * proposal.well_known &&
-      proposal.alike_share() >= options_.least_alike && proposal.position_sd <= options_.largest_position_sd;
+      proposal.inliers >= options_.min_inliers && proposal.found >= options_.min_share * proposal.well_known &&
+      proposal.similarity() >= options_.min_similarity && proposal.position_sd <= options_.max_position_sd;
 }
 
 }  // namespace dkb

@@ -66,7 +66,7 @@ TEST_F(RelocaliserTest, FindsTheCameraWithoutAnyIdeaOfItsPlace) {
     ASSERT_TRUE(found) << n;
     EXPECT_TRUE(found->verified);
     EXPECT_LT(distance_between(found->cam_from_world, truth), 0.015);
-    EXPECT_LT(turn_between(found->cam_from_world, truth), 0.3);
+    EXPECT_LT(rotation_between(found->cam_from_world, truth), 0.3);
     EXPECT_GT(found->found, 0.5 * found->well_known);
   }
 }
@@ -126,11 +126,11 @@ TEST_F(RelocaliserTest, APlaceThatLooksDifferentWhereNothingMatchedIsNotVerified
   };
   const auto same = relocaliser().find(map, features, ignores_none, always(true));
   ASSERT_TRUE(same);
-  EXPECT_EQ(same->alike_share(), 1);
+  EXPECT_EQ(same->similarity(), 1);
   EXPECT_FALSE(relocaliser().find(map, features, ignores_none, always(false)));
   const auto other = relocaliser().propose(map, features, ignores_none, always(false));
   ASSERT_FALSE(other.empty());
-  EXPECT_NEAR(other[0].alike_share(), 0.5, 0.1);
+  EXPECT_NEAR(other[0].similarity(), 0.5, 0.1);
   const auto unknown = [](const Eigen::Vector2d&, double, int, const Descriptor&) -> std::optional<bool> { return {}; };
   EXPECT_TRUE(relocaliser().find(map, features, ignores_none, unknown));
 }

@@ -19,10 +19,10 @@ constexpr double kGuessFactor = 2.0;         // on the noise of points at a gues
 
 void TrackingOptions::check() const {
   require_option(initial_points >= 10, "initial_points", initial_points, "at least 10");
-  require_option(least_matches >= 6, "least_matches", least_matches, "at least 6");
-  require_option(least_inliers >= 6, "least_inliers", least_inliers, "at least 6");
+  require_option(min_matches >= 6, "min_matches", min_matches, "at least 6");
+  require_option(min_inliers >= 6, "min_inliers", min_inliers, "at least 6");
   require_option(close_depth > 0, "close_depth", close_depth, "greater than 0 m");
-  require_option(least_new_points >= 0, "least_new_points", least_new_points, "at least 0");
+  require_option(min_new_points >= 0, "min_new_points", min_new_points, "at least 0");
   require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
   require_option(radius_wide > 0, "radius_wide", radius_wide, "greater than 0 px");
   require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
@@ -91,7 +91,7 @@ Rigid3 Tracker::take_view(MapView view) {
   std::erase_if(retracted_, [&](PointId id) {
     return view_->keyframe(birth_keyframe(id)) != nullptr && view_->point(id) == nullptr;
   });
-  if (sighting_) express_anew(*sighting_);
+  if (unconfirmed_) express_anew(*unconfirmed_);
   if (!last_) return {};
   return express_anew(*last_);
 }
@@ -193,7 +193,7 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.outlier.resize(frame.source.size());
 }
 
-bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
+bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                               TrackedFrame& frame) {
   refresh_candidates(points, frame.index);
   const RgbdFeatures& features = *frame.features;
@@ -247,11 +247,11 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
   const PoseEstimate pose = refine(initial, pairs, features);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
-  if (inliers < least_inliers) return false;
+  if (inliers < min_inliers) return false;
 
   for (size_t i = 0; i < candidates.size(); ++i)
-    if (visible[i]) ++sightings_[candidates[i].id].visible;
-  for (PointId id : matched) ++sightings_[id].visible;
+    if (visible[i]) ++visibility_[candidates[i].id].visible;
+  for (PointId id : matched) ++visibility_[id].visible;
   // A guessed depth is let pass more; not where a mover may be.
   const auto strays = [&](const Pair& pair) {
     const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
@@ -269,7 +269,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int least_in
       frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
-      ++sightings_[points[f]].found;
+      ++visibility_[points[f]].found;
     } else if (strays(pairs[i])) {
       frame.outlier[f] = 1;
     } else {
@@ -324,7 +324,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features);
   if (!pose.ok) return;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
-  if (inliers < options_.least_inliers) return;
+  if (inliers < options_.min_inliers) return;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -338,31 +338,32 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FeaturesAt& fea
   frame.covariance = pose.covariance;
 }
 
-// Rooms that look alike are told apart by where the camera can have come to.
-bool Tracker::within_reach(const PoseProposal& found, double timestamp) const {
+// Similar rooms are told apart by how far the camera can have moved since it was lost.
+bool Tracker::within_travel_distance(const PoseProposal& found, double timestamp) const {
   if (!last_) return true;
   if (root(last_->reference) != root(found.keyframe)) return false;
   const RelocalisationOptions& o = options_.relocalisation;
-  const double way = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
-  return way <= o.reach + o.reach_per_second * (timestamp - last_->timestamp);
+  const double distance = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
+  return distance <= o.max_distance + o.max_speed * (timestamp - last_->timestamp);
 }
 
 bool Tracker::relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same) {
   auto found = relocaliser_.find(
       *view_, *frame.features, [this](PointId id) { return is_retracted(id); }, looks_the_same);
   if (!found) return false;
-  if (!within_reach(*found, frame.timestamp) && found->alike_share() < options_.relocalisation.least_alike_far)
+  if (!within_travel_distance(*found, frame.timestamp) &&
+      found->similarity() < options_.relocalisation.min_similarity_far)
     return false;
   candidates_made_ = -1;
-  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.least_inliers,
+  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.min_inliers,
                          found->points, frame);
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
 // rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
-bool Tracker::confirm_sighting(TrackedFrame& frame) {
-  if (!sighting_) return false;
-  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(sighting_, std::nullopt));
+bool Tracker::confirm_relocalisation(TrackedFrame& frame) {
+  if (!unconfirmed_) return false;
+  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_ = -1;
   if (last_->index + 1 == frame.index && track_from_last(frame)) return true;
@@ -400,15 +401,15 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
 
   const bool has_map = state_ != TrackingState::initialising;
   bool followed = has_map && track_from_last(frame);
-  bool found_again = has_map && !followed && confirm_sighting(frame);
+  bool found_again = has_map && !followed && confirm_relocalisation(frame);
   if (has_map && !followed && !found_again && relocalise(frame, looks_the_same)) {
-    // At once where it is but a step from the frame before; else when the next frame agrees.
-    followed = is_step_from_last(frame);
+    // At once where the motion from the frame before is plausible; else when the next frame agrees.
+    followed = moved_plausibly_from_last(frame);
     found_again = followed;
     if (!followed) {
       finish(frame);
-      sighting_ = frame;
-      odometry_.clear();  // they belong to the last frame, which the sighting will replace
+      unconfirmed_ = frame;
+      odometry_.clear();  // they belong to the last frame, which this one replaces once confirmed
       outcome.state = state_ = TrackingState::lost;
       velocity_.reset();
       return outcome;
@@ -428,7 +429,7 @@ TrackOutcome Tracker::track(FrameIndex index, double timestamp, const FeaturesAt
     return outcome;
   }
   lost_frames_ = 0;
-  sighting_.reset();
+  unconfirmed_.reset();
   if (!last_ || timestamp <= last_->timestamp) {
     velocity_.reset();
   } else {

@@ -22,10 +22,10 @@ namespace dkb {
 
 struct TrackingOptions {
   int initial_points = 100;            // features with depth that the first frame of a map needs, >= 10
-  int least_matches = 20;              // matches with the last frame that make a pose worth trying, >= 6
-  int least_inliers = 20;              // inliers of the final pose; fewer: lost, >= 6
+  int min_matches = 20;                // matches with the last frame that make a pose worth trying, >= 6
+  int min_inliers = 20;                // inliers of the final pose; fewer: lost, >= 6
   double close_depth = 6.0;            // [m] depths below make map points at once, > 0
-  int least_new_points = 100;          // nearest depths that make points at a keyframe whatever close_depth says, >= 0
+  int min_new_points = 100;            // nearest depths that make points at a keyframe whatever close_depth says, >= 0
   double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
   double radius_wide = 30.0;           // [px] second try, > 0
   double radius_local_map = 4.0;       // [px] search for local map points under the first pose, > 0
@@ -71,8 +71,8 @@ class Tracker {
   // `features_at` makes the frame's features for a velocity of the camera [m/s, rad/s] (see make_rgbd_features): once
   // for the expected velocity, and again for the one that the first pose shows.
   using FeaturesAt = std::function<std::shared_ptr<const RgbdFeatures>(const Vector6d& velocity)>;
-  // With `may_start_map` false a frame that finds no map stays without a pose. `looks_the_same` helps to tell places
-  // that look alike apart when a lost camera is sought; it may be empty.
+  // With `may_start_map` false a frame that finds no map stays without a pose. `looks_the_same` helps to tell similar
+  // places apart when a lost camera is sought; it may be empty.
   TrackOutcome track(FrameIndex index, double timestamp, const FeaturesAt& features_at, bool may_start_map = true,
                      const LooksTheSame& looks_the_same = {});
 
@@ -113,14 +113,14 @@ class Tracker {
                                          std::vector<PointId>& points) const;
   std::optional<Rigid3> match_last_frame(const RgbdFeatures& features, std::vector<PointId>& points) const;
   bool track_from_last(TrackedFrame& frame);
-  bool is_step(const Rigid3& cam_from_world) const;
+  bool plausible_motion(const Rigid3& cam_from_world) const;
   bool relocalise(TrackedFrame& frame, const LooksTheSame& looks_the_same);
-  bool is_step_from_last(const TrackedFrame& frame) const;
-  bool confirm_sighting(TrackedFrame& frame);
+  bool moved_plausibly_from_last(const TrackedFrame& frame) const;
+  bool confirm_relocalisation(TrackedFrame& frame);
   Rigid3 express_anew(TrackedFrame& frame) const;
-  bool within_reach(const PoseProposal& found, double timestamp) const;
+  bool within_travel_distance(const PoseProposal& found, double timestamp) const;
   bool start_map(TrackedFrame& frame);
-  bool track_local_map(const Rigid3& initial, double radius, int least_inliers, std::vector<PointId>& points,
+  bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                        TrackedFrame& frame);
   bool is_retracted(PointId id) const;
   void take_reports(KeyframePacket& packet);
@@ -147,18 +147,18 @@ class Tracker {
   };
   std::vector<PendingKeyframe> pending_;  // keyframes not in the view yet, by id
   std::map<PointId, ProvisionalPoint> provisional_;
-  std::map<PointId, PointSighting> sightings_;
+  std::map<PointId, PointVisibility> visibility_;
   std::vector<PointId> retracted_;   // increasing; until the view has dropped them
   std::vector<PointId> unreported_;  // of these, what mapping was not told yet
 
   TrackingState state_ = TrackingState::initialising;
-  std::optional<TrackedFrame> last_;      // last frame with a pose
-  OdometryPoints odometry_;               // from the last frame
-  std::optional<TrackedFrame> sighting_;  // where the frame before was found again, to be confirmed
-  std::optional<Vector6d> velocity_;      // [m/s, rad/s] tangent of now_cam_from_before_cam
-  int lost_frames_ = 0;                   // in a row that could have started a map
-  std::vector<Candidate> candidates_;     // from the view
-  FrameIndex candidates_made_ = -1;       // frame of the last refresh; -1 = the view is newer
+  std::optional<TrackedFrame> last_;         // last frame with a pose
+  OdometryPoints odometry_;                  // from the last frame
+  std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
+  std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
+  int lost_frames_ = 0;                      // in a row that could have started a map
+  std::vector<Candidate> candidates_;        // from the view
+  FrameIndex candidates_made_ = -1;          // frame of the last refresh; -1 = the view is newer
 };
 
 }  // namespace dkb

@@ -169,7 +169,7 @@ TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
   for (PointId p : o.frame.points) EXPECT_TRUE(p != dropped && p != fused);
 }
 
-TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
+TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
   publish(start());
   const int hidden = scene_point(map.live_points()[3]);
   TrackOutcome o;
@@ -177,11 +177,11 @@ TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
     o = track({}, {.hidden = hidden});
   }
   const KeyframePacket packet = insert(o.frame);
-  ASSERT_GT(packet.sightings.size(), 100U);
-  for (size_t i = 0; i < packet.sightings.size(); ++i) {
-    const PointSighting& s = packet.sightings[i];
+  ASSERT_GT(packet.visibility.size(), 100U);
+  for (size_t i = 0; i < packet.visibility.size(); ++i) {
+    const PointVisibility& s = packet.visibility[i];
     if (i > 0) {
-      EXPECT_LT(packet.sightings[i - 1].point, s.point);
+      EXPECT_LT(packet.visibility[i - 1].point, s.point);
     }
     EXPECT_LE(s.found, s.visible);
     if (scene_point(s.point) == hidden) {
@@ -191,7 +191,7 @@ TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
       EXPECT_EQ(s.found, 10);
     }
   }
-  EXPECT_TRUE(insert(track({}).frame).sightings.size() < 2 * packet.sightings.size());
+  EXPECT_TRUE(insert(track({}).frame).visibility.size() < 2 * packet.visibility.size());
 }
 
 TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {

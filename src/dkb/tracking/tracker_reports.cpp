@@ -9,11 +9,11 @@
 namespace dkb {
 
 void Tracker::take_reports(KeyframePacket& packet) {
-  for (auto& [point, sighting] : sightings_) {
-    sighting.point = point;
-    packet.sightings.push_back(sighting);
+  for (auto& [point, visibility] : visibility_) {
+    visibility.point = point;
+    packet.visibility.push_back(visibility);
   }
-  sightings_.clear();
+  visibility_.clear();
   packet.retracted = std::exchange(unreported_, {});
 }
 
@@ -71,7 +71,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   }
   std::sort(by_depth.begin(), by_depth.end());
   for (const auto& [z, f] : by_depth) {
-    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.least_new_points) break;
+    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.min_new_points) break;
     const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
     ProvisionalPoint p;
     p.id = make_point_id(id, f);

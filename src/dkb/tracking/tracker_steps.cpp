@@ -9,8 +9,8 @@ namespace dkb {
 namespace {
 
 // What the camera may do from one frame to the next; beyond it is taken as lost and sought.
-constexpr double kLongestStep = 0.5;  // [m]
-constexpr double kLargestTurn = 0.5;  // [rad]
+constexpr double kMaxTranslation = 0.5;  // [m]
+constexpr double kMaxRotation = 0.5;     // [rad]
 
 }  // namespace
 
@@ -34,11 +34,11 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   match.ratio = 0.9f;
   const auto matches =
       match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
-  if (static_cast<int>(matches.size()) < options_.least_matches) return std::nullopt;
+  if (static_cast<int>(matches.size()) < options_.min_matches) return std::nullopt;
   std::vector<Pair> pairs;
   for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
   const PoseEstimate pose = refine(predicted, pairs, features);
-  if (!pose.ok || pose.inliers < options_.least_matches / 2) return std::nullopt;
+  if (!pose.ok || pose.inliers < options_.min_matches / 2) return std::nullopt;
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
       points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
@@ -56,8 +56,8 @@ std::optional<Rigid3> Tracker::match_last_frame(const RgbdFeatures& features, st
   }
   RansacOptions ransac;
   ransac.seed = seed_;
-  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.least_matches, ransac);
-  if (!found || found->inliers < options_.least_matches || !is_step(found->cam_from_world)) return std::nullopt;
+  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.min_matches, ransac);
+  if (!found || found->inliers < options_.min_matches || !plausible_motion(found->cam_from_world)) return std::nullopt;
   points = std::move(found->points);
   return found->cam_from_world;
 }
@@ -76,20 +76,21 @@ bool Tracker::track_from_last(TrackedFrame& frame) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(*view_, last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); }, {});
-    if (!near || !is_step(near->cam_from_world)) return false;
+    if (!near || !plausible_motion(near->cam_from_world)) return false;
     pose = near->cam_from_world;
     points = std::move(near->points);
   }
-  return pose && track_local_map(*pose, options_.radius_local_map, options_.least_inliers, points, frame);
+  return pose && track_local_map(*pose, options_.radius_local_map, options_.min_inliers, points, frame);
 }
 
-bool Tracker::is_step(const Rigid3& cam_from_world) const {
-  const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
-  return step.translation.norm() <= kLongestStep && vector_from_rotation(step.rotation).norm() <= kLargestTurn;
+bool Tracker::plausible_motion(const Rigid3& cam_from_world) const {
+  const Rigid3 motion = cam_from_world * last_->cam_from_world.inverse();
+  return motion.translation.norm() <= kMaxTranslation && vector_from_rotation(motion.rotation).norm() <= kMaxRotation;
 }
 
-bool Tracker::is_step_from_last(const TrackedFrame& frame) const {
-  return last_ && last_->index + 1 == frame.index && state_ != TrackingState::lost && is_step(frame.cam_from_world);
+bool Tracker::moved_plausibly_from_last(const TrackedFrame& frame) const {
+  return last_ && last_->index + 1 == frame.index && state_ != TrackingState::lost &&
+         plausible_motion(frame.cam_from_world);
 }
 
 }  // namespace dkb

@@ -26,7 +26,7 @@ TEST_F(TrackerTest, FollowsASteadyMotionThroughNoiseAndOutliers) {
     ASSERT_EQ(o.state, TrackingState::tracking) << "frame " << f;
     EXPECT_GT(o.frame.inliers, 50);
     EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 0.015) << "frame " << f;
-    EXPECT_LT(turn_between(o.frame.cam_from_world, on_path(f)), 0.3) << "frame " << f;
+    EXPECT_LT(rotation_between(o.frame.cam_from_world, on_path(f)), 0.3) << "frame " << f;
     int inliers = 0;
     for (size_t i = 0; i < o.frame.points.size(); ++i) {
       if (o.frame.points[i] == kNoPoint) continue;
@@ -43,7 +43,7 @@ TEST_F(TrackerTest, ExactViewsGiveExactPoses) {
   for (int f = 1; f <= 5; ++f) {
     const TrackOutcome o = track(on_path(f));
     EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-5);
-    EXPECT_LT(turn_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+    EXPECT_LT(rotation_between(o.frame.cam_from_world, on_path(f)), 1e-3);
   }
 }
 
@@ -66,7 +66,7 @@ TEST_F(TrackerTest, FollowsACameraThatTurnsFastFromTheVeryFirstFrame) {
     const TrackOutcome o = track(truth, kNoisy);
     ASSERT_EQ(o.state, TrackingState::tracking) << f;
     EXPECT_LT(distance_between(o.frame.cam_from_world, truth), 0.02) << f;
-    EXPECT_LT(turn_between(o.frame.cam_from_world, truth), 0.4) << f;
+    EXPECT_LT(rotation_between(o.frame.cam_from_world, truth), 0.4) << f;
   }
 }
 
@@ -260,7 +260,7 @@ TEST(TrackingOptions, AreChecked) {
     EXPECT_THROW(options.check(), InvalidOption);
   };
   rejects([](auto& o) { o.initial_points = 9; });
-  rejects([](auto& o) { o.least_matches = 5; });
+  rejects([](auto& o) { o.min_matches = 5; });
   rejects([](auto& o) { o.close_depth = 0; });
   rejects([](auto& o) { o.radius_local_map = -1; });
   rejects([](auto& o) { o.match_distance = 257; });
@@ -268,7 +268,7 @@ TEST(TrackingOptions, AreChecked) {
   rejects([](auto& o) { o.local_map.keyframes = 0; });
   rejects([](auto& o) { o.new_map_after = -1; });
   rejects([](auto& o) { o.relocalisation.candidates = 0; });
-  rejects([](auto& o) { o.relocalisation.least_share = 1.1; });
+  rejects([](auto& o) { o.relocalisation.min_share = 1.1; });
   EXPECT_NO_THROW(TrackingOptions().check());
 }
 
