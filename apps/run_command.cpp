@@ -6,8 +6,8 @@
 
 #include <atomic>
 #include <csignal>
-#include <cstdlib>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -176,7 +176,8 @@ int run(const RunArguments& args) {
     }
     facts.stamps.push_back(next.stamp);
     const FrameResult result = slam.process(next.frame);
-    for (const Mover& mover : result.movers) facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+    for (const Mover& mover : result.movers)
+      facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
     for (const Event& event : slam.take_events())
       if (event.kind == Event::Kind::warning)
         warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);

@@ -43,8 +43,8 @@ std::vector<Trajectory> with_stamps(const std::vector<TrajectoryFrame>& frames,
     const auto map = static_cast<size_t>(f.map);
     if (by_map.size() <= map) by_map.resize(map + 1);
     // Keyframes of a loaded map are of no frame of this run.
-    by_map[map].push_back({seconds_from_ns(f.stamp_ns), f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "",
-                            f.world_from_cam});
+    by_map[map].push_back(
+        {seconds_from_ns(f.stamp_ns), f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "", f.world_from_cam});
   }
   const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; };
   for (Trajectory& t : by_map) std::stable_sort(t.begin(), t.end(), earlier);

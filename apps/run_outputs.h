@@ -30,7 +30,8 @@ double seconds_since_process_start();
 // Writes every result of the contract into `folder`, each file atomically. Throws OutputError.
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
 
-// dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws OutputError.
+// dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws
+// OutputError.
 std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds);
 
 }  // namespace dkb

@@ -55,11 +55,11 @@ class Reference {
     truth_ = read_trajectory(folder / "groundtruth.txt");
     const Evaluation evaluation = evaluate(truth_, run);
     map_from_truth_ = evaluation.truth_from_estimate.motion.inverse();
-    // The tracked body need not be the camera: what turns it is the mean over the run.
-    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    // The tracked body need not be the camera: the rotation between them is the mean over the run.
+    Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < evaluation.truth.size(); ++i)
-      turn += vector_from_rotation(evaluation.truth[i].rotation.conjugate() * evaluation.estimate[i].rotation);
-    body_from_cam_.rotation = rotation_from_vector(turn / static_cast<double>(evaluation.truth.size()));
+      rotation += vector_from_rotation(evaluation.truth[i].rotation.conjugate() * evaluation.estimate[i].rotation);
+    body_from_cam_.rotation = rotation_from_vector(rotation / static_cast<double>(evaluation.truth.size()));
   }
   bool mapped(double stamp) const { return run_.contains(stamp); }
   std::optional<Rigid3> at(double stamp) const {

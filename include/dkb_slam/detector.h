@@ -53,8 +53,8 @@ class DKB_SLAM_API Detector {
 
 /// When a slow detector is asked, and when its answer counts. In frames, so that runs do not depend on a clock.
 struct DKB_SLAM_API DetectionSchedule {
-  int every = 3;    ///< [frames] from one image to the next, >= 1
-  int latency = 3;  ///< [frames] until an answer is used, >= 0; should cover the detector's p95 at the camera's rate
+  int every = 3;       ///< [frames] from one image to the next, >= 1
+  int latency = 3;     ///< [frames] until an answer is used, >= 0; should cover the detector's p95 at the camera's rate
   void check() const;  ///< throws InvalidOption
 };
 
@@ -71,13 +71,13 @@ struct DKB_SLAM_API Detectors {
 
 /// What the command line's detector options say; a file that is not named is not used.
 struct DetectorChoice {
-  std::string kinds = "auto";             ///< auto, yolo, motion, file, none; several joined by +
-  std::filesystem::path model;            ///< ONNX file of the yolo kind
-  std::filesystem::path labels;           ///< its class names, one per line; default: the 80 of COCO
-  std::filesystem::path boxes;            ///< of the file kind: `stamp class x y w h [score]` per line
-  std::filesystem::path masks;            ///< folder of STAMP.png, 255 = mover; stamps in seconds
-  std::vector<int64_t> stamps_ns;         ///< of the images to come: the masks' stamps are held against them
-  int every = 0, latency = 0;             ///< [frames] of the network; 0 = by the model's size
+  std::string kinds = "auto";      ///< auto, yolo, motion, file, none; several joined by +
+  std::filesystem::path model;     ///< ONNX file of the yolo kind
+  std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
+  std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
+  std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
+  std::vector<int64_t> stamps_ns;  ///< of the images to come: the masks' stamps are held against them
+  int every = 0, latency = 0;      ///< [frames] of the network; 0 = by the model's size
 };
 
 /// The detectors of that choice. A network runs by OpenCV's DNN module, loaded when the first one is made.

@@ -22,17 +22,17 @@ struct RgbdImage;  // the library's own
 /// What something else knows of the camera's motion since the frame before: wheels, an inertial unit, a planner. It
 /// guides the search for the frame's pose; the images have the last word.
 struct MotionPrior {
-  Rigid3 previous_from_current;               ///< camera axes; of the frames that process() was given last and now
-  bool rotation_only = false;                 ///< the translation is not known
-  Matrix6d covariance = Matrix6d::Identity(); ///< right perturbation, [translation m, rotation rad], camera axes
+  Rigid3 previous_from_current;                ///< camera axes; of the frames that process() was given last and now
+  bool rotation_only = false;                  ///< the translation is not known
+  Matrix6d covariance = Matrix6d::Identity();  ///< right perturbation, [translation m, rotation rad], camera axes
 };
 
 /// A pair of images as the caller has them. The views are read during the call and may be gone after it.
 struct FrameInput {
-  int64_t stamp_ns = 0;           ///< of the colour image, middle of the exposure; rises from frame to frame
-  ImageView colour;               ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
-  ImageView depth;                ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
-  int64_t depth_stamp_ns = -1;    ///< of the depth image; -1 = the colour image's
+  int64_t stamp_ns = 0;         ///< of the colour image, middle of the exposure; rises from frame to frame
+  ImageView colour;             ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
+  ImageView depth;              ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
+  int64_t depth_stamp_ns = -1;  ///< of the depth image; -1 = the colour image's
   std::optional<MotionPrior> prior;
 };
 
@@ -80,8 +80,8 @@ struct Mover {
   Eigen::Vector3d velocity_in_world{0, 0, 0};  ///< [m/s]
   double position_sd = 0;                      ///< [m] standard deviation of each coordinate of the position
   Matrix6d covariance = Matrix6d::Zero();      ///< of [position m, velocity m/s] in the world
-  Eigen::Vector3d size{0, 0, 0};               ///< [m] of what is visible: width, height, depth, along the camera's axes
-  Box box;                                     ///< [px] of the original image
+  Eigen::Vector3d size{0, 0, 0};  ///< [m] of what is visible: width, height, depth, along the camera's axes
+  Box box;                        ///< [px] of the original image
   bool operator==(const Mover&) const = default;
 };
 
@@ -96,10 +96,10 @@ DKB_SLAM_API const char* name_of(FeatureState state);
 
 /// Why a feature was rejected.
 enum class FeatureReason : uint8_t {
-  none,        ///< it was not
-  on_mover,    ///< it lies where a detector or the motion segmentation sees a mover
-  moved,       ///< it moved in a way that the camera's own motion does not explain (the filters of other systems)
-  disagrees,   ///< its place or depth is off from the point that it was matched with
+  none,       ///< it was not
+  on_mover,   ///< it lies where a detector or the motion segmentation sees a mover
+  moved,      ///< it moved in a way that the camera's own motion does not explain (the filters of other systems)
+  disagrees,  ///< its place or depth is off from the point that it was matched with
 };
 DKB_SLAM_API const char* name_of(FeatureReason reason);
 

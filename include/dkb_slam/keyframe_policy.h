@@ -23,17 +23,17 @@ struct TrackedPoint {
 
 /// What a rule may know of a tracked frame.
 struct KeyframeQuery {
-  int frame = 0;                 ///< index of the frame
-  int64_t stamp_ns = 0;          ///< of its colour image
-  int frames_since_keyframe = 0; ///< since the last keyframe
+  int frame = 0;                  ///< index of the frame
+  int64_t stamp_ns = 0;           ///< of its colour image
+  int frames_since_keyframe = 0;  ///< since the last keyframe
   double seconds_since_keyframe = 0;
   bool mapper_idle = true;         ///< the last keyframe is in the map
   int tracked_close_points = 0;    ///< points of the pose that are near enough for good depth
   int creatable_close_points = 0;  ///< features near enough that show no map point yet
   int reference_points = 0;        ///< points of the reference keyframe that other keyframes see as well
   Rigid3 world_from_cam;
-  Rigid3 world_from_last_keyframe;    ///< the last keyframe's camera
-  std::vector<TrackedPoint> points;   ///< inliers of the pose
+  Rigid3 world_from_last_keyframe;   ///< the last keyframe's camera
+  std::vector<TrackedPoint> points;  ///< inliers of the pose
 };
 
 /// The answer, with the numbers that led to it.

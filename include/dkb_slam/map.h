@@ -37,7 +37,7 @@ struct KeyframeInfo {
   int frame = 0;         ///< index of its frame; below 0 for keyframes of a map that was loaded
   Rigid3 world_from_cam;
   std::vector<CovisibleKeyframe> covisible;  ///< by decreasing shared points
-  int map = 0;  ///< 0 = the first map; maps that were not joined have worlds of their own
+  int map = 0;                               ///< 0 = the first map; maps that were not joined have worlds of their own
 };
 
 /// Two keyframes that were found to show the same place.
@@ -55,8 +55,8 @@ class DKB_SLAM_API MapSnapshot {
 
   size_t point_count() const;
   int keyframe_count() const;
-  std::vector<PointInfo> points() const;        ///< by id
-  std::vector<KeyframeInfo> keyframes() const;  ///< by id
+  std::vector<PointInfo> points() const;                         ///< by id
+  std::vector<KeyframeInfo> keyframes() const;                   ///< by id
   const std::vector<LoopInfo>& loops() const { return loops_; }  ///< of this session, in order
   const std::shared_ptr<const Map>& map() const { return map_; }
 

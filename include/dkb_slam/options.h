@@ -24,10 +24,10 @@ class DKB_SLAM_API Options {
   Options& operator=(const Options& other);
   ~Options();
 
-  bool threaded = true;   ///< mapping, detection and loop search on threads of their own; false: the same bytes from one
-  bool realtime = false;  ///< never wait for them but for the first detection; results may differ from run to run
-  bool dense_map = false; ///< keep what Slam::dense_map() needs: about 0.5 MB per keyframe
-  Rigid3 base_from_cam;   ///< mount: the world is the robot's base at the first tracked frame
+  bool threaded = true;  ///< mapping, detection and loop search on threads of their own; false: the same bytes from one
+  bool realtime = false;   ///< never wait for them but for the first detection; results may differ from run to run
+  bool dense_map = false;  ///< keep what Slam::dense_map() needs: about 0.5 MB per keyframe
+  Rigid3 base_from_cam;    ///< mount: the world is the robot's base at the first tracked frame
 
   /// Sets one setting from text ("features.count", "1200"). `where` opens the message of what it throws: InputError for
   /// an unknown key, with the nearest one, for a value of another type, or one out of range.

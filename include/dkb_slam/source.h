@@ -46,11 +46,11 @@ class DKB_SLAM_API Source {
 };
 
 struct FolderOptions {
-  std::string camera;      ///< a camera file or a name (fr1, fr2, fr3, bonn); empty = camera.yaml in the folder, else by
-                           ///< the folder's name
-  std::optional<Camera> fallback_camera;  ///< where none of these tells it
-  int64_t skip_pairs = 0;  ///< left out at the beginning before all else
-  double start = 0;        ///< [s] after the first pair's colour stamp, inclusive
+  std::string camera;  ///< a camera file or a name (fr1, fr2, fr3, bonn); empty = camera.yaml in the folder, else by
+                       ///< the folder's name
+  std::optional<Camera> fallback_camera;                 ///< where none of these tells it
+  int64_t skip_pairs = 0;                                ///< left out at the beginning before all else
+  double start = 0;                                      ///< [s] after the first pair's colour stamp, inclusive
   double end = std::numeric_limits<double>::infinity();  ///< [s] likewise, inclusive
   std::optional<int64_t> max_frames;                     ///< pairs counted from start
   bool threaded = true;                                  ///< decode ahead on a thread; the frames are the same
@@ -60,6 +60,7 @@ struct FolderOptions {
 /// colour as PNG or JPEG, depth as 16-bit PNG or 32-bit float. Throws InputError with file and line when the lists are
 /// wrong, when none of the first five pairs can be read, or when one that can has another size than the camera.
 /// A pair that cannot be read later on is skipped.
-DKB_SLAM_API std::unique_ptr<Source> open_folder(const std::filesystem::path& folder, const FolderOptions& options = {});
+DKB_SLAM_API std::unique_ptr<Source> open_folder(const std::filesystem::path& folder,
+                                                 const FolderOptions& options = {});
 
 }  // namespace dkb

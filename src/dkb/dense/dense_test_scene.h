@@ -21,21 +21,21 @@ struct DenseScene {
   double person_radius = 0.25;
 
   // Depth factor along a ray from `eye` with unit z in the camera.
-  double hit(const Eigen::Vector3d& eye, const Eigen::Vector3d& way) const {
+  double hit(const Eigen::Vector3d& eye, const Eigen::Vector3d& direction) const {
     double best = std::numeric_limits<double>::infinity();
     const auto take = [&](double t) {
       if (t > 0.05) best = std::min(best, t);
     };
-    if (way.y() > 1e-9) take((1.2 - eye.y()) / way.y());
-    if (way.z() > 1e-9) take((3.0 - eye.z()) / way.z());
+    if (direction.y() > 1e-9) take((1.2 - eye.y()) / direction.y());
+    if (direction.z() > 1e-9) take((3.0 - eye.z()) / direction.z());
     const Eigen::Vector3d m = eye - ball;
-    const double a = way.squaredNorm(), b = m.dot(way), c = m.squaredNorm() - ball_radius * ball_radius;
+    const double a = direction.squaredNorm(), b = m.dot(direction), c = m.squaredNorm() - ball_radius * ball_radius;
     if (b * b > a * c) take((-b - std::sqrt(b * b - a * c)) / a);
     if (person) {
-      const Eigen::Vector2d o(eye.x() - person->x(), eye.z() - person->y()), d(way.x(), way.z());
+      const Eigen::Vector2d o(eye.x() - person->x(), eye.z() - person->y()), d(direction.x(), direction.z());
       const double pa = d.squaredNorm(), pb = o.dot(d), pc = o.squaredNorm() - person_radius * person_radius;
       if (pb * pb > pa * pc) {
-        const double t = (-pb - std::sqrt(pb * pb - pa * pc)) / pa, y = eye.y() + t * way.y();
+        const double t = (-pb - std::sqrt(pb * pb - pa * pc)) / pa, y = eye.y() + t * direction.y();
         if (y > -0.6 && y < 1.2) take(t);
       }
     }

@@ -45,7 +45,7 @@ class DepthViewMaker {
   DepthViewMaker(const CameraModel& camera, const DenseOptions& options);
 
   const ViewCamera& camera() const { return view_camera_; }
-  // Depths at steps and on movers, and those around them, are left out.
+  // Depths at jumps and on movers, and those around them, are left out.
   DepthView make(FrameIndex frame, const RgbdImage& image, const MoverMask& movers) const;
   // Movers that became known later.
   void remove(const MoverMask& movers, DepthView* view) const;

@@ -38,23 +38,23 @@ class FreeSpace {
   }
 
  private:
-  void walk(const Eigen::Vector3d& eye, const Eigen::Vector3d& way) {
-    // The part of the way that is above the floor and below obstacle_high.
+  void walk(const Eigen::Vector3d& eye, const Eigen::Vector3d& ray) {
+    // The part of the ray that is above the floor and below obstacle_high.
     double from = 0, to = 1;
     const double low = -options_.obstacle_low, high = options_.obstacle_high;
-    if (std::abs(way.z()) < 1e-9) {
+    if (std::abs(ray.z()) < 1e-9) {
       if (eye.z() < low || eye.z() > high) return;
     } else {
-      const double a = (low - eye.z()) / way.z(), b = (high - eye.z()) / way.z();
+      const double a = (low - eye.z()) / ray.z(), b = (high - eye.z()) / ray.z();
       from = std::max(from, std::min(a, b));
       to = std::min(to, std::max(a, b));
     }
-    const double flat = std::hypot(way.x(), way.y());
-    if (way.z() >= 0 || eye.z() + way.z() > options_.obstacle_low) to -= flat > 0 ? grid_->cell / flat : 0;
+    const double flat = std::hypot(ray.x(), ray.y());
+    if (ray.z() >= 0 || eye.z() + ray.z() > options_.obstacle_low) to -= flat > 0 ? grid_->cell / flat : 0;
     if (from >= to) return;
     const int steps = static_cast<int>(std::ceil((to - from) * flat / (0.7 * grid_->cell))) + 1;
     for (int i = 0; i <= steps; ++i) {
-      const Eigen::Vector3d p = eye + (from + (to - from) * i / steps) * way;
+      const Eigen::Vector3d p = eye + (from + (to - from) * i / steps) * ray;
       const int x = static_cast<int>(std::floor((p.x() - grid_->origin_x) / grid_->cell));
       const int y = grid_->cells.height() - 1 - static_cast<int>(std::floor((p.y() - grid_->origin_y) / grid_->cell));
       if (grid_->cells.contains(x, y)) grid_->cells(x, y) = OccupancyGrid::kFree;

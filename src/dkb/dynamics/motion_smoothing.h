@@ -19,7 +19,7 @@ struct MotionSmoothingOptions {
 };
 
 // Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)
-// by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth steps and
+// by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth jumps and
 // concave folds. A fold is where inverse depth, which is linear in the image on every plane, bends away from the
 // viewer.
 class MotionSmoothing {

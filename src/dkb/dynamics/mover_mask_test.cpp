@@ -33,7 +33,7 @@ TEST(MoverMask, NothingIsMarkedLeftOfOrAboveTheImage) {
   EXPECT_FALSE(mask.at(0, -3));
 }
 
-TEST(MoverMask, SpreadsIntoHolesThatTouchItButNoFartherThanItsReach) {
+TEST(MoverMask, SpreadsIntoHolesThatTouchItButNoFartherThanTheMaxDistance) {
   const MoverMask mask = one_cell(40, 10, 2, 5);
   DepthImage depth(160, 40, 2.0f);
   for (int y = 20; y < 24; ++y)

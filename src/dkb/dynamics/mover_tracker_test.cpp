@@ -33,7 +33,7 @@ MoverTestScene one_person(double x, double z) {
   return scene;
 }
 
-TEST(MoverTracker, TheThirdSightingGivesAnId) {
+TEST(MoverTracker, TheThirdObservationGivesAnId) {
   MoverTracker tracker(MoverTestScene().camera, {});
   EXPECT_TRUE(show(&tracker, 0, one_person(0, 2)).empty());
   EXPECT_TRUE(show(&tracker, kStep, one_person(0, 2)).empty());

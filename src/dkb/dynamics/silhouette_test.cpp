@@ -77,7 +77,7 @@ TEST(Silhouette, ALimbMayBeCutByTheBorderOfTheImage) {
   EXPECT_TRUE(silhouette_in(depth, {90, 10, 70, 100}).at(156, 50));
 }
 
-TEST(Silhouette, WhatLiesBeyondTheReachIsNotPartOfThePerson) {
+TEST(Silhouette, WhatLiesFartherInDepthIsNotPartOfThePerson) {
   DepthImage depth = person_before_wall();
   // A ramp behind the person's side: its steps are as small as those of one surface, but it leads away.
   for (int x = 100; x < 150; ++x) fill(&depth, x, 20, x + 1, 100, 1.5f + 0.0069f * static_cast<float>(x - 99));

@@ -35,9 +35,9 @@ class SquareWorld {
   SquareWorld(int width, int height, int squares, uint64_t seed) : width_(width), height_(height) {
     Random random(seed);
     for (int i = 0; i < squares; ++i) {
-      const double turn = random.uniform(0, 6.3);
-      squares_.push_back({random.uniform(-60, width + 60), random.uniform(-60, height + 60), std::cos(turn),
-                          std::sin(turn), random.uniform(5, 22), random.uniform(20, 235)});
+      const double angle = random.uniform(0, 6.3);
+      squares_.push_back({random.uniform(-60, width + 60), random.uniform(-60, height + 60), std::cos(angle),
+                          std::sin(angle), random.uniform(5, 22), random.uniform(20, 235)});
     }
   }
 

@@ -117,8 +117,8 @@ std::vector<bool> consistent_orientations(std::span<const float> angles_a, std::
   std::vector<bool> keep(count, true);
   if (count < 3) return keep;
   const auto bin_of = [&](size_t i) {
-    const double turn = static_cast<double>(angles_a[i]) - static_cast<double>(angles_b[i]);
-    const double share = turn / kTurn - std::floor(turn / kTurn);  // [0, 1), or 1 by rounding
+    const double rotation = static_cast<double>(angles_a[i]) - static_cast<double>(angles_b[i]);
+    const double share = rotation / kTurn - std::floor(rotation / kTurn);  // [0, 1), or 1 by rounding
     return static_cast<size_t>(share * kBins) % kBins;
   };
   std::array<int, kBins> counts{};

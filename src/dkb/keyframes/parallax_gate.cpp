@@ -29,8 +29,8 @@ double units_per_metre(TranslationUnit unit, double median_depth) {
 }
 
 Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, double units_in_metre) {
-  const Eigen::Matrix3d turn = last_cam_from_world.matrix3().transpose() * cam_from_world.matrix3();
-  const double cosine = std::clamp((turn.trace() - 1) / 2, -1.0, 1.0);
+  const Eigen::Matrix3d rotation = last_cam_from_world.matrix3().transpose() * cam_from_world.matrix3();
+  const double cosine = std::clamp((rotation.trace() - 1) / 2, -1.0, 1.0);
   const double metres = (centre_in_world(cam_from_world) - centre_in_world(last_cam_from_world)).norm();
   return {std::acos(cosine) * 180 / M_PI, units_in_metre * metres};
 }

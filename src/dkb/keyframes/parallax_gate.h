@@ -7,7 +7,7 @@
 
 namespace dkb {
 
-// What a translation of 1 is in the gate. The paper gives no unit; in metres only turns would count.
+// What a translation of 1 is in the gate. The paper gives no unit; in metres only rotations would count.
 enum class TranslationUnit {
   metre,
   centimetre,

@@ -19,7 +19,7 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
   if (keyframes.size() < 2) return correction;
   std::vector<uint8_t> fixed;
   for (KeyframeId k : keyframes) fixed.push_back(map.keyframe(k)->parent == kNoKeyframe);
-  // Points of one sighting tie nothing together; they follow their keyframe.
+  // Points of one observation tie nothing together; they follow their keyframe.
   std::vector<PointId> points;
   for (PointId p : map.live_points())
     if (map.point(p)->observations.size() >= 2) points.push_back(p);

@@ -8,7 +8,7 @@
 
 namespace dkb {
 
-// A place seen again: the newest keyframe and some around it show the area around an old one.
+// A place seen again: the newest keyframe and its supporting keyframes show the area around an old one.
 struct LoopFinding {
   struct Support {
     KeyframeId keyframe = kNoKeyframe;
@@ -19,7 +19,7 @@ struct LoopFinding {
   bool merge = false;                // the two belong to maps that are not joined
 };
 
-// Length [m] of the shortest way from `from` to every keyframe, along covisibility and the spanning tree; infinite
+// Length [m] of the shortest path from `from` to every keyframe, along covisibility and the spanning tree; infinite
 // where there is none.
 std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from);
 
@@ -28,9 +28,9 @@ std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps);
 
 // Does keyframe `id` show a place that the map knows, but does not know to be the same? Candidates are the keyframes
 // that look most like it (PlaceIndex), its neighbours apart. Each is verified by geometry: a rigid motion between the
-// points of both (3-D to 3-D, RANSAC), guided matching, and a pose on that. A loop needs keyframes around the newest
-// one to agree, and a drift that the way between the two places could explain. That way is what tells look-alike rooms
-// apart: their views agree as well as those of one room do.
+// points of both (3-D to 3-D, RANSAC), guided matching, and a pose on that. A loop needs supporting
+// keyframes, and a drift that the path between the two places could explain. Only the path tells similar rooms apart:
+// their views pass the other tests as well as those of one room do.
 //
 // A pure function of the snapshot. Deterministic for a seed.
 std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics& optics, const LoopOptions& options,

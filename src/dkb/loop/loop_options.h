@@ -30,9 +30,9 @@ struct LoopOptions {
   double support_translation = 0.08;  // [m] by which they may differ, > 0
   double support_rotation = 3;        // [deg] > 0
 
-  // Plausibility: what the way through the map from the one keyframe to the other can have drifted.
+  // Plausibility: what can have drifted along the shortest path through the map from the one keyframe to the other.
   double drift_translation_base = 0.2;    // [m] >= 0
-  double drift_translation_share = 0.08;  // of the way's length, >= 0
+  double drift_translation_share = 0.08;  // of the path's length, >= 0
   double drift_rotation_base = 8;         // [deg] >= 0
   double drift_rotation_per_metre = 1.5;  // [deg/m] >= 0
 
@@ -46,8 +46,9 @@ struct LoopOptions {
   double edge_position_share = 0.01;    // growth of that with the edge's length, >= 0
   double edge_rotation_sd = 0.002;      // [rad] > 0
   double edge_rotation_growth = 0.004;  // [rad/m] >= 0
-  double edge_rotation_share = 0.02;    // growth of that with the edge's turn: turning images are sheared, >= 0
-  int graph_iterations = 20;            // steps of the optimisation, >= 1
+  double edge_rotation_share =
+      0.02;                   // growth of that with the edge's rotation: images of a rotating camera are sheared, >= 0
+  int graph_iterations = 20;  // steps of the optimisation, >= 1
 
   void check() const;
 };

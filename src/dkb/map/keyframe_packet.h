@@ -27,7 +27,8 @@ struct PointVisibility {
   int visible = 0, found = 0;
 };
 
-// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of sightings and retractions.
+// What tracking tells mapping of a new keyframe; with no keyframe (id = kNoKeyframe) only of visibility and
+// retractions.
 struct KeyframePacket {
   KeyframeId id = kNoKeyframe;
   FrameIndex frame = 0;

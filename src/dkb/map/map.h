@@ -14,7 +14,7 @@
 
 namespace dkb {
 
-// One sighting of a map point.
+// One observation of a map point.
 struct Observation {
   KeyframeId keyframe = kNoKeyframe;
   int32_t feature = 0;
@@ -85,7 +85,7 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
-  // The keyframe at the end of the way up the spanning tree: keyframes of one map have one root, which has no parent.
+  // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
   // The points that these keyframes show, which must exist: increasing, each once.

@@ -23,7 +23,7 @@ struct BaWindow {
   std::vector<Source> sources;        // per observation
 };
 
-// `keyframes` with their sightings of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.
+// `keyframes` with their observations of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
                         std::vector<PointId> points, const CameraModel& camera, const SensorNoise& noise,
                         double scale_factor);

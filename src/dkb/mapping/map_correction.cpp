@@ -7,7 +7,7 @@
 namespace dkb {
 namespace {
 
-// Makes `joint` the root of its tree: the way up from it is turned round.
+// Makes `joint` the root of its tree: the path up from it is reversed.
 void hang_tree(Map& map, KeyframeId joint, KeyframeId parent) {
   std::vector<KeyframeId> path;
   for (KeyframeId k = joint; k != kNoKeyframe; k = map.keyframe(k)->parent) path.push_back(k);

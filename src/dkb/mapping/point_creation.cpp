@@ -46,7 +46,7 @@ struct DescriptorMatch {
   int feature = -1, distance = 0;
 };
 
-// The most alike of the free features near a line [px], of those within `max_distance` bits.
+// The most similar of the free features near a line [px], of those within `max_distance` bits.
 DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& descriptor,
                              const std::vector<FreeFeature>& free, const RgbdFeatures& features, int max_distance) {
   DescriptorMatch best{-1, max_distance + 1};

@@ -92,7 +92,7 @@ TEST_F(PointCreation, WithoutParallaxThereIsNothingToTriangulate) {
   EXPECT_TRUE(create().empty());
 }
 
-TEST_F(PointCreation, RaysMustMeetAtTheLeastParallax) {
+TEST_F(PointCreation, RaysMustMeetAtTheMinimumParallax) {
   build(TestScene::camera_at({0.2, 0, 0}));
   PointCreationOptions options;
   options.min_parallax_deg = 20;  // 0.2 m seen from 1.5 m and more: 7.6 degrees at most

@@ -154,7 +154,7 @@ TEST_F(CandidateMatching, AmbiguousMatchesOfOneLevelAreRejected) {
   EXPECT_EQ(match({at(100, 100)}).size(), 1U);
 }
 
-TEST_F(CandidateMatching, VisibleAreThoseInTheImageInReachOfThePyramidAndSeenFromTheirSide) {
+TEST_F(CandidateMatching, VisibleAreThoseInTheImageWithinThePyramidsScalesAndSeenFromTheirSide) {
   Candidate behind = at(100, 100);
   behind.position.z() = -2;
   Candidate towards = at(320, 240), away = towards, unknown = towards;

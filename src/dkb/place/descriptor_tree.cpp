@@ -78,8 +78,8 @@ void DescriptorTree::remove_below(std::shared_ptr<Node>& node, const std::vector
   std::erase_if(own(node).entries, gone);
 }
 
-// All ways go down level by level together: the loads of one level do not wait for one another, so the processor
-// fetches many at once. One way after the other takes about twice as long in a map larger than the cache.
+// All searches go down level by level together: the loads of one level do not wait for one another, so the processor
+// fetches many at once. One search after the other takes about twice as long in a map larger than the cache.
 std::vector<DescriptorTree::Lookup> DescriptorTree::look_up(std::span<const Descriptor> descriptors) const {
   std::vector<Lookup> lookups(descriptors.size());
   for (size_t i = 0; i < lookups.size(); ++i) {
@@ -88,12 +88,12 @@ std::vector<DescriptorTree::Lookup> DescriptorTree::look_up(std::span<const Desc
     lookups[i].bits = static_cast<uint16_t>(key >> kRootBits);
     if (const auto& block = root_[root / kBlock]) lookups[i].node = block->nodes[root % kBlock].get();
   }
-  for (bool on_the_way = true; on_the_way;) {
-    on_the_way = false;
+  for (bool descending = true; descending;) {
+    descending = false;
     for (Lookup& l : lookups) {
       if (l.node == nullptr || l.node->leaf()) continue;
       l.node = l.node->children[(l.bits >> l.depth++) & 1].get();
-      on_the_way = true;
+      descending = true;
     }
   }
   return lookups;

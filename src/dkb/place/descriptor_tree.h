@@ -41,7 +41,7 @@ class DescriptorTree {
     uint8_t tolerated;  // [bits] largest distance that is listed here
   };
   // Calls visit(neighbours) for each descriptor: the entries in its leaf that differ in at most a quarter of the bits
-  // which the way to the leaf left open, in the order in which they were added.
+  // which the path to the leaf left open, in the order in which they were added.
   template <class Visit>
   void find(std::span<const Descriptor> descriptors, Visit&& visit) const {
     std::vector<Neighbour> neighbours;
@@ -70,11 +70,11 @@ class DescriptorTree {
     std::array<std::shared_ptr<Node>, kBlock> nodes;
   };
 
-  // Where the way of a key through the tree has come to.
+  // Where the search for a key in the tree has come to.
   struct Lookup {
     const Node* node = nullptr;  // none: nothing is stored there
     uint16_t bits = 0;           // of the key, after the root's
-    uint8_t depth = 0;           // how many of them the way decided
+    uint8_t depth = 0;           // how many of them the path decided
   };
   static constexpr size_t kAhead = 6;  // leaves fetched ahead of the one being compared
 

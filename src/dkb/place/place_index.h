@@ -14,7 +14,7 @@ namespace dkb {
 
 struct PlaceMatch {
   int32_t id = -1;  // keyframe
-  float score = 0;  // larger is more alike; to be compared within one query only
+  float score = 0;  // larger is more similar; to be compared within one query only
   int votes = 0;    // pairs of like descriptors behind it
 };
 
@@ -35,7 +35,7 @@ class PlaceIndex {
   // An id that is not there is ignored.
   void remove(int32_t id);
 
-  // The most alike keyframes first, at most `max_results`; equal ones by id. Only keyframes with votes are listed.
+  // The most similar keyframes first, at most `max_results`; equal ones by id. Only keyframes with votes are listed.
   std::vector<PlaceMatch> query(std::span<const Descriptor> descriptors, size_t max_results) const;
 
   bool contains(int32_t id) const { return find(id) != slot_of_id_.end(); }

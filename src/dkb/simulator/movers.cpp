@@ -20,16 +20,16 @@ double wrapped(double a) {
 struct Stretch {
   Eigen::Vector2d a, b;
   double start = 0, end = 0;  // [s]
-  // Smooth start and stop: share of the way at a time.
+  // Smooth start and stop: share of the path at a time.
   Eigen::Vector2d at(double t) const {
     if (end <= start) return b;
     const double s = std::clamp((t - start) / (end - start), 0.0, 1.0), ramp = std::min(0.5, 0.35 / (end - start));
     // Trapezoid of speed with ramps of `ramp`.
     const double v = 1 / (1 - ramp);
-    const double way = s < ramp       ? 0.5 * v * s * s / ramp
-                       : s > 1 - ramp ? 1 - 0.5 * v * (1 - s) * (1 - s) / ramp
-                                      : v * (s - 0.5 * ramp);
-    return a + way * (b - a);
+    const double share = s < ramp       ? 0.5 * v * s * s / ramp
+                         : s > 1 - ramp ? 1 - 0.5 * v * (1 - s) * (1 - s) / ramp
+                                        : v * (s - 0.5 * ramp);
+    return a + share * (b - a);
   }
 };
 
@@ -96,9 +96,9 @@ class Planner {
     }
     for (int i = 0; i < 60; ++i) {
       const Eigen::Vector2d target = propose();
-      const double way = (target - here).norm(), speed = random_.uniform(area_.speed_min, area_.speed_max);
-      if (way < 0.8 || !may_stand(target)) continue;
-      Stretch walk{here, target, t, t + way / speed + 0.35};
+      const double distance = (target - here).norm(), speed = random_.uniform(area_.speed_min, area_.speed_max);
+      if (distance < 0.8 || !may_stand(target)) continue;
+      Stretch walk{here, target, t, t + distance / speed + 0.35};
       if (clear(walk)) return walk;
     }
     return {here, here, t, t + 0.3};

@@ -7,7 +7,8 @@
 namespace dkb {
 
 MappingStage::MappingStage(LocalMapper mapper, bool threaded)
-    : mapper_(std::move(mapper)), stage_([this](const Task& task) { return work(task); }, {.name = "mapping", .threaded = threaded}) {}
+    : mapper_(std::move(mapper)),
+      stage_([this](const Task& task) { return work(task); }, {.name = "mapping", .threaded = threaded}) {}
 
 MappingStage::Result MappingStage::work(const Task& task) {
   MapView view = task.correction ? mapper_.apply(*task.correction) : mapper_.process(task.packet);

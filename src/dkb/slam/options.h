@@ -14,9 +14,9 @@
 #include "dkb/keyframes/adaptive_policy.h"
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
-#include "dkb/slam/scene_stage.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/readout_calibration.h"
+#include "dkb/slam/scene_stage.h"
 #include "dkb/tracking/tracker.h"
 #include "dkb/util/settings.h"
 

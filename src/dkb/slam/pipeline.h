@@ -35,7 +35,8 @@ struct PipelineContext {
 // earlier frames is its own; a frame itself is a value that every stage makes richer.
 class Pipeline {
  public:
-  // Goes on in `map`, whose keyframes are of frames below 0; an empty one is a new world. `context` and `record` must outlive the pipeline.
+  // Goes on in `map`, whose keyframes are of frames below 0; an empty one is a new world. `context` and `record` must
+  // outlive the pipeline.
   Pipeline(const PipelineContext& context, RunRecord& record, Map map);
 
   // Throws InputError for a frame that does not fit.

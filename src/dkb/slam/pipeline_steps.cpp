@@ -107,8 +107,7 @@ void Pipeline::correct(std::vector<std::shared_ptr<const MapCorrection>> correct
       const LoopInfo loop{correction->near_side.front(), correction->far_side.front(), merge};
       record_.add(loop);
       note(merge ? Event::Kind::merge : Event::Kind::loop,
-           "keyframe " + std::to_string(loop.keyframe) + " shows the place of " +
-               std::to_string(loop.earlier_keyframe),
+           "keyframe " + std::to_string(loop.keyframe) + " shows the place of " + std::to_string(loop.earlier_keyframe),
            loop.keyframe);
     }
     mapping_.push(std::move(correction), due);
@@ -120,9 +119,9 @@ ExtractedFrame Pipeline::extract(const Frame& frame) {
   const GreyImage& grey = frame.image()->grey;
   // When movers took most of the last frame's features, the rest of the image gets its half now.
   const bool crowded = crowded_share_ > 0.5 && !last_mask_.empty();
-  ExtractedFrame extracted{next_frame_, frame,
-                           crowded ? extractor_.extract(grey, last_mask_.cells, last_mask_.cell)
-                                   : extractor_.extract(grey)};
+  ExtractedFrame extracted{
+      next_frame_, frame,
+      crowded ? extractor_.extract(grey, last_mask_.cells, last_mask_.cell) : extractor_.extract(grey)};
   record_.add_time("features", watch.ms());
   return extracted;
 }
@@ -141,8 +140,8 @@ Expectation Pipeline::expect(const Frame& frame) const {
     const Rigid3 cam_from_keyframe = expected.cam_from_world * k.cam_from_world.inverse();
     for (const Keypoint& p : k.features->keypoints)
       if (p.depth > 0)
-        expected.keyframe_points_in_camera.push_back(
-            cam_from_keyframe * context_.camera.unproject(p.pixel.cast<double>(), p.depth));
+        expected.keyframe_points_in_camera.push_back(cam_from_keyframe *
+                                                     context_.camera.unproject(p.pixel.cast<double>(), p.depth));
   }
   return expected;
 }
@@ -171,13 +170,12 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.depth);
   features.motion = usable.motion;
   ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
-  TrackedFrame tracked =
-      tracker_.track({.index = next_frame_,
-                      .timestamp = image.timestamp,
-                      .features = features,
-                      .appearance = &appearance,
-                      .prior = frame.prior() ? &*frame.prior() : nullptr,
-                      .may_start_map = !localize_only_});
+  TrackedFrame tracked = tracker_.track({.index = next_frame_,
+                                         .timestamp = image.timestamp,
+                                         .features = features,
+                                         .appearance = &appearance,
+                                         .prior = frame.prior() ? &*frame.prior() : nullptr,
+                                         .may_start_map = !localize_only_});
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
   return tracked;
@@ -240,8 +238,8 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     c.points = &tracked.points;
     c.features = tracked.features.get();
     c.explain = explain_keyframes_;
-    const auto positions = context_.policy ? tracker_.positions(tracked.points)
-                                           : std::vector<std::optional<Eigen::Vector3d>>();
+    const auto positions =
+        context_.policy ? tracker_.positions(tracked.points) : std::vector<std::optional<Eigen::Vector3d>>();
     c.positions = &positions;
     decision = decider_->decide(c, tracker_.map().view());
     record_.add(decision.tests);
@@ -298,8 +296,8 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     result.keyframe = decision.insert;
     if (explain_keyframes_) result.keyframe_explanation = explained(decision);
     if (options_.dynamics.filter == FilterKind::standard)
-      result.movers = movers_.update(frame.image()->timestamp, frame.image()->depth, scene.mask, scene.boxes,
-                                     world_from_cam);
+      result.movers =
+          movers_.update(frame.image()->timestamp, frame.image()->depth, scene.mask, scene.boxes, world_from_cam);
   } else if (tracked.state == TrackingState::lost) {
     odometry_.lost();
   }
@@ -311,9 +309,11 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
 
   const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
                                      [](FeatureReason reason) { return reason != FeatureReason::none; });
-  crowded_share_ = scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
+  crowded_share_ =
+      scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
-  outcome_ = FrameOutcome{tracked.tracked() ? std::optional(tracked.cam_from_world) : std::nullopt, decision.insert, {}};
+  outcome_ =
+      FrameOutcome{tracked.tracked() ? std::optional(tracked.cam_from_world) : std::nullopt, decision.insert, {}};
   last_state_ = tracked.state;
   collect_times();
   ++next_frame_;

@@ -71,10 +71,10 @@ std::vector<TrajectoryFrame> RunRecord::trajectory(bool online) const {
   std::vector<TrajectoryFrame> frames;
   frames.reserve(records_.size());
   for (const Record& r : records_)
-    frames.push_back({r.frame, r.stamp_ns,
-                      online ? r.world_from_cam_online
-                             : (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse(),
-                      rank_of(roots, map_.root(r.reference))});
+    frames.push_back(
+        {r.frame, r.stamp_ns,
+         online ? r.world_from_cam_online : (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse(),
+         rank_of(roots, map_.root(r.reference))});
   return frames;
 }
 

@@ -31,8 +31,8 @@ struct Scene {
   std::vector<LateMask> late_masks;  // where they were in earlier keyframes, as detections have shown since
 };
 
-// The corners that tracking may see. Those that a rival filter rejected are gone for good. Those on movers stay, marked:
-// well-established map points may be found there.
+// The corners that tracking may see. Those that a rival filter rejected are gone for good. Those on movers stay,
+// marked: well-established map points may be found there.
 struct UsableFeatures {
   OrbFeatures orb;
   std::vector<int> corner;  // per feature: its index among all corners of the scene

@@ -127,8 +127,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   }
   if (slow_stage_) carried_.follow(past_, *pyramid);
   for (const DueDetections& d : due) {
-    auto late =
-        carried_.receive(d.frame, d.detections, scene.extracted.index, past_, *pyramid, options_.motion.cell);
+    auto late = carried_.receive(d.frame, d.detections, scene.extracted.index, past_, *pyramid, options_.motion.cell);
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(scene.late_masks));
   }
   scene.boxes = carried_.boxes();
@@ -140,9 +139,9 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   watch = Stopwatch();
   const auto& corners = scene.extracted.orb.corners;
   if (rival_) {
-    const auto dynamic = rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes,
-                                          past_.empty() ? nullptr : &past_.back(), pyramid.get(),
-                                          expected.current_from_previous, expected.keyframe_points_in_camera});
+    const auto dynamic =
+        rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes, past_.empty() ? nullptr : &past_.back(),
+                         pyramid.get(), expected.current_from_previous, expected.keyframe_points_in_camera});
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {

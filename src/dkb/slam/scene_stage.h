@@ -37,8 +37,9 @@ struct FrameOutcome {
   Rigid3 new_world_from_old;  // how the map was corrected since
 };
 
-// Says what of a frame moves (DKB section 3.1): detections made beside tracking are carried to the frame by flow, prompt
-// detectors are asked, depth is held against earlier views, and the chosen filter rejects corners. Deterministic.
+// Says what of a frame moves (DKB section 3.1): detections made beside tracking are carried to the frame by flow,
+// prompt detectors are asked, depth is held against earlier views, and the chosen filter rejects corners.
+// Deterministic.
 class SceneStage {
  public:
   // `threaded`, `realtime`: of the slow detector.

@@ -29,11 +29,11 @@ struct TrackedFrame {
   // What follows holds when tracking or relocalised.
   std::shared_ptr<const RgbdFeatures> features;
   std::vector<FeatureMotion> motion;  // per feature
-  std::vector<PointId> points;   // per feature: the map point it shows (inliers of the pose), else kNoPoint
-  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<PointId> points;        // per feature: the map point it shows (inliers of the pose), else kNoPoint
+  std::vector<uint8_t> outlier;       // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: inliers of the pose that are no map points
   std::vector<uint8_t> makes_point;  // per feature: 1 = it made a map point, when the frame became a keyframe
-  std::vector<int> source;  // per feature: its index among the features that tracking was given
+  std::vector<int> source;           // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;
   Rigid3 cam_from_reference;
   Rigid3 cam_from_world;                       // by the map as tracking knew it at the time
@@ -49,9 +49,10 @@ struct TrackingInput {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
   const FrameFeatures& features;
-  PointAppearance* appearance = nullptr;  // tells places that look alike apart when a lost camera is sought; may be null
-  const MotionPrior* prior = nullptr;     // may be null
-  bool may_start_map = true;              // else a frame that finds no map stays without a pose
+  PointAppearance* appearance =
+      nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
+  const MotionPrior* prior = nullptr;  // may be null
+  bool may_start_map = true;           // else a frame that finds no map stays without a pose
 };
 
 }  // namespace dkb

@@ -100,11 +100,11 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
   if (!coarse) return std::nullopt;
   proposal.cam_from_world = *coarse;
-  std::vector<Candidate> around = local_map_candidates(proposal.points, map, local_map_);
-  std::erase_if(around, [&](const Candidate& c) { return ignores(c.id); });
-  if (!search(around, options_.radius, features, proposal)) return std::nullopt;
-  if (!search(around, options_.radius_fine, features, proposal)) return std::nullopt;
-  verify(map, around, features, appearance, proposal);
+  std::vector<Candidate> nearby = local_map_candidates(proposal.points, map, local_map_);
+  std::erase_if(nearby, [&](const Candidate& c) { return ignores(c.id); });
+  if (!search(nearby, options_.radius, features, proposal)) return std::nullopt;
+  if (!search(nearby, options_.radius_fine, features, proposal)) return std::nullopt;
+  verify(map, nearby, features, appearance, proposal);
   return proposal;
 }
 
@@ -136,17 +136,17 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
   return found->cam_from_world;
 }
 
-// Matches the map around anew under the proposal's pose and refines it.
-bool Relocaliser::search(const std::vector<Candidate>& around, double radius, const MatchableFeatures& features,
+// Matches the map nearby anew under the proposal's pose and refines it.
+bool Relocaliser::search(const std::vector<Candidate>& nearby, double radius, const MatchableFeatures& features,
                          PoseProposal& proposal) const {
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
-  const auto matches = match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
+  const auto matches = match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
                                            match, nullptr, nullptr);
   std::vector<PoseObservation> observations;
   for (const ProjectionMatch& m : matches)
     observations.push_back(pose_observation(features.features.keypoints[static_cast<size_t>(m.feature)],
-                                            around[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
+                                            nearby[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
   const PoseEstimate pose = optimise_pose(camera_, proposal.cam_from_world, observations);
   if (!pose.ok || pose.inliers < options_.min_ransac_inliers) return false;
   proposal.cam_from_world = pose.cam_from_world;
@@ -155,24 +155,24 @@ bool Relocaliser::search(const std::vector<Candidate>& around, double radius, co
   proposal.points.assign(features.features.size(), kNoPoint);
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
-      proposal.points[static_cast<size_t>(matches[i].feature)] = around[static_cast<size_t>(matches[i].candidate)].id;
+      proposal.points[static_cast<size_t>(matches[i].feature)] = nearby[static_cast<size_t>(matches[i].candidate)].id;
   return true;
 }
 
-// What the map would have in view from there must be found, or at least look as it did. In a room that only looks alike
+// What the map would have in view from there must be found, or at least look as it did. In a room that is only similar
 // most things do, but some are others, and those are told by the points that no feature was matched with.
-void Relocaliser::verify(const Map& map, const std::vector<Candidate>& around, const MatchableFeatures& features,
+void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, const MatchableFeatures& features,
                          PointAppearance* appearance, PoseProposal& proposal) const {
   std::vector<PointId> matched;
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());
-  std::vector<uint8_t> visible(around.size(), 0);
-  match_by_projection(around, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
+  std::vector<uint8_t> visible(nearby.size(), 0);
+  match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
                       &visible);
   const Eigen::Vector3d centre = centre_in_world(proposal.cam_from_world);
-  for (size_t i = 0; i < around.size(); ++i) {
-    const Candidate& c = around[i];
+  for (size_t i = 0; i < nearby.size(); ++i) {
+    const Candidate& c = nearby[i];
     if (!visible[i] || map.point(c.id)->observations.size() < kWellKnownObservers) continue;
     ++proposal.well_known;
     if (std::binary_search(matched.begin(), matched.end(), c.id)) {

@@ -19,7 +19,7 @@ struct RelocalisationOptions {
   int neighbours = 4;               // covisible keyframes whose points are matched along with each one's, >= 0
   int min_matches = 15;             // matches by descriptor alone that make a candidate worth a try, >= 6
   int min_ransac_inliers = 10;      // of these, that must agree on a pose, >= 6
-  double radius = 10.0;             // [px] first search around that pose; the second is within `radius_fine`, > 0
+  double radius = 10.0;             // [px] first search nearby that pose; the second is within `radius_fine`, > 0
   double radius_fine = 4.0;         // [px] > 0
   int min_inliers = 40;             // points that the final pose rests on, >= 6
   double min_share = 0.1;           // of the map's well-known points in view that must be found, 0 ... 1
@@ -33,7 +33,7 @@ struct RelocalisationOptions {
   void check() const;
 };
 
-// A pose that a look-alike keyframe led to, with what speaks for and against it.
+// A pose that a similar keyframe led to, with what speaks for and against it.
 struct PoseProposal {
   KeyframeId keyframe = kNoKeyframe;  // that led to it
   Rigid3 cam_from_world;
@@ -44,11 +44,11 @@ struct PoseProposal {
   double position_sd = 0;         // [m]
   bool verified = false;          // it meets the options
 
-  double similarity() const { return alike + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
+  double similarity() const { return similar + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
 };
 
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the
-// frame, seeks a pose by RANSAC and searches the map around it. Without any idea of where the camera was.
+// frame, seeks a pose by RANSAC and searches the map nearby it. Without any idea of where the camera was.
 // Deterministic for a seed. Features that may lie on movers take no part.
 class Relocaliser {
  public:
@@ -72,9 +72,9 @@ class Relocaliser {
  private:
   std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                     const IgnoresPoint& ignores, std::vector<PointId>& points) const;
-  bool search(const std::vector<Candidate>& around, double radius, const MatchableFeatures& features,
+  bool search(const std::vector<Candidate>& nearby, double radius, const MatchableFeatures& features,
               PoseProposal& proposal) const;
-  void verify(const Map& map, const std::vector<Candidate>& around, const MatchableFeatures& features,
+  void verify(const Map& map, const std::vector<Candidate>& nearby, const MatchableFeatures& features,
               PointAppearance* appearance, PoseProposal& proposal) const;
 
   CameraModel camera_;

@@ -169,7 +169,7 @@ TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
   for (PointId p : o.frame.points) EXPECT_TRUE(p != dropped && p != fused);
 }
 
-TEST_F(TrackerTest, SightingsCountWhatWasInViewAndWhatWasMatched) {
+TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
   publish(start());
   const int hidden = scene_point(map.live_points()[3]);
   TrackOutcome o;

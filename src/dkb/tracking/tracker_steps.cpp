@@ -66,12 +66,12 @@ std::optional<Rigid3> Tracker::match_last_frame(const MatchableFeatures& feature
 std::vector<Rigid3> Tracker::expected_poses(double dt, const MotionPrior* prior) const {
   std::vector<Rigid3> steps;
   if (prior != nullptr) {
-    Rigid3 motion = prior->previous_from_current.inverse();
-    if (prior->rotation_only) motion.translation = expected_motion(dt).translation;
+    Rigid3 step = prior->previous_from_current.inverse();
+    if (prior->rotation_only) step.translation = expected_motion(dt).translation;
     steps.push_back(step);
   }
   if (velocity_) steps.push_back(expected_motion(dt));
-  for (Rigid3& step : steps) motion = step * last_->cam_from_world;
+  for (Rigid3& step : steps) step = step * last_->cam_from_world;
   return steps;
 }
 
