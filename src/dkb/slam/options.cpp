@@ -10,7 +10,7 @@
 namespace dkb {
 
 void PipelineOptions::check() const {
-  require_option(mapper_latency >= 1, "pipeline.mapper_latency", mapper_latency, "at least 1 frame");
+  require_option(mapper_latency > 0, "pipeline.mapper_latency", mapper_latency, "greater than 0 s");
   require_option(mapper_queue >= 1, "pipeline.mapper_queue", mapper_queue, "at least 1");
 }
 
@@ -93,10 +93,10 @@ void bind_settings(Settings& s, SlamOptions& o) {
          "on the noise of visual-odometry points; 0 = without them");
   s.bind("tracking.match_distance", &t.match_distance, "[bits] of a match with a map point");
   s.bind("tracking.match_ratio", &t.match_ratio, "best over second best distance of such a match");
-  s.bind("tracking.established_frames", &t.established_frames,
-         "[frames] since its birth before a point may be found where a mover is");
-  s.bind("tracking.refresh_frames", &t.refresh_frames, "[frames] between choices of local map points, at most");
-  s.bind("tracking.new_map_after", &t.new_map_after, "[frames] lost in a row until a new map is started; 0 = never");
+  s.bind("tracking.established_after", &t.established_after,
+         "[s] since its birth before a point may be found where a mover is");
+  s.bind("tracking.refresh_after", &t.refresh_after, "[s] between choices of local map points, at most");
+  s.bind("tracking.new_map_after", &t.new_map_after, "[s] lost in a row until a new map is started; 0 = never");
   RelocalisationOptions& r = t.relocalisation;
   s.bind("tracking.relocalisation.candidates", &r.candidates, "look-alike keyframes that a lost tracker tries");
   s.bind("tracking.relocalisation.neighbours", &r.neighbours, "covisible keyframes matched along with each");
@@ -224,14 +224,13 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("loop.edge_rotation_growth", &l.edge_rotation_growth, "[rad/m] and its growth");
   s.bind("loop.edge_rotation_share", &l.edge_rotation_share, "[1] and its growth with the edge's turn");
   s.bind("loop.graph_iterations", &l.graph_iterations, "steps of the pose graph's optimisation");
-  s.bind("loop.latency", &o.loop_closing.loop_latency.base, "[frames] from a keyframe's view to its correction ...");
-  s.bind("loop.latency_per_keyframe", &o.loop_closing.loop_latency.per_keyframe, "... and its growth with the map");
+  s.bind("loop.latency", &o.loop_closing.loop_latency.base, "[s] until the result is used");
+  s.bind("loop.latency_per_keyframe", &o.loop_closing.loop_latency.per_keyframe, "[s] more for each keyframe of the map");
   GlobalBaOptions& g = o.loop_closing.global_ba;
   s.bind("global_ba.iterations_first", &g.iterations_first, "[steps] before outliers are told apart");
   s.bind("global_ba.iterations_second", &g.iterations_second, "[steps] after");
-  s.bind("global_ba.latency", &o.loop_closing.global_ba_latency.base, "[frames] until the result is used ...");
-  s.bind("global_ba.latency_per_keyframe", &o.loop_closing.global_ba_latency.per_keyframe,
-         "... and its growth with the map");
+  s.bind("global_ba.latency", &o.loop_closing.global_ba_latency.base, "[s] until the result is used");
+  s.bind("global_ba.latency_per_keyframe", &o.loop_closing.global_ba_latency.per_keyframe, "[s] more for each keyframe of the map");
   s.bind("global_ba.final", &o.final_ba, "adjust the whole map once more at the end");
 
   s.bind("readout.estimate", &o.readout.estimate, "learn the rolling shutter's readout where the camera's is unknown");
@@ -292,8 +291,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dynamics.points_per_box", &d.carried.points_per_box, "features followed to carry a box");
   s.bind("dynamics.missed_results", &d.carried.missed_results,
          "detector results that may miss an object before its box is dropped");
-  s.bind("dynamics.evidence_observations", &o.evidence.min_observations,
-         "times on a mover before a map point is retracted");
+  s.bind("dynamics.evidence_seconds", &o.evidence.seconds, "[s] on a mover before a map point is retracted");
 
   DenseOptions& v = o.dense;
   s.bind("dense.voxel", &v.voxel, "[m] side of a voxel of the dense map (--dense)");
@@ -312,7 +310,7 @@ void bind_settings(Settings& s, SlamOptions& o) {
   s.bind("dense.threads", &v.threads, "of the fusion; the result does not depend on it");
 
   s.bind("pipeline.mapper_latency", &o.pipeline.mapper_latency,
-         "[frames] after which a keyframe's mapping becomes visible");
+         "[s] after which a keyframe's mapping becomes visible, in whole frames");
   s.bind("pipeline.mapper_queue", &o.pipeline.mapper_queue, "[keyframes] outstanding at most in a real-time run");
 }
 

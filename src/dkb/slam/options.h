@@ -26,7 +26,7 @@ namespace dkb {
 struct PipelineOptions {
   bool threaded = true;    // mapping on its own thread; false: the same bytes from one thread
   bool realtime = false;   // never wait for mapping; take its results when they are there
-  int mapper_latency = 2;  // [frames] after which a keyframe's mapping becomes visible to tracking, >= 1
+  double mapper_latency = 0.06;  // [s] after which mapping becomes visible to tracking, in whole frames, > 0
   int mapper_queue = 4;    // [keyframes] outstanding at most in a real-time run, >= 1
   void check() const;
 };
