@@ -18,5 +18,6 @@ install(FILES ${PROJECT_BINARY_DIR}/dkb_slamConfig.cmake ${PROJECT_BINARY_DIR}/d
   DESTINATION ${package_dir})
 
 file(RELATIVE_PATH prefix_from_pc ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" prefix_from_pc ${prefix_from_pc})
 configure_file(${CMAKE_CURRENT_LIST_DIR}/dkb_slam.pc.in ${PROJECT_BINARY_DIR}/dkb_slam.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/dkb_slam.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

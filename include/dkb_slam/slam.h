@@ -118,7 +118,7 @@ class DKB_SLAM_API Slam {
   std::vector<TrajectoryFrame> keyframes() const;
   Statistics statistics() const;  ///< stages of other threads are complete after finish()
 
-  /// The dense map of the still world, from the keyframes so far; Options::dense_map must be on. Takes seconds.
+  /// The still world from the keyframes so far; takes seconds. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
 
   /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is
