@@ -11,7 +11,7 @@ SOURCES = $(shell git ls-files '*.cpp' '*.h' '*.inl')
 # ThreadSanitizer's shadow memory collides with address-space randomisation on recent kernels.
 NO_ASLR := $(shell setarch $$(uname -m) -R true 2>/dev/null && echo setarch $$(uname -m) -R)
 
-.PHONY: help deps build demo test test-san test-asan test-tsan bench format lint clean install
+.PHONY: help deps build demo test test-san test-asan test-tsan bench docs format lint clean install
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(firstword $(MAKEFILE_LIST)) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -19,11 +19,17 @@ help:  ## List the targets
 deps:  ## Install missing packages (Debian 12, Ubuntu 22.04 and newer)
 	@bash scripts/deps.sh
 
-build: deps  ## Release build of the executable: build/apps/dkb-slam
-	cmake --preset release
-	cmake --build build --target dkb-slam -j $(JOBS)
+# These two install no packages: they name the missing ones.
+build:  ## Release build of the executable and the library: build/apps/dkb-slam, build/lib
+	@bash scripts/deps.sh check
+	cmake --preset program
+	cmake --build build --target dkb-slam dkb_shared dkb_static -j $(JOBS)
 
-demo: build  ## Simulate a sequence with people, run SLAM on it, score it: demo/
+install: build  ## Install the executable and the library under PREFIX (/usr/local)
+	cmake --install build --prefix $(PREFIX)
+
+demo: deps  ## Simulate a sequence with people, run SLAM on it, score it: demo/
+	@$(MAKE) --no-print-directory build
 	bash scripts/demo.sh $(DKB_SLAM) demo
 
 test: deps  ## Release build of everything, then all tests
@@ -55,6 +61,11 @@ bench: deps  ## Build and run the benchmarks (DKB_DATA=folder of real sequences)
 	for program in $(filter-out $(NEED_SEQUENCES),$(wildcard bench/*_bench.cpp)); do \
 	  name=$$(basename "$$program" .cpp); "build-bench/bench/$$name"; done
 
+docs:  ## Site of the library and the documents: build/docs/html/index.html
+	@bash scripts/deps.sh docs
+	@mkdir -p build/docs
+	DKB_SLAM_VERSION=$$(sed -n 's/.*define DKB_SLAM_VERSION "\(.*\)"/\1/p' include/dkb_slam/version.h) doxygen docs/Doxyfile
+
 format:  ## Format the C++ sources in place
 	@bash scripts/deps.sh lint
 	clang-format -i $(SOURCES)
@@ -63,11 +74,6 @@ lint:  ## Check format, clang-tidy and cppcheck
 	@bash scripts/deps.sh lint
 	cmake --preset lint
 	bash scripts/lint.sh build-lint $(JOBS)
-
-install: deps  ## Install the executable and the library under PREFIX (/usr/local)
-	cmake --preset release
-	cmake --build build -j $(JOBS)
-	cmake --install build --prefix $(PREFIX)
 
 clean:  ## Remove every build folder and the demo's output
 	rm -rf build build-asan build-tsan build-bench build-lint demo

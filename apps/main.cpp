@@ -9,6 +9,7 @@
 #include "bench/bench_command.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "dkb_slam/version.h"
 #include "eval/eval_command.h"
 #include "map_command.h"
 #include "run_command.h"
@@ -57,7 +58,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
 
 int main(int argc, char** argv) {
   CLI::App app("Real-time RGB-D SLAM that withstands people in the picture (DKB-SLAM)", "dkb-slam");
-  app.set_version_flag("--version", "dkb-slam " DKB_VERSION);
+  app.set_version_flag("--version", "dkb-slam " DKB_SLAM_VERSION);
   app.require_subcommand(1);
   int exit_code = 0;
   try {

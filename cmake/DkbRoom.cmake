@@ -18,22 +18,22 @@ endif()
 
 # dkb_room(NAME [NOT_INSTALLED] SOURCES a.cpp ... TESTS a_test.cpp ... DEPENDS lower rooms and libraries PRIVATE_DEPENDS ... TEST_DEPENDS ...)
 #
-# One folder, one static library dkb_NAME, one test program dkb_NAME_test. A room names only rooms below it. A room that
-# is NOT_INSTALLED is no part of what users link.
+# One folder, one static library dkb_NAME, one test program dkb_NAME_test. A room names only rooms below it. The
+# executable and the tests link rooms; users link their objects as one library (Library.cmake), of which a room that is
+# NOT_INSTALLED is no part.
 function(dkb_room name)
   cmake_parse_arguments(ROOM "NOT_INSTALLED" "" "SOURCES;TESTS;DEPENDS;PRIVATE_DEPENDS;TEST_DEPENDS" ${ARGN})
   if(ROOM_SOURCES)
     add_library(dkb_${name} STATIC ${ROOM_SOURCES})
     set(scope PUBLIC)
-    target_link_libraries(dkb_${name} PRIVATE $<BUILD_INTERFACE:dkb_warnings> ${ROOM_PRIVATE_DEPENDS})
+    target_link_libraries(dkb_${name} PRIVATE dkb_warnings ${ROOM_PRIVATE_DEPENDS})
     set_target_properties(dkb_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   else()
     add_library(dkb_${name} INTERFACE)
     set(scope INTERFACE)
   endif()
-  target_include_directories(dkb_${name} ${scope} $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_include_directories(dkb_${name} ${scope} ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
   target_link_libraries(dkb_${name} ${scope} dkb_compile_options ${ROOM_DEPENDS})
-  set_target_properties(dkb_${name} PROPERTIES EXPORT_NAME ${name})
   if(NOT ROOM_NOT_INSTALLED)
     set_property(GLOBAL APPEND PROPERTY DKB_ROOMS dkb_${name})
   endif()

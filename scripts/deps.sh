@@ -4,15 +4,20 @@
 # and newer). Does nothing, without touching the network, when all of it is there.
 #
 #   scripts/deps.sh          what `make demo`, `make test` and `make bench` need
+#   scripts/deps.sh check    installs nothing: fails with one line when something is missing that `make build` needs
+#   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
 #   scripts/deps.sh slurm    the same and Slurm, for bench/slurm/one_node_cluster.sh
 #
 # DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
 set -euo pipefail
 
-packages=(
-  g++ cmake make ninja-build ccache
+needed=(
+  g++ cmake make ninja-build
   libeigen3-dev libpng-dev libjpeg-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libnanoflann-dev
+)
+packages=(
+  "${needed[@]}" ccache pkg-config
   # Tests and benchmarks only: the frameworks, and the references that fast code is compared with.
   libgtest-dev libbenchmark-dev libceres-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
@@ -20,15 +25,18 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
+  check) packages=("${needed[@]}") ;;
+  docs) packages=(doxygen) ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [lint|slurm]" >&2; exit 2 ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|docs|lint|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then
   echo "deps: not checked (DKB_SKIP_DEPS=1)"
   exit 0
 fi
+if [[ "${1:-}" == check ]] && ! command -v dpkg-query >/dev/null; then exit 0; fi  # CMake names what it does not find
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
   {
@@ -45,8 +53,12 @@ for package in "${packages[@]}"; do
   [[ " $status" == *" installed "* ]] || missing+=("$package")
 done
 if [[ ${#missing[@]} -eq 0 ]]; then
-  echo "deps: all packages are installed"
+  [[ "${1:-}" == check ]] || echo "deps: all packages are installed"
   exit 0
+fi
+if [[ "${1:-}" == check ]]; then
+  echo "error: missing: ${missing[*]}; \`make deps\` installs them (DKB_SKIP_DEPS=1: they are there, from elsewhere)" >&2
+  exit 1
 fi
 
 as_root=()

@@ -17,7 +17,7 @@ sed -nE 's/^ *"file": "([^"]*)",?$/\1/p' "$build/compile_commands.json" | grep -
 
 echo "== cppcheck"
 git ls-files 'src/*.cpp' 'apps/*.cpp' ':!*_test.cpp' |
-  cppcheck --file-list=- -I src --std=c++20 --language=c++ -j "$jobs" --quiet --inline-suppr \
+  cppcheck --file-list=- -I src -I include --std=c++20 --language=c++ -j "$jobs" --quiet --inline-suppr \
     --enable=warning,performance,portability --suppress=internalAstError --suppress=unknownMacro \
     --error-exitcode=1 || result=1
 

@@ -2,6 +2,7 @@
 // Recorded by a hand-held Kinect (TUM fr1_xyz), where the sequence is at hand.
 #include <gtest/gtest.h>
 
+#include "dkb/util/test_data.h"
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -10,7 +11,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(RunRealData, FollowsEveryFrameOfAHandHeldKinect) {
-  const fs::path dataset = fs::path(DKB_SOURCE_DIR) / "../shared/data/rgbd_dataset_freiburg1_xyz";
+  const fs::path dataset = test_data() / "rgbd_dataset_freiburg1_xyz";
   if (!fs::exists(dataset / "associations.txt")) GTEST_SKIP() << "skipped: no recorded sequence at " << dataset;
   const TempFolder temp;
   const SlamRun run(dataset, temp / "out", {"--max-frames", "60"});

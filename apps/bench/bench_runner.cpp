@@ -23,6 +23,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/timing.h"
+#include "dkb_slam/version.h"
 
 namespace dkb::bench {
 namespace fs = std::filesystem;
@@ -443,7 +444,7 @@ RunnerReport run_jobs(const ResultsFolder& folder, const std::vector<Job>& jobs,
 std::string program_id(const fs::path& program) {
   uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
   for (const char c : read_file(program)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
-  return fmt::format("{} {:016x}", DKB_VERSION, hash);
+  return fmt::format("{} {:016x}", DKB_SLAM_VERSION, hash);
 }
 
 }  // namespace dkb::bench

@@ -24,7 +24,7 @@ struct Detection {
 
 /// What a detector says of one image: boxes, a mask, or both.
 struct Detections {
-  std::vector<Detection> boxes;
+  std::vector<Detection> boxes;  ///< what of a box belongs to the object is found by depth
   GreyImage mask;  ///< empty = none given; else of the image's size, 255 = on something that moves, 0 = not
   bool operator==(const Detections&) const = default;
 };
@@ -40,14 +40,16 @@ struct DetectorInput {
 /// Finds what may move in an image. Derive from it to plug in a detector of your own; it may be slow.
 /// One thread at a time calls an instance: the feeding thread when it is prompt, one of the library's when it is slow.
 /// Runs are repeatable as far as the same images in the same order give the same detections.
+/// Boxes outside the image and masks of another size are left out, with a warning (Event::Kind::warning).
 class DKB_SLAM_API Detector {
  public:
   virtual ~Detector() = default;
-  /// What it throws is counted as a warning. A slow detector that threw is not asked again until reset().
+  /// Looks at one image. What it throws becomes a warning, and tracking goes on without an answer; a slow detector that
+  /// threw is not asked again until Slam::reset().
   virtual Detections detect(const DetectorInput& image) = 0;
   /// "yolo", "file" ...: as written to statistics.
   virtual std::string kind() const = 0;
-  /// The next image is of another time or place.
+  /// The next image is of another time or place: Slam was made, reset or given a map.
   virtual void reset() {}
 };
 
@@ -60,7 +62,7 @@ struct DKB_SLAM_API DetectionSchedule {
 
 /// The detectors of one system.
 struct DKB_SLAM_API Detectors {
-  bool motion = true;                             ///< whatever moves against the still world, by depth; no model
+  bool motion = true;                             ///< what moves against the still world, by depth; needs no model
   std::vector<std::shared_ptr<Detector>> prompt;  ///< asked for every frame, on the feeding thread
   std::shared_ptr<Detector> slow;                 ///< asked on a thread of its own; its boxes and masks are carried
   DetectionSchedule schedule;                     ///< of the slow one
@@ -77,7 +79,7 @@ struct DetectorChoice {
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
   std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
   std::vector<int64_t> stamps_ns;  ///< of the images to come: the masks' stamps are held against them
-  int every = 0, latency = 0;      ///< [frames] of the network; 0 = by the model's size
+  int every = 0, latency = 0;      ///< [frames] the network's DetectionSchedule; 0 = by the model's size
 };
 
 /// The detectors of that choice. A network runs by OpenCV's DNN module, loaded when the first one is made.

@@ -33,29 +33,29 @@ struct FrameInput {
   ImageView colour;      ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
   ImageView depth;       ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
   std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image; nothing = the colour image's
-  std::optional<MotionPrior> prior = {};
+  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion
 };
 
 /// A pair of images, checked, copied and never changed again. Copies of it share the images. A frame may be made on
 /// another thread than the one that feeds it to Slam, so that converting costs the tracking thread nothing.
 class DKB_SLAM_API Frame {
  public:
-  Frame() = default;
+  Frame() = default;  ///< empty
   /// Throws InputError when an image is missing, has another size than the camera, a stride below its width, or a
   /// format that does not fit, and when a number of the prior is not finite.
   Frame(const Camera& camera, const FrameInput& input);
   /// The library's own readers enter here.
   explicit Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns);
 
-  bool empty() const { return image_ == nullptr; }
-  int64_t stamp_ns() const { return stamp_ns_; }
-  int64_t depth_stamp_ns() const { return depth_stamp_ns_; }
+  bool empty() const { return image_ == nullptr; }            ///< it holds no images
+  int64_t stamp_ns() const { return stamp_ns_; }              ///< of the colour image
+  int64_t depth_stamp_ns() const { return depth_stamp_ns_; }  ///< of the depth image
   const std::optional<MotionPrior>& prior() const { return prior_; }
   void set_prior(const std::optional<MotionPrior>& prior) { prior_ = prior; }
   ImageView colour() const;  ///< rgb8; empty for grey cameras. Valid as long as a copy of the frame lives
   ImageView grey() const;    ///< grey8, likewise
   ImageView depth() const;   ///< depth_f32, likewise
-  const std::shared_ptr<const RgbdImage>& image() const { return image_; }
+  const std::shared_ptr<const RgbdImage>& image() const { return image_; }  ///< the library's own
 
  private:
   std::shared_ptr<const RgbdImage> image_;
@@ -63,6 +63,7 @@ class DKB_SLAM_API Frame {
   std::optional<MotionPrior> prior_;
 };
 
+/// What tracking made of a frame.
 enum class TrackingState {
   initialising,  ///< no map yet
   tracking,      ///< the pose is good
@@ -105,23 +106,23 @@ DKB_SLAM_API const char* name_of(FeatureReason reason);
 
 /// One feature that a frame extracted.
 struct FeatureReport {
-  float image_x = 0, image_y = 0;  ///< [px] of the image as read
-  FeatureState state = FeatureState::unused;
-  FeatureReason reason = FeatureReason::none;
+  float image_x = 0, image_y = 0;              ///< [px] of the original image, distortion and all
+  FeatureState state = FeatureState::unused;   ///< what became of it
+  FeatureReason reason = FeatureReason::none;  ///< of state `outlier` or `dynamic`
 };
 
 /// Durations of one stage, by the steady clock.
 struct StageSummary {
-  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;
-  size_t count = 0;
+  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;  ///< [ms]
+  size_t count = 0;                                           ///< how often it ran
 };
 
 /// Everything of one frame.
 struct FrameResult {
-  int frame = 0;         ///< counts the frames that were accepted, from 0
-  int64_t stamp_ns = 0;  ///< the input's
-  TrackingState state = TrackingState::initialising;
-  /// Camera axes: x right, y down, z forward. World: the first tracked camera, or the robot's base there
+  int frame = 0;                                      ///< counts the frames that were accepted, from 0
+  int64_t stamp_ns = 0;                               ///< the input's
+  TrackingState state = TrackingState::initialising;  ///< what the rest may be used for
+  /// The pose. Camera axes: x right, y down, z forward. World: the first tracked camera, or the robot's base there
   /// (Options::base_from_cam). There is a pose when tracked().
   std::optional<Rigid3> world_from_cam;
   std::optional<Rigid3> odom_from_cam;  ///< smooth: does not jump when the map is corrected; steer by this
@@ -138,6 +139,7 @@ struct FrameResult {
   double tracking_ms = 0;               ///< steady clock: own work on this frame
   double waiting_ms = 0;                ///< for mapping and the detector; 0 in a real-time run, but for the first frame
 
+  /// There is a pose.
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
 };
 

@@ -23,10 +23,10 @@ struct Rigid3 {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();         ///< [m]
 
   Rigid3() = default;
-  Rigid3(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) : rotation(q), translation(t) {}
+  Rigid3(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) : rotation(q), translation(t) {}  ///< q of unit norm
 
-  Eigen::Matrix3d matrix3() const { return rotation.toRotationMatrix(); }
-  Rigid3 inverse() const {
+  Eigen::Matrix3d matrix3() const { return rotation.toRotationMatrix(); }  ///< of the rotation
+  Rigid3 inverse() const {                                                 ///< a_from_b of a b_from_a
     const Eigen::Quaterniond q = rotation.conjugate();
     return {q, -(q * translation)};
   }

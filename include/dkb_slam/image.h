@@ -27,14 +27,14 @@ DKB_SLAM_API int bytes_per_pixel(PixelFormat format);
 /// Somebody else's pixels. The library reads them during the call that is given the view, never later and never
 /// outside of height rows of `stride` bytes.
 struct ImageView {
-  const void* data = nullptr;
-  int width = 0, height = 0;  ///< [px]
-  size_t stride = 0;          ///< [bytes] from a row to the next; 0 = rows are packed
-  PixelFormat format = PixelFormat::rgb8;
+  const void* data = nullptr;              ///< the first byte of the top row
+  int width = 0, height = 0;               ///< [px]
+  size_t stride = 0;                       ///< [bytes] from a row to the next; 0 = rows are packed
+  PixelFormat format = PixelFormat::rgb8;  ///< of every pixel
 
   bool empty() const { return data == nullptr; }
   size_t row_bytes() const { return static_cast<size_t>(width) * static_cast<size_t>(bytes_per_pixel(format)); }
-  const uint8_t* row(int y) const {
+  const uint8_t* row(int y) const {  ///< the first byte of row y
     return static_cast<const uint8_t*>(data) + static_cast<size_t>(y) * (stride == 0 ? row_bytes() : stride);
   }
 };
@@ -87,8 +87,8 @@ struct Box {
 
 /// Where in an image something moves, or may: square cells of `cell` px, 255 = mover. Empty = nothing known to move.
 struct MoverMask {
-  int cell = 4;  ///< [px]
-  Image<uint8_t> cells;
+  int cell = 4;          ///< [px] side of a cell
+  Image<uint8_t> cells;  ///< cell (x, y) covers the pixels from (cell * x, cell * y)
 
   bool empty() const { return cells.empty(); }
   /// Whether a pixel of the original image lies in a marked cell.

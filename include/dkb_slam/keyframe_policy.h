@@ -23,22 +23,22 @@ struct TrackedPoint {
 
 /// What a rule may know of a tracked frame.
 struct KeyframeQuery {
-  int frame = 0;                  ///< index of the frame
-  int64_t stamp_ns = 0;           ///< of its colour image
-  int frames_since_keyframe = 0;  ///< since the last keyframe
-  double seconds_since_keyframe = 0;
-  bool mapper_idle = true;         ///< the last keyframe is in the map
-  int tracked_close_points = 0;    ///< points of the pose that are near enough for good depth
-  int creatable_close_points = 0;  ///< features near enough that show no map point yet
-  int reference_points = 0;        ///< points of the reference keyframe that other keyframes see as well
-  Rigid3 world_from_cam;
-  Rigid3 world_from_last_keyframe;   ///< the last keyframe's camera
-  std::vector<TrackedPoint> points;  ///< inliers of the pose
+  int frame = 0;                      ///< index of the frame
+  int64_t stamp_ns = 0;               ///< of its colour image
+  int frames_since_keyframe = 0;      ///< since the last keyframe
+  double seconds_since_keyframe = 0;  ///< [s] likewise
+  bool mapper_idle = true;            ///< the last keyframe is in the map
+  int tracked_close_points = 0;       ///< points of the pose that are near enough for good depth
+  int creatable_close_points = 0;     ///< features near enough that show no map point yet
+  int reference_points = 0;           ///< points of the reference keyframe that other keyframes see as well
+  Rigid3 world_from_cam;              ///< the frame's pose
+  Rigid3 world_from_last_keyframe;    ///< the last keyframe's camera
+  std::vector<TrackedPoint> points;   ///< inliers of the pose
 };
 
 /// The answer, with the numbers that led to it.
 struct KeyframeAnswer {
-  bool insert = false;
+  bool insert = false;      ///< the frame becomes a keyframe
   std::string explanation;  ///< for logs; may be empty
 };
 
@@ -47,8 +47,9 @@ struct KeyframeAnswer {
 class DKB_SLAM_API KeyframePolicy {
  public:
   virtual ~KeyframePolicy() = default;
+  /// What it throws leaves Slam::process(), as an InputError, and ends this world until reset() or load_map().
   virtual KeyframeAnswer decide(const KeyframeQuery& query) = 0;
-  /// The map starts anew.
+  /// The map starts anew: Slam was made, reset or given a map.
   virtual void reset() {}
 };
 

@@ -22,6 +22,7 @@ namespace dkb {
 
 /// Something that happened, for whoever does not look at every frame's result.
 struct Event {
+  /// What it was.
   enum class Kind {
     keyframe,  ///< a frame became a keyframe
     loop,      ///< a place was seen again, and the map moved
@@ -32,35 +33,40 @@ struct Event {
     warning,   ///< something a person should know; `text` says what
   };
   Kind kind = Kind::warning;
-  int frame = 0;         ///< index of the frame it came with
+  int frame = 0;         ///< index of the frame it came with, as in FrameResult
   int64_t stamp_ns = 0;  ///< of that frame
   int keyframe = -1;     ///< of keyframe, loop and merge
-  std::string text;
+  std::string text;      ///< one line for people, may be empty; of warnings what is wrong
 };
 DKB_SLAM_API const char* name_of(Event::Kind kind);
 
 /// A frame of the trajectory.
 struct TrajectoryFrame {
-  int frame = 0;  ///< below 0: a keyframe of the map that was loaded
-  int64_t stamp_ns = 0;
-  Rigid3 world_from_cam;
-  int map = 0;  ///< 0 = the first map; maps that were never joined have worlds of their own
+  int frame = 0;          ///< as in FrameResult; below 0: a keyframe of the map that was loaded
+  int64_t stamp_ns = 0;   ///< of the colour image
+  Rigid3 world_from_cam;  ///< as in FrameResult
+  int map = 0;            ///< 0 = the first map; maps that were never joined have worlds of their own
 };
 
+/// What has happened since the world began.
 struct Statistics {
-  int frames = 0, tracked = 0, lost = 0, relocalisations = 0;
-  int keyframes = 0, keyframes_inserted = 0;  ///< in the map now; ever made
-  int maps = 0;                               ///< that are not joined
-  int loops = 0, merges = 0;
-  size_t map_points = 0;
-  int points_created = 0, points_culled = 0, points_fused = 0, points_retracted = 0, keyframes_culled = 0;
-  std::map<std::string, int> keyframe_rules;  ///< keyframes by the rule that made them
-  std::map<std::string, int> keyframe_tests;  ///< how often each test of the rule spoke for a keyframe
-  long features_removed = 0;                  ///< features that the filter kept from tracking
-  std::string detector = "none";              ///< kinds, joined by +
-  double detector_rate_hz = 0;                ///< answers of the slow detector per second of the sequence
-  int detector_latency_frames = 0;
-  std::map<std::string, StageSummary> stages;
+  int frames = 0, tracked = 0, lost = 0;       ///< accepted; with a pose; without one although there is a map
+  int relocalisations = 0;                     ///< how often a lost camera was found
+  int keyframes = 0, keyframes_inserted = 0;   ///< in the map now; ever made
+  int maps = 0;                                ///< that are not joined
+  int loops = 0, merges = 0;                   ///< places seen again; maps joined
+  size_t map_points = 0;                       ///< in the map now
+  int points_created = 0, points_culled = 0;   ///< map points ever made; taken out because too few frames found them
+  int points_fused = 0;                        ///< joined with another that is the same
+  int points_retracted = 0;                    ///< taken out because they lie on something that moves
+  int keyframes_culled = 0;                    ///< taken out because others show the same
+  std::map<std::string, int> keyframe_rules;   ///< keyframes by the rule that made them
+  std::map<std::string, int> keyframe_tests;   ///< how often each test of the rule spoke for a keyframe
+  long features_removed = 0;                   ///< features that the filter kept from tracking
+  std::string detector = "none";               ///< kinds, joined by +
+  double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
+  int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
+  std::map<std::string, StageSummary> stages;  ///< times by stage: "tracking", "mapping", "wait_mapper" ...
 };
 
 /// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map() and the switches.
@@ -83,7 +89,7 @@ class DKB_SLAM_API Slam {
 
   /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise.
   FrameResult process(const FrameInput& input);
-  FrameResult process(const Frame& frame);
+  FrameResult process(const Frame& frame);  ///< likewise
 
   /// Waits for all outstanding work and takes its result: trajectory and map are complete then. process() may go on.
   void finish();
@@ -112,7 +118,7 @@ class DKB_SLAM_API Slam {
   std::vector<TrajectoryFrame> keyframes() const;
   Statistics statistics() const;  ///< stages of other threads are complete after finish()
 
-  /// The dense map of the still world, from the keyframes so far; Options::dense_map must be on. Takes seconds.
+  /// The still world from the keyframes so far; takes seconds. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
 
   /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is
@@ -124,8 +130,8 @@ class DKB_SLAM_API Slam {
   /// What the callback throws leaves process(). An empty callback ends it.
   void on_event(std::function<void(const Event&)> callback, Executor executor = {});
 
-  const Camera& camera() const;
-  const Options& options() const;
+  const Camera& camera() const;    ///< as given
+  const Options& options() const;  ///< as given
 
  private:
   class Impl;

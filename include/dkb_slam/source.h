@@ -22,18 +22,20 @@ enum class SourceState {
   ended,      ///< there is nothing more
 };
 
+/// What Source::next() answers.
 struct SourceFrame {
-  SourceState state = SourceState::ended;
-  Frame frame;        ///< when state is `frame`
-  size_t index = 0;   ///< of the pair in its recording; skipped pairs count
-  std::string stamp;  ///< the colour image's, as its recording writes it [s]
-  std::string note;   ///< why it was skipped
+  SourceState state = SourceState::ended;  ///< what there is
+  Frame frame;                             ///< when state is `frame`
+  size_t index = 0;                        ///< of the pair in its recording; skipped pairs count
+  std::string stamp;                       ///< the colour image's, as its recording writes it [s]
+  std::string note;                        ///< why it was skipped
 };
 
 /// Gives frames one after the other. One thread at a time calls next().
 class DKB_SLAM_API Source {
  public:
   virtual ~Source() = default;
+  /// The same for all frames.
   virtual const Camera& camera() const = 0;
   /// Waits for the next frame. The end and a device that is gone are states and no exceptions.
   virtual SourceFrame next() = 0;
@@ -45,6 +47,7 @@ class DKB_SLAM_API Source {
   virtual std::string description() const = 0;
 };
 
+/// Which camera, and which of a recording's pairs.
 struct FolderOptions {
   std::string camera;  ///< a camera file or a name (fr1, fr2, fr3, bonn); empty = camera.yaml in the folder, else by
                        ///< the folder's name

@@ -12,6 +12,7 @@
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_data.h"
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
@@ -157,7 +158,7 @@ TEST_F(RgbdReaderTest, OptionsOutOfRangeAreRefused) {
 }
 
 TEST(RgbdReaderRealData, ReadsARecordedSequence) {
-  const fs::path folder = fs::path(DKB_SHARED_DATA) / "rgbd_dataset_freiburg1_xyz";
+  const fs::path folder = test_data() / "rgbd_dataset_freiburg1_xyz";
   if (!fs::exists(folder)) GTEST_SKIP() << "skipped: no recorded sequence at hand";
   TumDataset dataset = open_tum_dataset(folder);
   EXPECT_EQ(dataset.pairs.size(), 261u);

@@ -15,6 +15,7 @@
 #include "dkb/detection/onnx_graph_test_util.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_data.h"
 
 namespace dkb {
 namespace {
@@ -219,7 +220,7 @@ TEST_F(OnnxDetectorTest, InputsThatAreNoFloatImageAreRefused) {
 
 // Real weights and images, where they are.
 
-const fs::path kData = fs::path(DKB_SOURCE_DIR) / ".." / "shared" / "data";
+const fs::path kData = test_data();
 
 RgbdImage read_jpeg(const fs::path& path) {
   const std::string bytes = read_file(path);

@@ -10,6 +10,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_data.h"
 
 namespace dkb {
 namespace {
@@ -163,7 +164,7 @@ TEST(RpeDelta, IsANumberWithItsUnit) {
 }
 
 TEST(Evaluate, AgreesWithTheReferenceOnARecordedTrajectory) {
-  const fs::path folder = fs::path(DKB_SHARED_DATA) / "trajectories";
+  const fs::path folder = test_data() / "trajectories";
   if (!fs::exists(folder)) GTEST_SKIP() << "skipped: no recorded trajectories at hand";
   const Evaluation e =
       evaluate(read_trajectory(folder / "fr2_desk_groundtruth.txt"), read_trajectory(folder / "fr2_desk_ORB.txt"));

@@ -16,6 +16,7 @@
 #include "dkb/features/orb_extractor.h"
 #include "dkb/place/place_index.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_data.h"
 
 namespace dkb {
 namespace {
@@ -81,7 +82,7 @@ double distance(const std::array<double, 3>& a, const std::array<double, 3>& b) 
 }
 
 TEST(PlaceIndexOnRealFrames, FindsTheDeskAgain) {
-  const fs::path data = fs::path(DKB_SOURCE_DIR) / ".." / "shared" / "data";
+  const fs::path data = test_data();
   const fs::path desk = data / "rgbd_dataset_freiburg1_xyz",
                  office = data / "rgbd_dataset_freiburg3_walking_halfsphere";
   if (!fs::exists(desk / "rgb.txt") || !fs::exists(office / "rgb.txt")) GTEST_SKIP() << "skipped: no TUM sequences";
