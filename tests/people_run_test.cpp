@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // People through the whole program, by every kind of detector: poses, features and map against the simulator's truth.
 //
-// What wrong wiring measures on this sequence, and what the kinds below measure:
-//                                                  APE [mm]  leak       lost         map points on people
-//   no filter                                      46        .34        .09          98
-//   boxes 200 px beside the people                 48        .26        .09
-//   boxes of 15 frames before                       9        .10        .09
-//   boxes with x and y swapped                     25        .32        .09
-//   masks inverted (38 of 90 frames lost)         287        .45       1.00
-//   masks of the frame before, of 5 frames before   5, 8     .009, .06  .10, .09
-//   masks mirrored, upside down                    37, 8     .26, .035  .08, .17
-//   all of a box left out                           -        .00       1.00
-//   motion, boxes, masks, motion with boxes         5 ... 6  .000 ... .006  .06 ... .09  0
-//   networks, answering after 3 or 4 frames         5 ... 6  .014 ... .050  .05 ... .09  0
+// What right wiring measures on this sequence (six seeds, each with one pair less at the start), and what wrong wiring
+// does (one seed, the first row six). Limits lie between, nearer to the right ones.
+//                                            APE [mm]    leak           lost        map points on people
+//   motion, boxes, masks, motion with boxes   5 ... 7    .000 ... .006  .06 ... .09    0 ... 4
+//   networks, answers after 3 or 4 frames     5 ... 6    .017 ... .050  .07 ... .09    0 ... 8
+//   every 12th frame, answer after 8          8 ... 9    .050 ... .090  .07 ... .09    0 ... 10
+//   no filter                                39 ... 50   .34 ... .36    .05 ... .09   67 ... 110
+//   all of each box left out                  5          .001           .57            5
+//   boxes 200 px beside the people           48          .26            .09           82
+//   boxes of 15 frames before                 9          .10            .09
+//   boxes with x and y swapped               25          .32            .09
+//   boxes for one of two people              20          .22            .09
+//   masks inverted (53 of 90 frames tracked) 287         .45           1.00          223
+//   masks of the frame before                 5          .009           .10            0
+//   masks of 5 frames before                  8          .058           .09           14
+//   masks mirrored                           37          .26            .09
+//   masks upside down                         8          .035           .17
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -66,13 +71,13 @@ void expect_people_kept_out(const PeopleRun& run, double leak) {
   EXPECT_EQ(run.stats.at("frames"), kPeopleFrames);
   EXPECT_EQ(run.stats.at("lost"), 0);
   EXPECT_EQ(run.stats.at("maps"), 1);
-  EXPECT_LT(run.ape, 0.012);
-  EXPECT_LT(run.online_ape, 0.012);
+  EXPECT_LT(run.ape, 0.015) << "[m]";
+  EXPECT_LT(run.online_ape, 0.015) << "[m]";
   EXPECT_GT(run.features.on_people, 4000);
   EXPECT_LT(run.features.leak, leak);
   EXPECT_GT(run.features.in_boxes, 4000);
   EXPECT_LT(run.features.lost, 0.2);
-  EXPECT_LE(run.map_points_on_people, 5);
+  EXPECT_LT(run.map_points_on_people, 20);
 }
 
 // In real time what is left out depends on the machine: accuracy is asked of a run that had the time, the rest always.
@@ -115,14 +120,37 @@ TEST_P(People, StayOutInRealTime) {
 INSTANTIATE_TEST_SUITE_P(By, People, ::testing::Values("motion", "boxes", "masks", "motion_with_boxes"),
                          [](const auto& p) { return std::string(p.param); });
 
-TEST(PeopleByMasks, StayOutOfAMapThatStartsWithThemInView) {
-  const TempFolder temp;
-  const PeopleRun run(temp / "out", people_detector("masks"), {"--start", "1.2"});
+class PeopleInViewAtTheStart : public People {};
+
+TEST_P(PeopleInViewAtTheStart, StayOutOfPosesFeaturesAndMap) {
+  const PeopleRun run(temp / "out", people_detector(GetParam()), {"--start", "1.2"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   EXPECT_EQ(run.stats.at("tracked"), run.stats.at("frames"));
-  EXPECT_LT(run.ape, 0.012) << "0.057 without a filter";
+  EXPECT_LT(run.ape, 0.015) << "[m]; 0.057 without a filter";
   EXPECT_LT(run.features.leak, 0.005) << "0.30 without a filter";
-  EXPECT_LE(run.map_points_on_people, 5);
+  EXPECT_LT(run.map_points_on_people, 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(By, PeopleInViewAtTheStart, ::testing::Values("masks"),
+                         [](const auto& p) { return std::string(p.param); });
+
+TEST(PeopleByMotionAndBoxes, AreFoundByEither) {
+  const TempFolder temp;
+  std::string boxes_of_one;
+  for (const MoverRow& row : read_movers(people_sequence() / "movers.csv")) {
+    const Box& b = row.mover.box;
+    if (row.mover.id != 1) continue;
+    boxes_of_one += row.stamp + " person";
+    for (const float v : {b.x, b.y, b.w, b.h}) boxes_of_one += " " + std::to_string(v);
+    boxes_of_one += "\n";
+  }
+  write_text(temp / "boxes.txt", boxes_of_one);
+  const PeopleRun run(temp / "out", {"--detector", "motion+file", "--boxes", temp / "boxes.txt"});
+  expect_people_kept_out(run, 0.015);  // by these boxes alone 0.22
+  std::map<std::string, int> movers;
+  for (const MoverRow& row : read_movers(run.out / "movers.csv")) ++movers[row.mover.class_name];
+  EXPECT_GT(movers["person"], 20) << "as the boxes say";
+  EXPECT_GT(movers["object"], 20) << "that is all that motion knows";
 }
 
 // A network answers some frames later: boxes are carried, masks come late, points are retracted.
@@ -137,7 +165,7 @@ TEST_P(PeopleByAnyNetwork, StayOutOfPosesFeaturesAndMap) {
   const Arguments detector = people_detector(GetParam());
   if (detector.empty()) GTEST_SKIP() << no_people_detector(GetParam());
   const PeopleRun run(temp / "out", detector);
-  expect_people_kept_out(run, 0.08);
+  expect_people_kept_out(run, 0.1);
   EXPECT_EQ(run.stats.at("tracked"), kPeopleFrames);
   EXPECT_EQ(run.stats.at("detector").at("kind"), "yolo");
 }
@@ -154,6 +182,21 @@ TEST_F(PeopleByNetwork, AreRetractedWhenTheAnswerIsLate) {
   EXPECT_GT(run.stats.at("dynamic").at("points_retracted"), 50);
 }
 
+// Later answers come eight frames after their image; the first is used at once.
+TEST_F(PeopleByNetwork, AreKeptOutFromTheFirstFrameOn) {
+  const Arguments detector = people_detector("yolov5n_320x256");
+  if (detector.empty()) GTEST_SKIP() << no_people_detector("yolov5n_320x256");
+  for (const std::string pace : {"--threads=1", "--realtime"}) {
+    const SlamRun run(people_sequence(), temp / pace,
+                      PeopleRun::joined(detector, {pace, "--start", "0.7", "--max-frames", "4", "--detect-every", "12",
+                                                   "--detect-latency", "8"}));
+    ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+    const FeatureUse features = feature_use(people_sequence(), read_features(run.out / "features.csv"), 0);
+    EXPECT_GT(features.on_people, 100);
+    EXPECT_LT(features.leak, 0.2) << pace << "; 0.37 when nobody waits";
+  }
+}
+
 TEST_F(PeopleByNetwork, AndByMotionStayOutBetweenAnswers) {
   const Arguments detector = people_detector("yolov5n_320x256_with_motion");
   if (detector.empty()) GTEST_SKIP() << no_people_detector("yolov5n_320x256");
@@ -168,7 +211,7 @@ TEST_F(PeopleByNetwork, StayOutInRealTime) {
   expect_all_accounted_for(run);
   // Ten answers a second are wanted, as many as the sequence at rest gets.
   if (!kept_pace(run) || run.stats.at("detector").at("rate_hz") < 9) GTEST_SKIP() << kTooBusy;
-  expect_people_kept_out(run, 0.12);
+  expect_people_kept_out(run, 0.1);
 }
 
 // What the tests above could not tell from right wiring would make them worthless.
@@ -209,7 +252,7 @@ TEST(PeopleControl, MasksOfEarlierFramesAreNoticed) {
     for (size_t i = before; i < rows.size(); ++i)
       fs::create_symlink(people_sequence() / "masks" / (rows[i - before][0] + ".png"), masks / (rows[i][0] + ".png"));
     const PeopleRun run(temp / ("out" + std::to_string(before)), {"--masks", masks});
-    EXPECT_GT(run.features.leak, before == 1 ? 0.006 : 0.03) << before;
+    EXPECT_GT(run.features.leak, before == 1 ? 0.005 : 0.03) << before;
   }
 }
 

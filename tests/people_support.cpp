@@ -107,12 +107,12 @@ FeatureRows read_features(const fs::path& csv) {
   return features;
 }
 
-FeatureUse feature_use(const fs::path& dataset, const FeatureRows& features) {
+FeatureUse feature_use(const fs::path& dataset, const FeatureRows& features, int skipped) {
   const auto boxes = read_boxes(dataset / "boxes.txt");
   FeatureUse result;
   int leaked = 0, used_in_boxes = 0, outside = 0, used_outside = 0, frame = 0;
   for (const auto& [stamp, rows] : features) {
-    if (frame++ < 10) continue;
+    if (frame++ < skipped) continue;
     const Silhouettes people(read_grey(dataset / "masks" / (stamp + ".png")));
     const auto boxes_here = boxes.find(stamp);
     for (const FeatureRow& f : rows) {

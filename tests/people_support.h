@@ -30,14 +30,14 @@ using FeatureRows = std::map<std::string, std::vector<FeatureRow>>;
 FeatureRows read_features(const std::filesystem::path& csv);
 
 // Which features a run used, by the true masks and boxes. Corners within 2 px of the rim of a silhouette inside, and 10
-// px outside, count for neither side; nor do the first ten frames.
+// px outside, count for neither side; nor do the first `skipped` frames.
 struct FeatureUse {
   int on_people = 0;  // features on people
   double leak = 0;    // share of these that was used
   int in_boxes = 0;   // features of the background inside people's boxes
   double lost = 0;    // 1 - used share of these / used share of the background outside; 1 when that is hardly used
 };
-FeatureUse feature_use(const std::filesystem::path& dataset, const FeatureRows& features);
+FeatureUse feature_use(const std::filesystem::path& dataset, const FeatureRows& features, int skipped = 10);
 
 // [m] points of map.ply, in the run's world.
 std::vector<Eigen::Vector3d> read_cloud(const std::filesystem::path& ply);
