@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "dkb/evaluation/trajectory_error.h"
+#include "dkb/util/test_data.h"
 
 namespace dkb::test {
 namespace fs = std::filesystem;
@@ -113,8 +114,7 @@ fs::path simulated(const fs::path& folder, const std::vector<std::string>& argum
 }
 
 fs::path outside_data(const std::string& name) {
-  const char* named = std::getenv("DKB_DATA");
-  const fs::path path = fs::path(named != nullptr ? named : DKB_SHARED_DATA) / name;
+  const fs::path path = test_data() / name;
   return fs::exists(path) ? path : fs::path();
 }
 
