@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
 
@@ -15,15 +13,6 @@ constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
 
 FrameIndex BackgroundLatency::operator()(int keyframes) const {
   return static_cast<FrameIndex>(std::ceil(base + per_keyframe * keyframes));
-}
-
-void LoopStageOptions::check() const {
-  loop.check();
-  global_ba.check();
-  for (const BackgroundLatency& l : {loop_latency, global_ba_latency}) {
-    require_option(l.base >= 1, "latency", l.base, "at least 1 frame");
-    require_option(l.per_keyframe >= 0, "latency_per_keyframe", l.per_keyframe, "at least 0 frames");
-  }
 }
 
 LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, const LocalBaOptions& local_ba,
@@ -45,18 +34,15 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
           },
           {.name = "loop search", .threaded = threaded, .priority = ThreadPriority::background}),
       adjustment_(
-          [optics, local_ba, ba = options.global_ba](const Task& task) {
+          [optics, local_ba](const Task& task) {
             const Stopwatch watch;
             Result result;
             result.generation = task.generation;
-            result.correction =
-                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, ba));
+            result.correction = std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba));
             result.ms = watch.ms();
             return result;
           },
-          {.name = "global bundle adjustment", .threaded = threaded, .priority = ThreadPriority::background}) {
-  options_.check();
-}
+          {.name = "global bundle adjustment", .threaded = threaded, .priority = ThreadPriority::background}) {}
 
 void LoopStage::offer(const MapView& view, FrameIndex now, bool may_skip) {
   const int keyframes = view->live_keyframe_count();

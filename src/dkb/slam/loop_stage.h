@@ -21,10 +21,8 @@ struct BackgroundLatency {
 
 struct LoopStageOptions {
   LoopOptions loop;
-  GlobalBaOptions global_ba;
   BackgroundLatency loop_latency{10, 0.02};
   BackgroundLatency global_ba_latency{15, 0.4};
-  void check() const;
 };
 
 // Loop closing and global bundle adjustment beside tracking and mapping, each on its own thread. Both work on views
