@@ -10,7 +10,6 @@
 namespace dkb {
 
 void DynamicsOptions::check() const {
-  rivals.check();
   motion.check();
   carried.check();
   require_option(support_cell >= 2 && support_cell <= 32, "dynamics.support_cell", support_cell, "2 ... 32 px");
