@@ -5,7 +5,6 @@
 #include <string>
 
 #include "dkb/dense/dense_options.h"
-#include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/features/rgbd_features.h"
@@ -45,7 +44,6 @@ struct SlamOptions {
   bool final_ba = false;  // adjust the whole map once more at the end
   DynamicsOptions dynamics;
   PointEvidenceOptions evidence;
-  MoverTrackerOptions movers;
   DenseOptions dense;
   bool dense_map = false;  // keep what the dense map is made of
   PipelineOptions pipeline;

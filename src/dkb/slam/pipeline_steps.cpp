@@ -40,7 +40,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
               options_.pipeline.realtime),
       evidence_(options_.evidence),
       readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
-      movers_(context.camera, options_.movers),
+      movers_(context.camera),
       odometry_(options_.base_from_cam),
       camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
