@@ -80,7 +80,7 @@ void time_stages(const GreyImage& image, const OrbOptions& options, Samples& sam
   FastCornerFinder finder;
   samples.time("fast", [&] {
     for (int i = 0; i < pyramid.levels(); ++i)
-      finder.find(pyramid.level(i), options.fast_threshold_min, options.border, corners[static_cast<size_t>(i)]);
+      finder.find(pyramid.level(i), options.fast_threshold_min, kOrbBorder, corners[static_cast<size_t>(i)]);
   });
   CornerSpread spread;
   samples.time("spread", [&] {
@@ -88,10 +88,10 @@ void time_stages(const GreyImage& image, const OrbOptions& options, Samples& sam
     for (int i = 0; i < pyramid.levels(); ++i) pixels += static_cast<double>(pyramid.level(i).size());
     for (int i = 0; i < pyramid.levels(); ++i) {
       const GreyImage& level = pyramid.level(i);
-      const int b = options.border;
+      const int b = kOrbBorder;
       const CornerRegion region{b, b, level.width() - b, level.height() - b};
       if (region.width() <= 0 || region.height() <= 0) continue;
-      spread.drop_weak(region, options.fast_threshold, options.cell_size, corners[static_cast<size_t>(i)]);
+      spread.drop_weak(region, options.fast_threshold, kOrbCellSize, corners[static_cast<size_t>(i)]);
       spread.keep(region, static_cast<int>(options.count * static_cast<double>(level.size()) / pixels),
                   corners[static_cast<size_t>(i)]);
     }

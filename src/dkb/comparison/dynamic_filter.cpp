@@ -6,6 +6,10 @@
 namespace dkb {
 namespace {
 
+constexpr double kMaxEpipolarDistance = 1.0;  // [px] of what stands still
+constexpr double kDepthJump = 0.4;  // [m] before what was seen there: something moved in (DynaSLAM, RA-L 2018)
+constexpr double kRadius = 15;      // [px] features so near to such a spot and at its depth are dynamic too
+
 // Distance [px] of the current pixel from the epipolar line of the previous one; 0 when the camera did not move.
 double epipolar_distance(const FilterFeature& f, const CameraModel& camera, const Rigid3& current_from_previous) {
   if (current_from_previous.translation.norm() < 1e-6) return 0;
@@ -67,26 +71,25 @@ std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::
         depths.push_back(features[i].depth);
         index.push_back(i);
       }
-    const auto verdict = depth_test(depths, options);
+    const auto verdict = depth_test(depths);
     for (size_t k = 0; k < index.size(); ++k) dynamic[index[k]] = verdict[k];
   }
   return dynamic;
 }
 
 std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
-                                     const CameraModel& camera, const Rigid3& current_from_previous,
-                                     const EpipolarFilterOptions& options) {
+                                     const CameraModel& camera, const Rigid3& current_from_previous) {
   std::vector<uint8_t> dynamic(features.size(), 0);
   const auto box = box_of_each(features, boxes);
   for (size_t i = 0; i < features.size(); ++i)
     dynamic[i] = box[i] >= 0 && features[i].flowed &&
-                 epipolar_distance(features[i], camera, current_from_previous) > options.threshold;
+                 epipolar_distance(features[i], camera, current_from_previous) > kMaxEpipolarDistance;
   return dynamic;
 }
 
 std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
                                       std::span<const Eigen::Vector3d> seen_in_camera, const CameraModel& camera,
-                                      const DepthImage& depth, const MultiviewFilterOptions& options) {
+                                      const DepthImage& depth) {
   struct Spot {
     Eigen::Vector2d image_pixel;
     double depth;
@@ -98,13 +101,13 @@ std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
     const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
     if (!depth.contains(x, y)) continue;
     const double z = depth(x, y);
-    if (z > 0 && p.z() - z > options.depth_jump) spots.push_back({at, z});
+    if (z > 0 && p.z() - z > kDepthJump) spots.push_back({at, z});
   }
   std::vector<uint8_t> dynamic(features.size(), 0);
   for (size_t i = 0; i < features.size(); ++i)
     for (const Spot& s : spots) {
-      if ((s.image_pixel - features[i].image_pixel).squaredNorm() > options.radius * options.radius) continue;
-      if (features[i].depth > 0 && std::abs(features[i].depth - s.depth) > 0.5 * options.depth_jump) continue;
+      if ((s.image_pixel - features[i].image_pixel).squaredNorm() > kRadius * kRadius) continue;
+      if (features[i].depth > 0 && std::abs(features[i].depth - s.depth) > 0.5 * kDepthJump) continue;
       dynamic[i] = 1;
       break;
     }

@@ -37,27 +37,13 @@ std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::
                                   const CameraModel& camera, const Rigid3& current_from_previous,
                                   const PaperFilterOptions& options);
 
-struct EpipolarFilterOptions {
-  double threshold = 1.0;  // [px] distance to the epipolar line, > 0
-  void check() const { require_option(threshold > 0, "threshold", threshold, "greater than 0 px"); }
-};
 std::vector<uint8_t> epipolar_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
-                                     const CameraModel& camera, const Rigid3& current_from_previous,
-                                     const EpipolarFilterOptions& options);
+                                     const CameraModel& camera, const Rigid3& current_from_previous);
 
-struct MultiviewFilterOptions {
-  double depth_jump = 0.4;  // [m] a surface must lie so far before what was seen there, > 0 (DynaSLAM, RA-L 2018)
-  double radius = 15;       // [px] features so near to such a spot and at its depth are dynamic too, > 0
-  int keyframes = 5;        // earlier keyframes compared, >= 1 (the same source)
-  void check() const {
-    require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0 m");
-    require_option(radius > 0, "radius", radius, "greater than 0 px");
-    require_option(keyframes >= 1, "keyframes", keyframes, "at least 1");
-  }
-};
 // `seen_in_camera`: points [m] of earlier keyframes in the current camera, by the predicted pose.
+constexpr int kMultiviewKeyframes = 5;  // earlier keyframes compared (DynaSLAM, RA-L 2018)
 std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
                                       std::span<const Eigen::Vector3d> seen_in_camera, const CameraModel& camera,
-                                      const DepthImage& depth, const MultiviewFilterOptions& options);
+                                      const DepthImage& depth);
 
 }  // namespace dkb

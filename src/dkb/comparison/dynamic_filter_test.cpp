@@ -39,7 +39,7 @@ std::vector<uint8_t> paper(const std::vector<FilterFeature>& features, const Rig
   return paper_filter(features, kWholeImage, test_camera(), motion, options);
 }
 std::vector<uint8_t> epipolar(const std::vector<FilterFeature>& features, const Rigid3& motion) {
-  return epipolar_filter(features, kWholeImage, test_camera(), motion, {});
+  return epipolar_filter(features, kWholeImage, test_camera(), motion);
 }
 Rigid3 shift(double x, double y, double z) {
   return {Eigen::Quaterniond::Identity(), {x, y, z}};
@@ -128,14 +128,14 @@ TEST(DynamicFilter, WhatStandsBeforeAKnownSurfaceIsDynamic) {
   const std::vector<Eigen::Vector3d> seen = {{0, 0, 3}};  // lands on (320, 240), where 2 m is seen now
   const std::vector<FilterFeature> features = {still_at(325, 240, 2.1), still_at(325, 240, 2.5), still_at(336, 240, 2),
                                                still_at(320, 254, 0)};
-  EXPECT_EQ(multiview_filter(features, seen, test_camera(), depth, {}), (std::vector<uint8_t>{1, 0, 0, 1}));
+  EXPECT_EQ(multiview_filter(features, seen, test_camera(), depth), (std::vector<uint8_t>{1, 0, 0, 1}));
 }
 
 TEST(DynamicFilter, SurfacesAtTheirOldPlaceAndUnknownOnesAreStill) {
   DepthImage depth(640, 480, 2.7f);
   const std::vector<FilterFeature> features = {still_at(320, 240, 2.7)};
   const auto dynamic = [&](const Eigen::Vector3d& seen) {
-    return multiview_filter(features, std::vector<Eigen::Vector3d>{seen}, test_camera(), depth, {}).at(0);
+    return multiview_filter(features, std::vector<Eigen::Vector3d>{seen}, test_camera(), depth).at(0);
   };
   EXPECT_EQ(dynamic({0, 0, 3}), 0);     // 0.3 m
   EXPECT_EQ(dynamic({0, 0, 3.2}), 1);   // 0.5 m
@@ -143,12 +143,6 @@ TEST(DynamicFilter, SurfacesAtTheirOldPlaceAndUnknownOnesAreStill) {
   EXPECT_EQ(dynamic({9, 0, 3}), 0);     // outside the image
   depth = DepthImage(640, 480);
   EXPECT_EQ(dynamic({0, 0, 3.2}), 0);  // no depth
-}
-
-TEST(DynamicFilter, OptionsAreChecked) {
-  EXPECT_THROW(EpipolarFilterOptions{.threshold = 0}.check(), InvalidOption);
-  EXPECT_THROW(MultiviewFilterOptions{.keyframes = 0}.check(), InvalidOption);
-  EXPECT_THROW(MultiviewFilterOptions{.radius = -1}.check(), InvalidOption);
 }
 
 }  // namespace

@@ -5,8 +5,15 @@
 #include <limits>
 
 namespace dkb {
+namespace {
 
-DepthSpread depth_spread(std::span<const double> depths, const PaperFilterOptions& options) {
+// DKB eq. 13.
+constexpr double kSpreadLimit = 8.0;          // s below which the narrow threshold holds
+constexpr double kNarrow = 2.8, kWide = 9.0;  // delta there, and elsewhere
+
+}  // namespace
+
+DepthSpread depth_spread(std::span<const double> depths) {
   DepthSpread s;
   if (depths.size() < 5) return s;
   for (double d : depths) s.mean += d;
@@ -29,14 +36,14 @@ DepthSpread depth_spread(std::span<const double> depths, const PaperFilterOption
   const double sigma_h = highs > 0 ? std::sqrt(high / static_cast<double>(highs)) : 0;
   const double sigma_l = lows > 0 ? std::sqrt(low / static_cast<double>(lows)) : 0;
   s.ratio = sigma_l > 0 ? sigma_h / sigma_l : std::numeric_limits<double>::infinity();
-  s.delta = s.ratio < options.spread_limit ? options.narrow : options.wide;
+  s.delta = s.ratio < kSpreadLimit ? kNarrow : kWide;
   s.usable = true;
   return s;
 }
 
-std::vector<uint8_t> depth_test(std::span<const double> depths, const PaperFilterOptions& options) {
+std::vector<uint8_t> depth_test(std::span<const double> depths) {
   std::vector<uint8_t> dynamic(depths.size(), 0);
-  const DepthSpread s = depth_spread(depths, options);
+  const DepthSpread s = depth_spread(depths);
   if (!s.usable) return dynamic;
   for (size_t i = 0; i < depths.size(); ++i) {
     const double th = (depths[i] - s.mean) / s.sigma;

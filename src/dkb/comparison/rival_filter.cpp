@@ -17,17 +17,8 @@ float depth_near(const DepthImage& depth, float x, float y) {
 
 }  // namespace
 
-void RivalFilterOptions::check() const {
-  paper.check();
-  epipolar.check();
-  multiview.check();
-  flow.check();
-}
-
 RivalFilter::RivalFilter(FilterKind kind, const Camera& camera, const RivalFilterOptions& options)
-    : kind_(kind), camera_(camera), options_(options), flow_(options.flow) {
-  options_.check();
-}
+    : kind_(kind), camera_(camera), options_(options), flow_(options.flow) {}
 
 std::vector<FilterFeature> RivalFilter::describe(const RivalFilterInput& input) const {
   const auto& corners = input.orb.corners;
@@ -87,11 +78,11 @@ std::vector<uint8_t> RivalFilter::dynamic(const RivalFilterInput& input) const {
     case FilterKind::box:
       return box_filter(features, input.boxes);
     case FilterKind::epipolar:
-      return epipolar_filter(features, input.boxes, camera_, own_motion(features, input), options_.epipolar);
+      return epipolar_filter(features, input.boxes, camera_, own_motion(features, input));
     case FilterKind::paper:
       return paper_filter(features, input.boxes, camera_, own_motion(features, input), options_.paper);
     case FilterKind::multiview:
-      return multiview_filter(features, input.seen_in_camera, camera_, input.image.depth, options_.multiview);
+      return multiview_filter(features, input.seen_in_camera, camera_, input.image.depth);
     case FilterKind::none:
     case FilterKind::standard:
       break;

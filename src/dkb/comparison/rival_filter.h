@@ -14,10 +14,7 @@ namespace dkb {
 
 struct RivalFilterOptions {
   PaperFilterOptions paper;
-  EpipolarFilterOptions epipolar;
-  MultiviewFilterOptions multiview;
   OpticalFlowOptions flow;
-  void check() const;
 };
 
 // What the filters of other systems look at.
@@ -26,9 +23,9 @@ struct RivalFilterInput {
   const RgbdImage& image;
   const UndistortionTable& undistort;
   const std::vector<Detection>& boxes;
-  const PastFrame* previous = nullptr;        // none in the first frame
-  const ImagePyramid* pyramid = nullptr;      // of the image, where needs_pyramid()
-  Rigid3 current_from_previous;               // expected motion of the camera
+  const PastFrame* previous = nullptr;          // none in the first frame
+  const ImagePyramid* pyramid = nullptr;        // of the image, where needs_pyramid()
+  Rigid3 current_from_previous;                 // expected motion of the camera
   std::vector<Eigen::Vector3d> seen_in_camera;  // [m] points of earlier keyframes by the expected pose, for `multiview`
 };
 
@@ -38,7 +35,7 @@ class RivalFilter {
   RivalFilter(FilterKind kind, const Camera& camera, const RivalFilterOptions& options);
 
   bool needs_pyramid() const { return kind_ == FilterKind::paper || kind_ == FilterKind::epipolar; }
-  int keyframes_looked_at() const { return kind_ == FilterKind::multiview ? options_.multiview.keyframes : 0; }
+  int keyframes_looked_at() const { return kind_ == FilterKind::multiview ? kMultiviewKeyframes : 0; }
   // 1 = dynamic, per corner.
   std::vector<uint8_t> dynamic(const RivalFilterInput& input) const;
 

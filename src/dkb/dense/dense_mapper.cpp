@@ -9,7 +9,8 @@
 namespace dkb {
 namespace {
 
-constexpr double kMaxGap = 0.2;  // [s] between poses that motion is interpolated over
+constexpr double kMaxGap = 0.2;     // [s] between poses that motion is interpolated over
+constexpr double kMinPatch = 0.03;  // [m^2] smaller connected surfaces are dropped
 
 // The camera's pose at a time between or shortly beside two poses of the trajectory, at constant velocity.
 std::optional<Rigid3> pose_at(std::span<const TimedPose> trajectory, double time) {
@@ -55,8 +56,8 @@ DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed
     }
   DenseMap map;
   map.views = static_cast<int>(placed.size());
-  map.mesh = without_small_parts(extract_surface(TsdfVolume::fuse(placed, maker_.camera(), noise_, options_)),
-                                 options_.min_patch);
+  map.mesh =
+      without_small_parts(extract_surface(TsdfVolume::fuse(placed, maker_.camera(), noise_, options_)), kMinPatch);
   if (placed.empty() || up.norm() < 1e-6) return map;
   if (const auto floor = find_floor(map.mesh, up, seed)) {
     const Eigen::Vector3d forward = placed.front().cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();

@@ -126,14 +126,5 @@ TEST(DenseMapper, ViewsFarFromAnyPoseAreLeftOut) {
   EXPECT_EQ(mapper_with_views(8).build(poses, 1).views, 6);
 }
 
-TEST(DenseOptions, SayWhichValueIsWrong) {
-  DenseOptions options;
-  options.voxel = 1;
-  EXPECT_THROW(options.check(), InvalidOption);
-  options = {};
-  options.obstacle_high = 0.05;
-  EXPECT_THROW(DenseMapper(CameraModel(), {}, options), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

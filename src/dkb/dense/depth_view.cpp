@@ -43,7 +43,6 @@ Image<float> facing(const DepthView& view, const ViewCamera& camera) {
 
 DepthViewMaker::DepthViewMaker(const CameraModel& camera, const DenseOptions& options)
     : camera_(camera), options_(options) {
-  options_.check();
   const int step = options_.pixel_step;
   view_camera_.width = (camera.width + step - 1) / step;
   view_camera_.height = (camera.height + step - 1) / step;

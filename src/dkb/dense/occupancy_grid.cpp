@@ -10,7 +10,8 @@
 namespace dkb {
 namespace {
 
-constexpr int kRayStride = 4;  // view pixels between the rays that look for free cells
+constexpr int kRayStride = 4;       // view pixels between the rays that look for free cells
+constexpr int kObstacleVoxels = 3;  // surface voxels of an obstacle's height that make a cell occupied
 
 struct Bounds {
   double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
@@ -94,7 +95,7 @@ OccupancyGrid make_occupancy_grid(const SurfaceMesh& mesh, std::span<const Place
     if (std::abs(p.z()) < options.obstacle_low) ++floor(x, y);
   }
   for (size_t i = 0; i < grid.cells.size(); ++i)
-    if (obstacles.data()[i] >= options.obstacle_voxels)
+    if (obstacles.data()[i] >= kObstacleVoxels)
       grid.cells.data()[i] = OccupancyGrid::kOccupied;
     else if (floor.data()[i] > 0)
       grid.cells.data()[i] = OccupancyGrid::kFree;

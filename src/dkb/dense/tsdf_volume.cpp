@@ -11,6 +11,8 @@ namespace dkb {
 namespace {
 
 constexpr int kSide = VoxelBlock::kSide;
+constexpr int kMinViews = 2;          // keyframes that must see a surface
+constexpr double kFreeShare = 0.08;   // of a voxel's keyframes that may have seen through it (docs/benchmarks.md)
 constexpr int kAllocationStride = 2;  // view pixels: a block is much larger than what lies between them
 
 uint64_t hash_of(const VoxelIndex& i) {
@@ -65,7 +67,7 @@ std::vector<VoxelIndex> blocks_to_fuse(std::span<const PlacedView> views, const 
   }
   std::vector<VoxelIndex> result;
   for (const auto& [index, count] : counts)
-    if (count >= options.min_views) result.push_back(index);
+    if (count >= kMinViews) result.push_back(index);
   return result;
 }
 
@@ -166,8 +168,7 @@ class BlockFuser {
 
   Voxel result(const Sums& s) const {
     Voxel voxel;
-    voxel.known = s.hits >= options_.min_views &&
-                  s.seen_through <= options_.free_share * static_cast<double>(s.hits + s.seen_through);
+    voxel.known = s.hits >= kMinViews && s.seen_through <= kFreeShare * static_cast<double>(s.hits + s.seen_through);
     if (!voxel.known) return voxel;
     voxel.distance = s.distance / s.weight;
     const auto byte = [&](float sum) { return static_cast<uint8_t>(sum / s.weight + 0.5F); };
@@ -188,7 +189,6 @@ class BlockFuser {
 
 TsdfVolume TsdfVolume::fuse(std::span<const PlacedView> views, const ViewCamera& camera, const SensorNoise& noise,
                             const DenseOptions& options) {
-  options.check();
   TsdfVolume volume;
   volume.voxel_ = options.voxel;
   const std::vector<VoxelIndex> indices = blocks_to_fuse(views, camera, options);

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 
 namespace dkb {
@@ -97,13 +96,6 @@ void move_mask(const GreyImage& mask, const Box& from, const AxisMotion& x_motio
 }
 
 }  // namespace
-
-void CarryOptions::check() const {
-  require_option(min_points >= 1, "min_points", min_points, ">= 1");
-  require_option(max_scale_step >= 1, "max_scale_step", max_scale_step, ">= 1");
-  require_option(growth_px >= 0, "growth_px", growth_px, ">= 0");
-  require_option(blind_growth >= 0, "blind_growth", blind_growth, ">= 0");
-}
 
 Detections carry(const Detections& from, std::span<const PointMotion> motions, int frames, int width, int height,
                  const CarryOptions& options) {

@@ -17,7 +17,6 @@ struct CarryOptions {
   float max_scale_step = 1.05f;  // largest change of size per frame carried, either way; >= 1
   float growth_px = 1.0f;        // [px] per frame and side, for what flow does not tell; >= 0
   float blind_growth = 0.02f;    // share of the box per frame and side, more, for boxes without enough points; >= 0
-  void check() const;
 };
 
 // Where the objects of `from` are `frames` frames later: every box is moved by the median motion of the points inside

@@ -129,11 +129,5 @@ TEST(Carry, NoFramesOrNonsenseChangeNothing) {
   EXPECT_EQ(carry(one(box), motions, 1, 640, 480, kNoGrowth), one(box));
 }
 
-TEST(CarryOptions, AreChecked) {
-  EXPECT_NO_THROW(CarryOptions{}.check());
-  EXPECT_THROW(CarryOptions{.min_points = 0}.check(), InvalidOption);
-  EXPECT_THROW(CarryOptions{.max_scale_step = 0.9f}.check(), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "dkb/detection/mask_folder.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
+
+constexpr size_t kPointsPerBox = 40;  // features followed to carry a box
+constexpr int kMissedResults = 2;     // detector results that may miss an object before its box is dropped
 
 // Boxes to carry a mask by, where the detector gives none.
 void box_regions(Detections& detections) {
@@ -29,18 +31,8 @@ void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
     }
 }
 
-void CarriedObjectsOptions::check() const {
-  flow.check();
-  carry.check();
-  silhouette.check();
-  require_option(points_per_box >= 4, "dynamics.points_per_box", points_per_box, "at least 4");
-  require_option(missed_results >= 0, "dynamics.missed_results", missed_results, "at least 0");
-}
-
 CarriedObjects::CarriedObjects(const Camera& camera, const CarriedObjectsOptions& options)
-    : camera_(camera), options_(options), flow_(options.flow) {
-  options_.check();
-}
+    : camera_(camera), options_(options), flow_(options.flow) {}
 
 std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const ImagePyramid& to,
                                                  const std::vector<Detection>& boxes) const {
@@ -50,7 +42,7 @@ std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const Im
     std::vector<size_t> inside;
     for (size_t i = 0; i < from.corners.size(); ++i)
       if (!chosen[i] && d.box.contains(from.corners[i].x(), from.corners[i].y())) inside.push_back(i);
-    const size_t step = std::max<size_t>(1, inside.size() / static_cast<size_t>(options_.points_per_box));
+    const size_t step = std::max<size_t>(1, inside.size() / kPointsPerBox);
     for (size_t k = 0; k < inside.size(); k += step) {
       chosen[inside[k]] = 1;
       points.push_back(from.corners[inside[k]]);
@@ -119,7 +111,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
     const bool seen_again = std::any_of(here.boxes.begin(), here.boxes.end(), [&](const Detection& d) {
       return intersection_over_union(d.box, old.detection.box) > 0.3f;
     });
-    if (!seen_again && old.missed < options_.missed_results) next.push_back({old.detection, old.missed + 1});
+    if (!seen_again && old.missed < kMissedResults) next.push_back({old.detection, old.missed + 1});
   }
   carried_ = std::move(next);
   mask_ = std::move(here.mask);

@@ -17,9 +17,6 @@ struct CarriedObjectsOptions {
   OpticalFlowOptions flow;
   CarryOptions carry;
   SilhouetteOptions silhouette;
-  int points_per_box = 40;  // features followed to carry a box, >= 4
-  int missed_results = 2;   // detector results that may miss an object before its box is dropped, >= 0
-  void check() const;
 };
 
 // Where movers were in an earlier keyframe, as a detection has shown since.
@@ -35,9 +32,9 @@ class CarriedObjects {
 
   // One frame on, from the newest of `past` to the image of `pyramid`.
   void follow(const PastFrames& past, const ImagePyramid& pyramid);
-  // Works in what was detected in frame `from`, and counts in frame `now` from here on. The masks of the keyframes since
-  // `from`, which may have let movers into the map: the detector's own, or else silhouettes of its boxes, without what
-  // was seen to stand still (score by cells of `score_cell` px).
+  // Works in what was detected in frame `from`, and counts in frame `now` from here on. The masks of the keyframes
+  // since `from`, which may have let movers into the map: the detector's own, or else silhouettes of its boxes, without
+  // what was seen to stand still (score by cells of `score_cell` px).
   std::vector<LateMask> receive(FrameIndex from, const Detections& detections, FrameIndex now, const PastFrames& past,
                                 const ImagePyramid& pyramid, int score_cell);
 

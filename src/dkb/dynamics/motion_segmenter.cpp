@@ -11,7 +11,27 @@
 namespace dkb {
 namespace {
 
-constexpr float kTooNear = 0.45f;         // [m] taken for the depth of what is too near for the sensor
+constexpr float kTooNear = 0.45f;      // [m] taken for the depth of what is too near for the sensor
+constexpr size_t kMaxViews = 8;        // past views kept
+constexpr size_t kViewsPerFrame = 4;   // of them compared with each frame, in turn
+constexpr double kViewInterval = 0.2;  // [s] between views when they are taken; with age they thin out
+constexpr double kViewAge = 15;        // [s] older views are dropped, so that a parked chair becomes part of the room
+constexpr float kSlope = 1;            // share of a view's depth range over 3 x 3 cells added to the tolerance
+constexpr double kSettle = 0.5;        // [s] agreement with a view counts in proportion to its age up to this
+constexpr double kHoleMemory = 1;      // [s] the memory of what is too near for the sensor
+constexpr float kRevision = 0.1f;      // share of its own verdict that a view gives up for today's on the same surface
+
+// Weights of evidence beside that of an intrusion into space seen empty, which is 1.
+constexpr float kContour = 0.3f;  // an outline that is where a view had it: still
+constexpr float kInterior =
+    0.1f;                        // a surface that is where a view had it: still, but so is the inside of one that sways
+constexpr float kState = 0.02f;  // what the cell was before
+constexpr float kPrior = 0.015f;        // nothing moves until something says so
+constexpr float kHolePrior = 0.02f;     // the same where depth is missing
+constexpr float kFullEvidence = 0.05f;  // mean weight around a cell at which one frame says all it can
+constexpr double kLoneHole =
+    0.05;  // share of the image from which missing depth moves though no measured mover touches it
+
 constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
@@ -26,34 +46,9 @@ void clear(Image<float>& image) {
 
 }  // namespace
 
-void MotionOptions::check() const {
-  require_option(cell >= 2 && cell <= 32, "motion.cell", cell, "in 2 ... 32 px");
-  require_option(views >= 2, "motion.views", views, "at least 2");
-  require_option(views_per_frame >= 1, "motion.views_per_frame", views_per_frame, "at least 1");
-  require_option(view_interval > 0, "motion.view_interval", view_interval, "greater than 0 s");
-  require_option(view_age > 0, "motion.view_age", view_age, "greater than 0 s");
-  require_option(tolerance >= 0, "motion.tolerance", tolerance, "at least 0 m");
-  require_option(tolerance_sigmas >= 0, "motion.tolerance_sigmas", tolerance_sigmas, "at least 0");
-  require_option(slope >= 0, "motion.slope", slope, "at least 0");
-  require_option(settle > 0, "motion.settle", settle, "greater than 0 s");
-  require_option(memory > 0, "motion.memory", memory, "greater than 0 s");
-  require_option(hole_memory > 0, "motion.hole_memory", hole_memory, "greater than 0 s");
-  require_option(revision >= 0 && revision <= 1, "motion.revision", revision, "in 0 ... 1");
-  require_option(contour >= 0, "motion.contour", contour, "at least 0");
-  require_option(interior >= 0, "motion.interior", interior, "at least 0");
-  require_option(state >= 0, "motion.state", state, "at least 0");
-  require_option(prior >= 0, "motion.prior", prior, "at least 0");
-  require_option(hole_prior >= 0, "motion.hole_prior", hole_prior, "at least 0");
-  require_option(full_evidence > 0, "motion.full_evidence", full_evidence, "greater than 0");
-  require_option(threshold > 0 && threshold <= 2, "motion.threshold", threshold, "in (0, 2]");
-  require_option(lone_hole >= 0 && lone_hole <= 1, "motion.lone_hole", lone_hole, "in 0 ... 1");
-  require_option(rim >= 0, "motion.rim", rim, "at least 0 cells");
-  smoothing.check();
-}
-
 MotionSegmenter::MotionSegmenter(const CameraModel& camera, const MotionOptions& options)
     : camera_(camera),
-      options_((options.check(), options)),
+      options_(options),
       rays_(camera, options.cell),
       smoothing_(camera, options.cell, options.smoothing) {
   const int width = rays_.width(), height = rays_.height();
@@ -118,7 +113,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   for (size_t i = 0; i < tolerance_.size(); ++i) tolerance_.data()[i] = tolerance_at(current_->depth.data()[i]);
   carry_scores();
   for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
-  const size_t count = views_.size(), chosen = std::min(count, static_cast<size_t>(options_.views_per_frame));
+  const size_t count = views_.size(), chosen = std::min(count, kViewsPerFrame);
   for (size_t i = 0; i < chosen; ++i) compare(*views_[(turn_ + i * count / chosen) % count]);
   ++turn_;
   find_openings();
@@ -141,8 +136,8 @@ void MotionSegmenter::carry_scores() {
   rays_.project(current_->depth, kTooNear, previous_->cam_from_world * current_->cam_from_world.inverse(), projection_);
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
-  const auto keep_hole = static_cast<float>(std::exp(-interval / options_.hole_memory));
-  const auto near = static_cast<float>(options_.smoothing.near_range);
+  const auto keep_hole = static_cast<float>(std::exp(-interval / kHoleMemory));
+  const auto near = static_cast<float>(kNearRange);
   const Image<float>& before = previous_->depth;
   for (size_t i = 0; i < current_->score.size(); ++i) {
     const float z = current_->depth.data()[i];
@@ -178,10 +173,10 @@ void MotionSegmenter::carry_scores() {
 // What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
 void MotionSegmenter::compare(MotionDepthGrid& view) {
   rays_.project(current_->depth, kTooNear, view.cam_from_world * current_->cam_from_world.inverse(), projection_);
-  const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / options_.settle, 0.0, 1.0));
-  const float contour_weight = trust * static_cast<float>(options_.contour);
-  const float interior_weight = trust * static_cast<float>(options_.interior);
-  const auto slope = static_cast<float>(options_.slope), revision = static_cast<float>(options_.revision);
+  const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / kSettle, 0.0, 1.0));
+  const float contour_weight = trust * kContour;
+  const float interior_weight = trust * kInterior;
+  const auto slope = kSlope, revision = kRevision;
   // From this much farther on, the surface behind does not hang together with the one in front.
   const auto beyond = [](float z, float tolerance) { return z + 2.0f * tolerance + 0.03f * z; };
   for (size_t i = 0; i < current_->depth.size(); ++i) {
@@ -229,8 +224,8 @@ void MotionSegmenter::find_openings() {
 
 void MotionSegmenter::weigh() {
   const int width = rays_.width(), height = rays_.height();
-  const auto state_weight = static_cast<float>(options_.state), prior = static_cast<float>(options_.prior);
-  const auto hole_prior = static_cast<float>(options_.hole_prior);
+  const auto state_weight = kState, prior = kPrior;
+  const auto hole_prior = kHolePrior;
   const Image<float>& depth = current_->depth;
   const auto supported = [&](int x, int y) {
     if (x == 0 || y == 0 || x + 1 == width || y + 1 == height) return false;
@@ -253,7 +248,7 @@ void MotionSegmenter::weigh() {
 }
 
 void MotionSegmenter::update_scores() {
-  const float gain = 1.0f / static_cast<float>(options_.full_evidence);
+  const float gain = 1.0f / kFullEvidence;
   for (size_t i = 0; i < weights_.size(); ++i) {
     const float weight = weights_.data()[i];
     if (!(weight > 0)) continue;
@@ -277,7 +272,7 @@ void MotionSegmenter::clear_thin_holes(MoverMask& mask) const {
 // was measured, or is large: somebody too near for the sensor.
 void MotionSegmenter::clear_lone_holes(Image<uint8_t>& marked) {
   const int width = marked.width(), height = marked.height();
-  const auto enough = static_cast<size_t>(options_.lone_hole * static_cast<double>(marked.size()));
+  const auto enough = static_cast<size_t>(kLoneHole * static_cast<double>(marked.size()));
   const auto hole = [&](size_t i) { return !(current_->depth.data()[i] > 0); };
   Image<uint8_t> seen(width, height);
   std::vector<size_t> region;
@@ -317,7 +312,6 @@ MoverMask MotionSegmenter::mask() {
   }
   clear_thin_holes(result);
   clear_lone_holes(result.cells);
-  dilate(result, options_.rim);
   return result;
 }
 
@@ -336,7 +330,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
 // The newest views lie `view_interval` apart; of more than `views`, the one goes whose loss leaves the smallest gap in
 // proportion to its age.
 void MotionSegmenter::keep_as_view(std::unique_ptr<MotionDepthGrid> grid) {
-  const double interval = views_.size() == 1 ? 0.3 * options_.view_interval : options_.view_interval;
+  const double interval = views_.size() == 1 ? 0.3 * kViewInterval : kViewInterval;
   if (!views_.empty() && grid->time - views_.back()->time < interval) {
     spare_.push_back(std::move(grid));
     return;
@@ -344,11 +338,11 @@ void MotionSegmenter::keep_as_view(std::unique_ptr<MotionDepthGrid> grid) {
   views_.push_back(std::move(grid));
   const double now = views_.back()->time;
   size_t drop = 0;
-  if (now - views_.front()->time <= options_.view_age) {
-    if (views_.size() <= static_cast<size_t>(options_.views)) return;
+  if (now - views_.front()->time <= kViewAge) {
+    if (views_.size() <= kMaxViews) return;
     double smallest = 0;
     for (size_t i = 1; i + 1 < views_.size(); ++i) {
-      const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (now - views_[i]->time + options_.view_interval);
+      const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (now - views_[i]->time + kViewInterval);
       if (drop == 0 || gap < smallest) {
         smallest = gap;
         drop = i;

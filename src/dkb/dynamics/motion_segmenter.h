@@ -17,29 +17,11 @@ namespace dkb {
 
 struct MotionOptions {
   int cell = 4;                 // [px] side of the cells that are judged, 2 ... 32
-  int views = 8;                // past views kept, >= 2
-  int views_per_frame = 4;      // of them compared with each frame, in turn, >= 1
-  double view_interval = 0.2;   // [s] between views when they are taken; with age they thin out, > 0
-  double view_age = 15;         // [s] older views are dropped, so that a parked chair becomes part of the room, > 0
   double tolerance = 0.02;      // [m] what poses and calibration may be off in depth, >= 0
   double tolerance_sigmas = 6;  // standard deviations of the sensor's depth noise on flat walls (SensorNoise), >= 0
-  double slope = 1;             // share of a view's depth range over 3 x 3 cells added to the tolerance, >= 0
-  double settle = 0.5;          // [s] agreement with a view counts in proportion to its age up to this, > 0
   double memory = 6;            // [s] time constant in which a mover that stands still is forgotten, > 0
-  double hole_memory = 1;       // [s] the same for what is too near for the sensor, > 0
-  double revision = 0.1;  // share of its own verdict that a view gives up for today's on the same surface, 0 ... 1
-  // Weights of evidence beside that of an intrusion into space seen empty, which is 1. All >= 0.
-  double contour = 0.3;         // an outline that is where a view had it: still
-  double interior = 0.1;        // a surface that is where a view had it: still, but so is the inside of one that sways
-  double state = 0.02;          // what the cell was before
-  double prior = 0.015;         // nothing moves until something says so
-  double hole_prior = 0.02;     // the same where depth is missing
-  double full_evidence = 0.05;  // mean weight around a cell at which one frame says all it can, > 0
   double threshold = 0.5;       // score from which a cell moves; one frame adds at most 1, (0, 2]
-  double lone_hole = 0.05;      // share of the image from which missing depth moves though no measured mover touches it
-  int rim = 0;                  // [cells] the mask is widened by, >= 0
   MotionSmoothingOptions smoothing;
-  void check() const;  // throws InvalidOption
 };
 
 // Finds what moves against the camera's own motion, of any class, without a model: people, a pushed chair, a carried

@@ -301,19 +301,5 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   EXPECT_THROW(segmenter.segment(image, Rigid3()), InputError);
 }
 
-TEST(MotionOptions, NamesTheFieldThatIsOutOfRange) {
-  MotionOptions options;
-  options.smoothing.distance = 0;
-  try {
-    options.check();
-    FAIL();
-  } catch (const InvalidOption& e) {
-    EXPECT_NE(std::string(e.what()).find("distance"), std::string::npos);
-  }
-  options = {};
-  options.views = 1;
-  EXPECT_THROW(MotionSegmenter(World().camera, options), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

@@ -6,16 +6,13 @@
 
 namespace dkb {
 
+// [m] a surface nearer than this may go on where depth is missing, being too near for the sensor
+constexpr double kNearRange = 0.55;
+
 struct MotionSmoothingOptions {
   double distance = 0.4;           // [m] along the surface over which cells of one object speak for each other, > 0
   double depth_jump_base = 0.015;  // [m] depth step between neighbouring cells of one surface: this ...
   double depth_jump_slope = 0.02;  // ... plus this share of their depth, >= 0
-  double crease =
-      0.012;  // [1/m] second difference of inverse depth in a fold between object and support (noise: 0.005), > 0
-  double crease_link = 0.3;  // share of what is said that crosses such a fold, 0 ... 1
-  double near_range =
-      0.55;            // [m] a surface nearer than this may go on where depth is missing, being too near for the sensor
-  void check() const;  // throws InvalidOption
 };
 
 // Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)

@@ -13,8 +13,16 @@
 namespace dkb {
 namespace {
 
-constexpr float kBin = 0.05f;       // [m] of depth histograms
-constexpr size_t kMaxPoints = 300;  // per object, that medians are taken of
+constexpr int kCell = 4;           // [px] one depth is looked at per square of this size
+constexpr size_t kMinCells = 12;   // cells with depth that a boxed object needs
+constexpr size_t kMinRegion = 40;  // the same for a region without a box
+constexpr double kMargin = 0.1;    // share of a box's size by which its rim reaches; mask there is no object of its own
+constexpr float kLayer = 0.45f;    // [m] an object reaches so far before and behind its main depth layer
+constexpr double kInnerShare = 0.4;   // of a region's cells must have all four neighbours in it: others are rims
+constexpr int kGap = 4;               // [cells] regions so near to each other in the image are one ...
+constexpr float kMergeDepth = 0.25f;  // [m] ... when so near in depth
+constexpr float kBin = 0.05f;         // [m] of depth histograms
+constexpr size_t kMaxPoints = 300;    // per object, that medians are taken of
 
 // What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
 // sensor's noise.
@@ -24,28 +32,15 @@ double position_sd(double depth) {
 
 }  // namespace
 
-void MoverObserverOptions::check() const {
-  require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
-  require_option(min_cells >= 1, "min_cells", min_cells, "at least 1");
-  require_option(min_region >= 1, "min_region", min_region, "at least 1");
-  require_option(margin >= 0, "margin", margin, "at least 0");
-  require_option(layer > 0, "layer", layer, "greater than 0 m");
-  require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0");
-  require_option(inner_share > 0 && inner_share <= 1, "inner_share", inner_share, "greater than 0, at most 1");
-  require_option(gap >= 0, "gap", gap, "at least 0 cells");
-  require_option(merge_depth > 0, "merge_depth", merge_depth, "greater than 0 m");
-}
-
 MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptions& options)
     : camera_(camera), options_(options) {
-  options_.check();
   camera_.check();
-  columns_ = (camera_.width + options_.cell - 1) / options_.cell;
-  rows_ = (camera_.height + options_.cell - 1) / options_.cell;
+  columns_ = (camera_.width + kCell - 1) / kCell;
+  rows_ = (camera_.height + kCell - 1) / kCell;
   rays_.reserve(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
   for (int y = 0; y < rows_; ++y)
     for (int x = 0; x < columns_; ++x) {
-      const Eigen::Vector2d middle((x + 0.5) * options_.cell - 0.5, (y + 0.5) * options_.cell - 0.5);
+      const Eigen::Vector2d middle((x + 0.5) * kCell - 0.5, (y + 0.5) * kCell - 0.5);
       rays_.push_back(camera_.unproject(camera_.undistort(middle), 1.0).head<2>().cast<float>());
     }
 }
@@ -53,7 +48,7 @@ MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptio
 // Cells whose middle lies in the box, widened by a share of its size.
 MoverObserver::CellRange MoverObserver::cells_in(const Box& b, double margin) const {
   const auto first = [&](double edge, int n) {
-    return static_cast<int>(std::clamp(std::ceil(edge / options_.cell - 0.5), 0.0, static_cast<double>(n)));
+    return static_cast<int>(std::clamp(std::ceil(edge / kCell - 0.5), 0.0, static_cast<double>(n)));
   };
   const double x = static_cast<double>(b.x), y = static_cast<double>(b.y), w = static_cast<double>(b.w),
                h = static_cast<double>(b.h);
@@ -70,7 +65,7 @@ void MoverObserver::for_each_cell(const CellRange& r, const Function& function) 
 
 // Depth in the middle of a cell, or beside it; 0 = none.
 float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
-  const int px = x * options_.cell + options_.cell / 2, py = y * options_.cell + options_.cell / 2;
+  const int px = x * kCell + kCell / 2, py = y * kCell + kCell / 2;
   for (const auto& [dx, dy] : {std::array{0, 0}, {-1, 0}, {0, -1}, {-1, -1}})
     if (depth.contains(px + dx, py + dy) && depth(px + dx, py + dy) > 0) return depth(px + dx, py + dy);
   return 0;
@@ -113,7 +108,7 @@ float MoverObserver::main_layer(const std::vector<float>& depths) const {
     if (bin >= histogram.size()) histogram.resize(bin + 1, 0);
     ++histogram[bin];
   }
-  const size_t window = std::max<size_t>(1, static_cast<size_t>(2 * static_cast<float>(options_.layer) / kBin));
+  const size_t window = std::max<size_t>(1, static_cast<size_t>(2 * kLayer / kBin));
   int inside = 0, most = 0;
   size_t end_of_most = 0;
   for (size_t end = 0; end < histogram.size(); ++end) {
@@ -142,7 +137,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
   std::stable_sort(by_area.begin(), by_area.end(),
                    [&](size_t a, size_t b) { return boxes[a].box.area() < boxes[b].box.area(); });
 
-  const float half = static_cast<float>(options_.layer);
+  const float half = kLayer;
   std::vector<float> found(boxes.size(), 0), depths;
   std::vector<char> explained(rays_.size(), 0);
   const auto settle = [&](size_t b, const auto& counts) {
@@ -150,7 +145,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (depth_[i] > 0 && counts(i)) depths.push_back(depth_[i]);
     });
-    if (depths.size() < static_cast<size_t>(options_.min_cells)) return;
+    if (depths.size() < kMinCells) return;
     const float depth = found[b] = main_layer(depths);
     for_each_cell(ranges[b], [&](size_t i, int, int) { explained[i] |= std::abs(depth_[i] - depth) < half; });
   };
@@ -164,7 +159,7 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
   std::vector<CellRange> ranges;
   for (const Detection& d : boxes) ranges.push_back(cells_in(d.box, 0));
   const std::vector<float> depths = box_depths(boxes, ranges);
-  const float half = static_cast<float>(options_.layer);
+  const float half = kLayer;
   // A cell in several boxes goes to the object at whose depth and in whose middle it is.
   std::vector<float> min_cost(rays_.size(), std::numeric_limits<float>::max());
   std::vector<int> owner(rays_.size(), -1);
@@ -187,7 +182,7 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (owner[i] == static_cast<int>(b)) cells.push_back(i);
     });
-    if (cells.size() < static_cast<size_t>(options_.min_cells)) continue;
+    if (cells.size() < kMinCells) continue;
     observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells),
                             position_sd(static_cast<double>(depths[b])), size_of(cells)});
   }
@@ -239,7 +234,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
       inner += (x == 0 || mine(i - 1)) && (x + 1 == width || mine(i + 1)) && (y == 0 || mine(i - width)) &&
                (i + width >= part_of.size() || mine(i + width));
     }
-    if (static_cast<double>(inner) < options_.inner_share * static_cast<double>(cells.size())) continue;
+    if (static_cast<double>(inner) < kInnerShare * static_cast<double>(cells.size())) continue;
     parts.push_back({{bounds, std::move(cells)}, upper_median(depths), parts.size()});
   }
   // Holes of the depth image and arms held out cut bodies into parts.
@@ -251,8 +246,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
     for (size_t b = a + 1; b < parts.size(); ++b) {
       const CellRange &p = parts[a].region.bounds, &q = parts[b].region.bounds;
       const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
-      if (gap > options_.gap || std::abs(parts[a].depth - parts[b].depth) > static_cast<float>(options_.merge_depth))
-        continue;
+      if (gap > kGap || std::abs(parts[a].depth - parts[b].depth) > kMergeDepth) continue;
       const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
       parts[high].merged_into = low;
     }
@@ -266,19 +260,18 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
   }
   std::vector<Region> regions;
   for (size_t p = 0; p < parts.size(); ++p)
-    if (parts[p].merged_into == p && parts[p].region.cells.size() >= static_cast<size_t>(options_.min_region))
+    if (parts[p].merged_into == p && parts[p].region.cells.size() >= kMinRegion)
       regions.push_back(std::move(parts[p].region));
   return regions;
 }
 
 void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
   depth_.assign(rays_.size(), 0.0f);
-  const float middle = 0.5f * static_cast<float>(options_.cell);
-  const bool same_cells = mask.cell == options_.cell && mask.cells.width() == columns_ && mask.cells.height() == rows_;
+  const float middle = 0.5f * static_cast<float>(kCell);
+  const bool same_cells = mask.cell == kCell && mask.cells.width() == columns_ && mask.cells.height() == rows_;
   for_each_cell({0, 0, columns_, rows_}, [&](size_t i, int x, int y) {
-    if (same_cells
-            ? mask.cells(x, y) != 0
-            : mask.at(static_cast<float>(x * options_.cell) + middle, static_cast<float>(y * options_.cell) + middle))
+    if (same_cells ? mask.cells(x, y) != 0
+                   : mask.at(static_cast<float>(x * kCell) + middle, static_cast<float>(y * kCell) + middle))
       depth_[i] = depth_near(depth, x, y);
   });
 }
@@ -293,14 +286,13 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   world_from_cam_ = world_from_cam;
   take_masked_depth(depth, mask);
   std::vector<char> claimed(rays_.size(), 0);  // by a box or its rim
-  for (const Detection& d : boxes)
-    for_each_cell(cells_in(d.box, options_.margin), [&](size_t i, int, int) { claimed[i] = 1; });
+  for (const Detection& d : boxes) for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { claimed[i] = 1; });
   std::vector<MoverObservation> observations = observe_boxes(boxes);
   std::vector<float> depths;
   for (const Region& r : find_regions(claimed)) {
     depths.clear();
     for (size_t i : r.cells) depths.push_back(depth_[i]);
-    const auto pixels = [&](int cells) { return static_cast<float>(cells * options_.cell); };
+    const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
     observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),

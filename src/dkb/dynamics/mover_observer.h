@@ -14,16 +14,7 @@
 namespace dkb {
 
 struct MoverObserverOptions {
-  int cell = 4;         // [px] one depth is looked at per square of this size, 1 ... 32
-  int min_cells = 12;   // cells with depth that a boxed object needs, >= 1
-  int min_region = 40;  // the same for a region without a box, >= 1
-  double margin = 0.1;  // share of a box's size by which its rim reaches; mask in the rim is no object of its own, >= 0
-  double layer = 0.45;  // [m] an object reaches so far before and behind its main depth layer, > 0
   double depth_jump = 0.05;  // [1] depth step between neighbouring cells of one region, relative to depth, > 0
-  double inner_share = 0.4;  // of a region's cells must have all four neighbours in it: others are rims, (0, 1]
-  int gap = 4;  // [cells] regions so near to each other in the image and `merge_depth` in depth are one, >= 0
-  double merge_depth = 0.25;  // [m] > 0
-  void check() const;         // throws InvalidOption
 };
 
 // One object of one frame.

@@ -136,10 +136,8 @@ TEST(MoverObserver, BoxesAcrossTheBorderAreCut) {
   EXPECT_NEAR(found[0].position_in_world.z(), 2, 1e-6);
 }
 
-TEST(MoverObserver, OptionsAndSizesAreChecked) {
+TEST(MoverObserver, AnImageOfAnotherSizeIsRefused) {
   MoverTestScene scene;
-  EXPECT_THROW(MoverObserver(scene.camera, {.cell = 0}), InvalidOption);
-  EXPECT_THROW(MoverObserver(scene.camera, {.layer = 0}), InvalidOption);
   scene.depth = DepthImage(10, 10);
   EXPECT_THROW(observe(scene), InputError);
 }

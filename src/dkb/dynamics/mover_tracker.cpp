@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "dkb/dynamics/assignment.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
@@ -14,30 +13,27 @@ namespace {
 constexpr double kUnassigned = 50.0;  // above what fits: what can be explained is
 constexpr const char* kUnnamed = "object";
 
+// What follows was chosen on simulated crowds (tests/movers_test.cpp).
+// Standard deviations of an observed position [m]: along the image's rows, along its columns, where clutter and other
+// movers hide legs and bodies, and along the optical axis.
+constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
+constexpr double kAgility = 3.0;  // [m^2/s^3] spectral density of the white noise that acceleration is taken for
+constexpr double kSpeedSd = 1.2;  // [m/s] standard deviation of the speed of something just found
+
+constexpr double kGate = 25.0;              // squared Mahalanobis distance within which an observation may be a track's
+constexpr double kMaxDistance = 0.9;        // [m] nor may it lie farther from where it is expected than this ...
+constexpr double kMaxDistanceGrowth = 1.5;  // [m/s] ... and this times the time unseen
+constexpr double kClassPenalty = 9.0;       // added to the squared distance when classes differ
+constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
+constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
+
+constexpr double kMemory = 1.2;        // [s] a mover unseen for longer is forgotten
+constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
+constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
+constexpr double kApart = 0.35;        // [m] nothing is found so near to a mover already seen in the frame
+constexpr double kRegionsApart = 0.6;  // [m] the same for regions without a box, across and along the optical axis
+
 }  // namespace
-
-void MoverTrackerOptions::check() const {
-  observer.check();
-  require_option(sd_across > 0, "sd_across", sd_across, "greater than 0 m");
-  require_option(sd_down > 0, "sd_down", sd_down, "greater than 0 m");
-  require_option(sd_deep > 0, "sd_deep", sd_deep, "greater than 0 m");
-  require_option(agility > 0, "agility", agility, "greater than 0 m^2/s^3");
-  require_option(speed_sd > 0, "speed_sd", speed_sd, "greater than 0 m/s");
-  require_option(gate > 0, "gate", gate, "greater than 0");
-  require_option(max_distance > 0, "max_distance", max_distance, "greater than 0 m");
-  require_option(max_distance_growth >= 0, "max_distance_growth", max_distance_growth, "at least 0 m/s");
-  require_option(class_penalty >= 0, "class_penalty", class_penalty, "at least 0");
-  require_option(box_weight >= 0, "box_weight", box_weight, "at least 0");
-  require_option(box_memory > 0, "box_memory", box_memory, "greater than 0 s");
-  require_option(memory > 0, "memory", memory, "greater than 0 s");
-  require_option(doubt_memory > 0, "doubt_memory", doubt_memory, "greater than 0 s");
-  require_option(min_observations >= 2, "min_observations", min_observations, "at least 2");
-  require_option(apart >= 0, "apart", apart, "at least 0 m");
-  require_option(regions_apart >= 0, "regions_apart", regions_apart, "at least 0 m");
-}
-
-MoverTracker::MoverTracker(const CameraModel& camera, const MoverTrackerOptions& options)
-    : options_((options.check(), options)), observer_(camera, options.observer) {}
 
 void MoverTracker::predict(double seconds) {
   Covariance transition = Covariance::Identity();
@@ -49,7 +45,7 @@ void MoverTracker::predict(double seconds) {
   noise.bottomLeftCorner<3, 3>() = noise.topRightCorner<3, 3>();
   for (Track& t : tracks_) {
     t.state.head<3>() += seconds * t.state.tail<3>();
-    t.covariance = transition * t.covariance * transition.transpose() + options_.agility * noise;
+    t.covariance = transition * t.covariance * transition.transpose() + kAgility * noise;
   }
 }
 
@@ -65,16 +61,15 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const Eigen::Matrix3d information = spread.inverse();
     // A mover long unseen fits anywhere: half its log likelihood's width keeps it from taking what others fit better.
     const double width = 0.5 * std::log(spread.determinant() / noise_determinant);
-    const double unseen = time_ - t.seen, max_distance = options_.max_distance + options_.max_distance_growth * unseen;
-    const double box_weight = options_.box_weight * std::max(0.0, 1 - unseen / options_.box_memory);
+    const double unseen = time_ - t.seen, max_distance = kMaxDistance + kMaxDistanceGrowth * unseen;
+    const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
       const Eigen::Vector3d off = o.position_in_world - t.state.head<3>();
       const double distance = off.dot(information * off), aside = (off - off.dot(down) * down).norm();
-      if (distance > options_.gate || aside > max_distance) continue;
+      if (distance > kGate || aside > max_distance) continue;
       double penalty = box_weight * (1 - static_cast<double>(intersection_over_union(t.box, o.box)));
-      if (!o.class_name.empty() && !t.class_name.empty() && o.class_name != t.class_name)
-        penalty += options_.class_penalty;
+      if (!o.class_name.empty() && !t.class_name.empty() && o.class_name != t.class_name) penalty += kClassPenalty;
       cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
           std::min(distance + width + penalty, 0.999 * kUnassigned);
     }
@@ -91,18 +86,17 @@ void MoverTracker::correct(const MoverObservation& o, const Eigen::Matrix3d& noi
   t->seen = time_;
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
-  if (++t->observations >= options_.min_observations && t->id == 0) t->id = ++last_id_;
+  if (++t->observations >= kMinObservations && t->id == 0) t->id = ++last_id_;
 }
 
 std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& depth, const MoverMask& mask,
                                         std::span<const Detection> boxes, const Rigid3& world_from_cam) {
   predict(std::max(0.0, timestamp - time_));
   time_ = timestamp;
-  std::erase_if(tracks_,
-                [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? options_.memory : options_.doubt_memory); });
+  std::erase_if(tracks_, [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? kMemory : kDoubtMemory); });
 
   const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam);
-  const Eigen::Vector3d sd(options_.sd_across, options_.sd_down, options_.sd_deep);
+  const Eigen::Vector3d sd(kSdAcross, kSdDown, kSdDeep);
   const Eigen::Matrix3d axes = world_from_cam.matrix3();
   const Eigen::Matrix3d noise = axes * sd.cwiseAbs2().asDiagonal() * axes.transpose();
 
@@ -127,7 +121,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     const MoverObservation& o = observations[k];
     if (taken[k]) continue;
     // Parts of one body may be taken for several regions, one above the other.
-    const double apart = o.class_name.empty() ? options_.regions_apart : options_.apart;
+    const double apart = o.class_name.empty() ? kRegionsApart : kApart;
     const auto near = [&](const Eigen::Vector3d& p) {
       const Eigen::Vector3d off = p - o.position_in_world;
       return (o.class_name.empty() ? (off - off.dot(axes.col(1)) * axes.col(1)).norm() : off.norm()) < apart;
@@ -139,7 +133,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     t.state << o.position_in_world, Eigen::Vector3d::Zero();
     t.covariance.setZero();
     t.covariance.topLeftCorner<3, 3>() = noise;
-    t.covariance.diagonal().tail<3>().setConstant(options_.speed_sd * options_.speed_sd);
+    t.covariance.diagonal().tail<3>().setConstant(kSpeedSd * kSpeedSd);
     t.seen = time_;
     t.box = o.box;
     t.observations = 1;

@@ -158,11 +158,5 @@ TEST(MoverTracker, ResetForgetsMoversAndGoesOnCounting) {
   EXPECT_EQ(show(&tracker, 5 * kStep, one_person(0, 2)).at(0).id, 2);
 }
 
-TEST(MoverTracker, OptionsAreChecked) {
-  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.min_observations = 1}), InvalidOption);
-  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.memory = 0}), InvalidOption);
-  EXPECT_THROW(MoverTracker(MoverTestScene().camera, {.observer = {.cell = 99}}), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

@@ -6,10 +6,14 @@
 #include <cmath>
 #include <vector>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
+
+constexpr int kCell = 4;           // [px] grid on which depth is looked at
+constexpr double kCore = 0.5;      // share of the box's width and height around its centre where the object is sought
+constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
+constexpr double kLayer = 0.15;    // [1] half-width of that layer relative to its depth
+constexpr double kMargin = 0.05;   // share of the box's size by which it is widened
 
 struct CellRange {
   int x0, y0, x1, y1;  // half open
@@ -38,7 +42,7 @@ float cell_depth(const DepthImage& depth, int cx, int cy, int cell) {
 }
 
 // Depth of the nearest layer that fills enough of the core, weighted toward the centre; 0 when the core has no depth.
-float object_depth(const Image<float>& grid, const CellRange& core, const SilhouetteOptions& options) {
+float object_depth(const Image<float>& grid, const CellRange& core) {
   struct Sample {
     float depth, weight;
   };
@@ -60,8 +64,8 @@ float object_depth(const Image<float>& grid, const CellRange& core, const Silhou
   if (samples.empty()) return 0;
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.depth < b.depth; });
   // Slide a window of the layer's relative width from near to far; the first local maximum that is heavy enough wins.
-  const float ratio = static_cast<float>((1 + options.layer) / (1 - options.layer));
-  const float needed = static_cast<float>(options.min_share) * total;
+  const float ratio = static_cast<float>((1 + kLayer) / (1 - kLayer));
+  const float needed = static_cast<float>(kMinShare) * total;
   float weight = 0, best_weight = 0, best_depth = samples[samples.size() / 2].depth;
   size_t end = 0;
   for (size_t begin = 0; begin < samples.size(); ++begin) {
@@ -142,32 +146,20 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
 
 }  // namespace
 
-void SilhouetteOptions::check() const {
-  require_option(cell >= 1 && cell <= 32, "cell", cell, "1 ... 32 px");
-  require_option(core > 0 && core <= 1, "core", core, "greater than 0, at most 1");
-  require_option(min_share > 0 && min_share <= 1, "min_share", min_share, "greater than 0, at most 1");
-  require_option(layer > 0 && layer < 1, "layer", layer, "between 0 and 1");
-  require_option(depth_jump > 0, "depth_jump", depth_jump, "greater than 0");
-  require_option(max_depth_offset > 0, "max_depth_offset", max_depth_offset, "greater than 0 m");
-  require_option(margin >= 0, "margin", margin, "at least 0");
-  require_option(rim >= 0, "rim", rim, "at least 0");
-}
-
 MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const SilhouetteOptions& options) {
   MoverMask mask;
-  mask.cell = options.cell;
+  mask.cell = kCell;
   if (boxes.empty()) return mask;
-  const int columns = (depth.width() + options.cell - 1) / options.cell,
-            rows = (depth.height() + options.cell - 1) / options.cell;
+  const int columns = (depth.width() + kCell - 1) / kCell, rows = (depth.height() + kCell - 1) / kCell;
   mask.cells = Image<uint8_t>(columns, rows);
   Image<float> grid(columns, rows);
   for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, options.cell);
+    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, kCell);
 
   for (const Detection& detection : boxes) {
-    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * options.margin), options.cell, columns, rows);
-    const CellRange core = cells_of(scaled(detection.box, options.core), options.cell, columns, rows);
-    const float layer = object_depth(grid, core, options);
+    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kMargin), kCell, columns, rows);
+    const CellRange core = cells_of(scaled(detection.box, kCore), kCell, columns, rows);
+    const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
         for (int x = range.x0; x < range.x1; ++x) mask.cells(x, y) = 255;
@@ -182,7 +174,7 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (near_layer(x, y, options.layer * layer)) seeds.push_back({x, y});
+        if (near_layer(x, y, kLayer * layer)) seeds.push_back({x, y});
     for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.

@@ -146,12 +146,5 @@ TEST(Silhouette, TheMasksOfSeveralBoxesAreUnited) {
   EXPECT_FALSE(mask.at(30, 60));
 }
 
-TEST(Silhouette, OptionsAreChecked) {
-  EXPECT_THROW(SilhouetteOptions{.cell = 0}.check(), InvalidOption);
-  EXPECT_THROW(SilhouetteOptions{.core = 1.5}.check(), InvalidOption);
-  EXPECT_THROW(SilhouetteOptions{.layer = 1}.check(), InvalidOption);
-  EXPECT_THROW(SilhouetteOptions{.rim = -1}.check(), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

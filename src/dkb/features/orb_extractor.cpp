@@ -11,31 +11,17 @@
 
 namespace dkb {
 
-void OrbOptions::check() const {
-  require_option(count >= 1, "count", count, ">= 1");
-  require_option(scale > 1.0 && scale <= 4.0, "scale", scale, "in (1, 4]");
-  require_option(levels >= 1 && levels <= 16, "levels", levels, "in 1 ... 16");
-  require_option(fast_threshold_min >= 1 && fast_threshold_min <= 254, "fast_threshold_min", fast_threshold_min,
-                 "in 1 ... 254");
-  require_option(fast_threshold >= fast_threshold_min && fast_threshold <= 254, "fast_threshold", fast_threshold,
-                 "in fast_threshold_min ... 254");
-  require_option(cell_size >= 8, "cell_size", cell_size, ">= 8");
-  require_option(border >= kBriefRadius + kBlurRadius + 1, "border", border, ">= 19, what a descriptor reaches");
-}
-
 OrbExtractor::OrbExtractor(OrbOptions options, Simd simd)
     : options_(options),
       simd_(simd),
       pyramid_({.levels = options.levels, .scale = options.scale}, simd),
       finder_(simd),
       blur_(simd),
-      brief_(simd) {
-  options_.check();
-}
+      brief_(simd) {}
 
 CornerRegion OrbExtractor::region(int level) const {
   const GreyImage& image = pyramid_.level(level);
-  return {options_.border, options_.border, image.width() - options_.border, image.height() - options_.border};
+  return {kOrbBorder, kOrbBorder, image.width() - kOrbBorder, image.height() - kOrbBorder};
 }
 
 void OrbExtractor::find_corners() {
@@ -43,8 +29,8 @@ void OrbExtractor::find_corners() {
   corners_.resize(levels);
   for (size_t i = 0; i < levels; ++i) {
     const int level = static_cast<int>(i);
-    finder_.find(pyramid_.level(level), options_.fast_threshold_min, options_.border, corners_[i]);
-    spread_.drop_weak(region(level), options_.fast_threshold, options_.cell_size, corners_[i]);
+    finder_.find(pyramid_.level(level), options_.fast_threshold_min, kOrbBorder, corners_[i]);
+    spread_.drop_weak(region(level), options_.fast_threshold, kOrbCellSize, corners_[i]);
   }
 }
 

@@ -15,16 +15,17 @@
 
 namespace dkb {
 
+constexpr int kOrbCellSize = 32;  // [px of the level] in which the threshold adapts
+constexpr int kOrbBorder =
+    kBriefRadius + kBlurRadius + 1;  // [px of the level] without corners: what a descriptor reaches
+
 struct OrbOptions {
   int count = 1000;            // features asked for, >= 1; fewer come where the image has no more corners
   double scale = 1.2;          // size of a pyramid level over that of the next, (1, 4]
   int levels = 8;              // pyramid levels, 1 ... 16
   int fast_threshold = 20;     // [grey levels] corner contrast, fast_threshold_min ... 254
   int fast_threshold_min = 7;  // [grey levels] used in cells where the first finds nothing, >= 1
-  int cell_size = 32;          // [px of the level] cells in which the threshold adapts, >= 8
-  int border = 19;             // [px of the level] free of corners at the image's edge, >= 19
   bool subpixel = true;        // refine positions below the pixel
-  void check() const;          // throws InvalidOption
 };
 
 // Oriented FAST corners with rotated BRIEF descriptors on an image pyramid (Rublee et al., ICCV 2011), spread evenly

@@ -223,13 +223,6 @@ TEST(OrbExtractor, ImagesWithoutCornersOrRoomGiveNone) {
   EXPECT_THROW(extractor.extract(GreyImage()), InputError);
 }
 
-TEST(OrbExtractor, RefusesBadOptions) {
-  EXPECT_THROW(OrbExtractor({.count = 0}), InvalidOption);
-  EXPECT_THROW(OrbExtractor({.levels = 17}), InvalidOption);
-  EXPECT_THROW(OrbExtractor({.fast_threshold = 5, .fast_threshold_min = 7}), InvalidOption);
-  EXPECT_THROW(OrbExtractor({.border = 18}), InvalidOption);
-}
-
 TEST(OrbExtractor, SubpixelPositionsAreAtLeastAThirdMoreAccurateThanPixels) {
   const SquareWorld world = test_world(4);
   OrbExtractor refined({.subpixel = true}), rounded({.subpixel = false});

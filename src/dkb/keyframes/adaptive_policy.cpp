@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 
 namespace dkb {
@@ -22,18 +21,6 @@ double median_depth(const KeyframeContext& q) {
 
 }  // namespace
 
-void AdaptiveKeyframeOptions::check() const {
-  parallax.check();
-  require_option(visibility_levels >= 2 && visibility_levels <= 18, "visibility_levels", visibility_levels, "2 ... 18");
-  require_option(min_frames_between >= 1, "min_frames_between", min_frames_between, "at least 1 frame");
-  require_option(floor_min_tracked >= 0, "floor_min_tracked", floor_min_tracked, "at least 0");
-  require_option(floor_few_close >= 0, "floor_few_close", floor_few_close, "at least 0");
-  require_option(floor_many_creatable >= 0, "floor_many_creatable", floor_many_creatable, "at least 0");
-  require_option(floor_reference_ratio >= 0 && floor_reference_ratio <= 1, "floor_reference_ratio",
-                 floor_reference_ratio, "0 ... 1");
-  require_option(floor_kept_ratio >= 0 && floor_kept_ratio <= 1, "floor_kept_ratio", floor_kept_ratio, "0 ... 1");
-}
-
 AdaptiveKeyframeOptions paper_keyframe_options() {
   AdaptiveKeyframeOptions options;
   options.parallax.threshold_min = 10;
@@ -49,9 +36,7 @@ AdaptiveKeyframeOptions paper_keyframe_options() {
 
 AdaptiveKeyframePolicy::AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width,
                                                int image_height)
-    : options_(options), image_width_(image_width), image_height_(image_height), gate_(options.parallax) {
-  options_.check();
-}
+    : options_(options), image_width_(image_width), image_height_(image_height), gate_(options.parallax) {}
 
 const AdaptiveKeyframePolicy::KeyframePoint* AdaptiveKeyframePolicy::find(PointId id) const {
   const auto at = std::lower_bound(keyframe_points_.begin(), keyframe_points_.end(), id,

@@ -25,8 +25,6 @@ struct AdaptiveKeyframeOptions {
   int floor_many_creatable = 70;       // [points] ... while at least so many could be made, >= 0
   double floor_reference_ratio = 0.7;  // or a smaller share of the reference keyframe's points, 0 ... 1
   double floor_kept_ratio = 0.5;       // or of the points tracked in the first frame after the last keyframe, 0 ... 1
-
-  void check() const;  // throws InvalidOption
 };
 
 // DKB section 3.2 as printed: T of 10 to 30, S of eq. 34, four levels, plain sums of cross products; the floor is the

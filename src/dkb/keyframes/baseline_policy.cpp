@@ -2,21 +2,17 @@
 #include <fmt/format.h>
 
 #include "dkb/keyframes/keyframe_policy.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
+namespace {
 
-void BaselineKeyframeOptions::check() const {
-  require_option(frames_between >= 1, "frames_between", frames_between, "at least 1 frame");
-  require_option(min_tracked >= 0, "min_tracked", min_tracked, "at least 0");
-  require_option(reference_ratio >= 0 && reference_ratio <= 1, "reference_ratio", reference_ratio, "0 ... 1");
-  require_option(few_close >= 0, "few_close", few_close, "at least 0");
-  require_option(many_creatable >= 0, "many_creatable", many_creatable, "at least 0");
-}
+// As published with ORB-SLAM2 for RGB-D cameras.
+constexpr int kFewClose = 100;      // [points] fewer tracked close points ...
+constexpr int kManyCreatable = 70;  // [points] ... while at least so many could be made call for a keyframe
 
-BaselineKeyframePolicy::BaselineKeyframePolicy(BaselineKeyframeOptions options) : options_(options) {
-  options_.check();
-}
+}  // namespace
+
+BaselineKeyframePolicy::BaselineKeyframePolicy(BaselineKeyframeOptions options) : options_(options) {}
 
 KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeContext& q, const Map&) {
   const bool settled = q.frame - q.last_relocalisation_frame > options_.frames_between;
@@ -25,8 +21,7 @@ KeyframeDecision BaselineKeyframePolicy::decide(const KeyframeContext& q, const 
   tests.waited = q.mapper_idle || q.frame - q.last_keyframe_frame > options_.frames_between;
   tests.few_points = q.tracked_points < options_.min_tracked;
   tests.view_left = q.tracked_points < options_.reference_ratio * q.reference_points;
-  tests.close_points =
-      q.tracked_close_points < options_.few_close && q.creatable_close_points >= options_.many_creatable;
+  tests.close_points = q.tracked_close_points < kFewClose && q.creatable_close_points >= kManyCreatable;
   decision.insert = settled && tests.waited && !tests.few_points && (tests.view_left || tests.close_points);
   decision.rule = decision.insert ? KeyframeRule::baseline : KeyframeRule::none;
   if (!q.explain) return decision;

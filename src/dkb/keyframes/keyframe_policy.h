@@ -81,9 +81,6 @@ struct BaselineKeyframeOptions {
   // Insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1. Published: 0.9, for
   // another matcher; with ours 0.85 gives as many keyframes as ORB-SLAM3 makes (35 to 39 on fr1_xyz's first 9 s).
   double reference_ratio = 0.85;
-  int few_close = 100;      // [points] fewer tracked close points ...
-  int many_creatable = 70;  // [points] ... while at least so many could be made call for a keyframe
-  void check() const;
 };
 
 class BaselineKeyframePolicy final : public KeyframeDecider {

@@ -4,17 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
-
-void ParallaxGateOptions::check() const {
-  require_option(window >= 1, "parallax.window", window, "at least 1 frame");
-  require_option(threshold_min >= 0, "parallax.threshold_min", threshold_min, "at least 0");
-  require_option(threshold_max >= threshold_min, "parallax.threshold_max", threshold_max, "at least threshold_min");
-  require_option(rotation_max > 0, "parallax.rotation_max", rotation_max, "greater than 0 degrees");
-  require_option(translation_max > 0, "parallax.translation_max", translation_max, "greater than 0");
-}
 
 double units_per_metre(TranslationUnit unit, double median_depth) {
   switch (unit) {
@@ -52,9 +42,7 @@ double parallax_threshold(double factor, double threshold_min, double threshold_
   return threshold_max - factor * (threshold_max - threshold_min);
 }
 
-ParallaxGate::ParallaxGate(const ParallaxGateOptions& options) : options_(options), threshold_(options.threshold_max) {
-  options_.check();
-}
+ParallaxGate::ParallaxGate(const ParallaxGateOptions& options) : options_(options), threshold_(options.threshold_max) {}
 
 bool ParallaxGate::passes(const Parallax& parallax) {
   window_.push_back(parallax);

@@ -22,7 +22,6 @@ struct ParallaxGateOptions {
   double rotation_max = 45.0;     // [deg] Theta_max, > 0                                            (DKB eq. 24)
   double translation_max = 10.0;  // [unit] t_max, > 0
   TranslationUnit translation_unit = TranslationUnit::depth_percent;
-  void check() const;  // throws InvalidOption
 };
 
 // Motion of a frame since a keyframe.

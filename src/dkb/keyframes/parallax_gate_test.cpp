@@ -115,17 +115,5 @@ TEST(ParallaxGate, AStillCameraKeepsItShut) {
   EXPECT_EQ(gate.threshold(), 30);
 }
 
-TEST(ParallaxGate, AnOptionOutOfRangeIsNamed) {
-  ParallaxGateOptions options;
-  options.window = 0;
-  EXPECT_THROW(ParallaxGate{options}, InvalidOption);
-  options = {};
-  options.threshold_max = options.threshold_min - 1;
-  EXPECT_THROW(ParallaxGate{options}, InvalidOption);
-  options = {};
-  options.translation_max = 0;
-  EXPECT_THROW(ParallaxGate{options}, InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

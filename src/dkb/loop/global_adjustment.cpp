@@ -3,17 +3,10 @@
 
 #include "dkb/mapping/ba_window.h"
 #include "dkb/solver/geometric_weights.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 
-void GlobalBaOptions::check() const {
-  require_option(iterations_first >= 1, "global_ba.iterations_first", iterations_first, "at least 1");
-  require_option(iterations_second >= 1, "global_ba.iterations_second", iterations_second, "at least 1");
-}
-
-MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
-                              const GlobalBaOptions& options) {
+MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local) {
   MapCorrection correction;
   const std::vector<KeyframeId> keyframes = map.live_keyframes();
   if (keyframes.size() < 2) return correction;
@@ -27,7 +20,7 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
                                    optics.scale_factor);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;
-  ba.rounds = {options.iterations_first, options.iterations_second};
+  ba.rounds = {5, 10};  // [steps] before and after outliers are told apart
   const BaResult result = bundle_adjust(window.problem, ba);
 
   for (size_t c = 0; c < window.keyframes.size(); ++c)

@@ -2,22 +2,25 @@
 #include "dkb/loop/loop_closer.h"
 
 namespace dkb {
+namespace {
+
+constexpr int kRestKeyframes = 5;  // [keyframes] without a search after a loop was closed: they see the same one
+
+}  // namespace
 
 LoopCloser::LoopCloser(const Optics& optics, const LoopOptions& options, uint64_t seed)
-    : optics_(optics), options_(options), seed_(seed) {
-  options_.check();
-}
+    : optics_(optics), options_(options), seed_(seed) {}
 
 std::optional<MapCorrection> LoopCloser::process(const Map& snapshot, KeyframeId id) {
   if (id < rests_until_) return std::nullopt;
   const auto finding = find_loop(snapshot, id, optics_, options_, seed_);
   if (!finding) return std::nullopt;
-  MapCorrection correction = correct_loop(snapshot, *finding, edges_, options_);
+  MapCorrection correction = correct_loop(snapshot, *finding, edges_);
   if (!finding->merge) {
     const auto added = loop_edges(snapshot, *finding);
     edges_.insert(edges_.end(), added.begin(), added.end());
   }
-  rests_until_ = id + 1 + options_.rest_keyframes;
+  rests_until_ = id + 1 + kRestKeyframes;
   return correction;
 }
 

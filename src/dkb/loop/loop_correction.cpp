@@ -8,17 +8,26 @@
 namespace dkb {
 namespace {
 
-PoseGraphEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points, const LoopOptions& options) {
+constexpr int kEssentialSharedPoints = 100;  // [points] shared by two keyframes whose relative pose is an edge
+// Standard deviation of an edge: what tracking drifts over its length and turn, images of a turning camera being
+// sheared.
+constexpr double kEdgePositionSd = 0.005;      // [m]
+constexpr double kEdgePositionShare = 0.01;    // of the edge's length
+constexpr double kEdgeRotationSd = 0.002;      // [rad]
+constexpr double kEdgeRotationGrowth = 0.004;  // [rad/m]
+constexpr double kEdgeRotationShare = 0.02;    // of the edge's rotation
+
+PoseGraphEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
   PoseGraphEdge e;
   e.a = a;
   e.b = b;
   e.b_from_a = b_from_a;
   const double length = b_from_a.translation.norm();
-  const double position = options.edge_position_sd + options.edge_position_share * length;
-  const double rotation = options.edge_rotation_sd + options.edge_rotation_growth * length +
-                          options.edge_rotation_share * vector_from_rotation(b_from_a.rotation).norm();
+  const double position = kEdgePositionSd + kEdgePositionShare * length;
+  const double rotation = kEdgeRotationSd + kEdgeRotationGrowth * length +
+                          kEdgeRotationShare * vector_from_rotation(b_from_a.rotation).norm();
   // Keyframes that share many points hang together firmly.
-  const double share = std::clamp(shared_points / static_cast<double>(options.essential_shared_points), 0.1, 4.0);
+  const double share = std::clamp(shared_points / static_cast<double>(kEssentialSharedPoints), 0.1, 4.0);
   e.information.setZero();
   e.information.diagonal().head<3>().setConstant(share / (position * position));
   e.information.diagonal().tail<3>().setConstant(share / (rotation * rotation));
@@ -31,7 +40,7 @@ int shared_points(const Keyframe& k, KeyframeId other) {
   return 0;
 }
 
-void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root, const LoopOptions& options,
+void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root,
                         MapCorrection& correction) {
   PoseGraph graph;
   std::vector<int> node(static_cast<size_t>(map.keyframe_count()), -1);
@@ -48,20 +57,18 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   };
   const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared) {
     const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
-    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared, options));
+    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
   };
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
     if (k.parent != kNoKeyframe) add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent));
     for (const Covisible& c : k.covisible)
-      if (c.keyframe > id && c.shared_points >= options.essential_shared_points && c.keyframe != k.parent &&
+      if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
           map.keyframe(c.keyframe)->parent != id)
         add(id, c.keyframe, relative(id, c.keyframe), c.shared_points);
   }
   for (const LoopEdge& e : edges) add(e.a, e.b, e.b_from_a, e.shared_points);
-  PoseGraphOptions solver;
-  solver.iterations = options.graph_iterations;
-  optimise_pose_graph(graph, solver);
+  optimise_pose_graph(graph);
   for (size_t n = 0; n < keyframes.size(); ++n)
     correction.poses.push_back({keyframes[n], map.keyframe(keyframes[n])->cam_from_world, graph.cam_from_world[n]});
 }
@@ -77,8 +84,7 @@ std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
   return edges;
 }
 
-MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std::vector<LoopEdge>& edges,
-                           const LoopOptions& options) {
+MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std::vector<LoopEdge>& edges) {
   MapCorrection correction;
   correction.kind = finding.merge ? MapCorrection::Kind::merge : MapCorrection::Kind::loop;
   correction.far_side = finding.far_area;
@@ -95,7 +101,7 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
     std::vector<LoopEdge> all = edges;
     const auto added = loop_edges(map, finding);
     all.insert(all.end(), added.begin(), added.end());
-    move_by_pose_graph(map, all, map.root(near), options, correction);
+    move_by_pose_graph(map, all, map.root(near), correction);
     return correction;
   }
   Rigid3 moved_from_world = finding.support.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;

@@ -10,24 +10,44 @@ namespace {
 
 constexpr double kDegrees = 57.295779513082321;
 
+// Candidates. All figures of this file: chosen on the simulated rounds and twins, docs/decisions.md.
+constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
+constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
+constexpr int kAreaKeyframes = 8;               // a candidate and its best covisible ones, whose points are matched
+constexpr double kMinShare = 0.2;               // of the area's well-known points that ought to be in view
+
+// Keyframes around the newest one that show the area just there as well.
+constexpr int kSupportKeyframes = 8;             // asked at most
+constexpr int kSupportInliers = 30;              // points of the area that such a keyframe must show
+constexpr double kMaxSupportTranslation = 0.08;  // [m] by which they may differ
+constexpr double kMaxSupportRotation = 3;        // [deg]
+
+// What can have drifted along the shortest path through the map from the one keyframe to the other.
+constexpr double kDriftTranslationShare = 0.08;  // of the path's length
+constexpr double kDriftRotationBase = 8;         // [deg]
+constexpr double kDriftRotationPerMetre = 1.5;   // [deg/m]
+
+// Between maps that are not joined there is no path, and appearance alone decides.
+constexpr int kMergeMinInliers = 80;
+constexpr double kMergeMinShare = 0.3;
+
 // How far the camera is from where it would be, and turned, if the world moved as `moved_from_map`.
-bool supports(const Rigid3& cam_from_world, const PlaceFit& fit, const Rigid3& fit_world_from_world, double translation,
-              double rotation) {
+bool supports(const Rigid3& cam_from_world, const PlaceFit& fit, const Rigid3& fit_world_from_world) {
   const Rigid3 expected = cam_from_world * fit_world_from_world.inverse();
   const Rigid3 difference = fit.cam_from_world * expected.inverse();
-  return difference.translation.norm() <= translation &&
-         kDegrees * vector_from_rotation(difference.rotation).norm() <= rotation;
+  return difference.translation.norm() <= kMaxSupportTranslation &&
+         kDegrees * vector_from_rotation(difference.rotation).norm() <= kMaxSupportRotation;
 }
 
 // Keyframes around `id` that may tell the same: covisible ones and those made just before.
-std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id, int count) {
+std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id) {
   std::vector<KeyframeId> chosen;
   const auto add = [&](KeyframeId k) {
-    if (static_cast<int>(chosen.size()) < count && k != id && map.live_keyframe(k) != nullptr &&
+    if (static_cast<int>(chosen.size()) < kSupportKeyframes && k != id && map.live_keyframe(k) != nullptr &&
         map.root(k) == map.root(id) && std::find(chosen.begin(), chosen.end(), k) == chosen.end())
       chosen.push_back(k);
   };
-  for (KeyframeId k = id - 1; k >= 0 && k >= id - (count + 1) / 2; --k) add(k);
+  for (KeyframeId k = id - 1; k >= 0 && k >= id - (kSupportKeyframes + 1) / 2; --k) add(k);
   for (const Covisible& c : map.keyframe(id)->covisible) add(c.keyframe);
   return chosen;
 }
@@ -100,12 +120,11 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     if (m.id != id && near[static_cast<size_t>(m.id)]) neighbour_score = std::max(neighbour_score, m.score);
   for (const PlaceMatch& m : similar) {
     if (!eligible(m.id) || covered[static_cast<size_t>(m.id)]) continue;
-    if (m.score < options.min_relative_similarity * neighbour_score ||
-        static_cast<int>(candidates.size()) >= options.candidates)
+    if (m.score < kMinRelativeSimilarity * neighbour_score || static_cast<int>(candidates.size()) >= kMaxCandidates)
       break;
     candidates.push_back(m.id);
     const auto& covisible = map.keyframe(m.id)->covisible;
-    for (size_t i = 0; i < std::min<size_t>(covisible.size(), static_cast<size_t>(options.area_keyframes / 2)); ++i)
+    for (size_t i = 0; i < std::min<size_t>(covisible.size(), static_cast<size_t>(kAreaKeyframes / 2)); ++i)
       covered[static_cast<size_t>(covisible[i].keyframe)] = 1;
   }
 
@@ -113,8 +132,8 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
-    const MapArea area = area_around(map, far, options.area_keyframes);
-    const auto located = locate_in_area(map, id, area, optics, options, seed + static_cast<uint64_t>(id));
+    const MapArea area = area_around(map, far, kAreaKeyframes);
+    const auto located = locate_in_area(map, id, area, optics, seed + static_cast<uint64_t>(id));
     if (!located) continue;
     if (!merge) {
       if (path_lengths.empty()) path_lengths = path_lengths_through_map(map, id);
@@ -122,13 +141,13 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
       const double shift = (centre_in_world(*located) - centre_in_world(newest->cam_from_world)).norm();
       const double rotation =
           kDegrees * vector_from_rotation(located->rotation.conjugate() * newest->cam_from_world.rotation).norm();
-      if (shift > options.drift_translation_base + options.drift_translation_share * path_length ||
-          rotation > options.drift_rotation_base + options.drift_rotation_per_metre * path_length)
+      if (shift > options.drift_translation_base + kDriftTranslationShare * path_length ||
+          rotation > kDriftRotationBase + kDriftRotationPerMetre * path_length)
         continue;
     }
-    const auto fit = fit_to_area(map, id, *located, area, optics, options);
-    if (!fit || static_cast<int>(fit->matches.size()) < (merge ? options.merge_min_inliers : options.min_inliers) ||
-        fit->share() < (merge ? options.merge_min_share : options.min_share))
+    const auto fit = fit_to_area(map, id, *located, area, optics);
+    if (!fit || static_cast<int>(fit->matches.size()) < (merge ? kMergeMinInliers : options.min_inliers) ||
+        fit->share() < (merge ? kMergeMinShare : kMinShare))
       continue;
     if (best && best->support.front().fit.matches.size() >= fit->matches.size()) continue;
 
@@ -137,11 +156,11 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     finding.merge = merge;
     finding.far_area = area.keyframes;
     finding.support.push_back({id, *fit});
-    for (KeyframeId supporter : support_candidates(map, id, options.support_keyframes)) {
+    for (KeyframeId supporter : support_candidates(map, id)) {
       const Rigid3& own = map.keyframe(supporter)->cam_from_world;
-      auto seen = fit_to_area(map, supporter, own * far_world_from_world.inverse(), area, optics, options);
-      if (seen && static_cast<int>(seen->matches.size()) >= options.support_inliers &&
-          supports(own, *seen, far_world_from_world, options.support_translation, options.support_rotation))
+      auto seen = fit_to_area(map, supporter, own * far_world_from_world.inverse(), area, optics);
+      if (seen && static_cast<int>(seen->matches.size()) >= kSupportInliers &&
+          supports(own, *seen, far_world_from_world))
         finding.support.push_back({supporter, std::move(*seen)});
     }
     if (static_cast<int>(finding.support.size()) > options.min_support) best = std::move(finding);

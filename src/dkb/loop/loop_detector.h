@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "dkb/loop/loop_options.h"
 #include "dkb/loop/place_verification.h"
 
 namespace dkb {

@@ -74,7 +74,7 @@ TEST(LoopCorrection, ClosesTheRoundAndAdjustmentSharpensIt) {
                           [](const Covisible& c) { return c.keyframe < 5; }))
       << "the ends are connected now";
   EXPECT_FALSE(closer.process(*view, last)) << "a loop is closed once";
-  view = mapper.apply(adjust_globally(*view, world.optics(), {}, {}));
+  view = mapper.apply(adjust_globally(*view, world.optics(), {}));
   EXPECT_LT(worst_error(world, *view), 0.25 * before);
 }
 
@@ -190,19 +190,6 @@ TEST(LoopCloser, TheSameSnapshotsGiveTheSameCorrections) {
     EXPECT_EQ(a->poses[i].after.rotation.coeffs(), b->poses[i].after.rotation.coeffs());
   }
   EXPECT_EQ(a->same, b->same);
-}
-
-TEST(LoopOptions, OutOfRangeIsRefused) {
-  LoopOptions options;
-  EXPECT_NO_THROW(options.check());
-  options.candidates = 0;
-  EXPECT_THROW(options.check(), InvalidOption);
-  options = {};
-  options.drift_translation_share = -1;
-  EXPECT_THROW(LoopCloser(Optics{}, options, 1), InvalidOption);
-  GlobalBaOptions ba;
-  ba.iterations_second = 0;
-  EXPECT_THROW(ba.check(), InvalidOption);
 }
 
 }  // namespace

@@ -11,6 +11,10 @@ namespace {
 
 constexpr int kReliableObservers = 3;
 constexpr int kMinPoseMatches = 10;
+constexpr int kMatchDistance = 60;               // [bits] of a descriptor match
+constexpr float kMatchRatio = 0.85f;             // best over second best distance without a guess
+constexpr int kMinRansacInliers = 15;            // pairs of points that one rigid motion explains
+constexpr float kSearchRadii[] = {12.0f, 4.0f};  // [px] under that motion, and under the refined pose
 
 }  // namespace
 
@@ -28,7 +32,7 @@ MapArea area_around(const Map& map, KeyframeId centre, int keyframes) {
 }
 
 std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const MapArea& area, const Optics& optics,
-                                     const LoopOptions& options, uint64_t seed) {
+                                     uint64_t seed) {
   const Keyframe& k = *map.keyframe(keyframe);
   std::vector<Descriptor> theirs, ours;
   std::vector<int> features;
@@ -39,10 +43,10 @@ std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const 
     features.push_back(static_cast<int>(f));
   }
   MatchOptions match;
-  match.max_distance = options.match_distance;
-  match.ratio = static_cast<float>(options.match_ratio);
+  match.max_distance = kMatchDistance;
+  match.ratio = kMatchRatio;
   const auto matches = match_brute_force(ours, theirs, match);
-  if (static_cast<int>(matches.size()) < options.min_ransac_inliers) return std::nullopt;
+  if (static_cast<int>(matches.size()) < kMinRansacInliers) return std::nullopt;
   std::vector<Eigen::Vector3d> in_world, in_cam;
   std::vector<double> sigma;
   for (const DescriptorMatch& m : matches) {
@@ -55,7 +59,7 @@ std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const 
   }
   RansacOptions ransac;
   ransac.chi2 = 7.815;
-  ransac.min_inliers = options.min_ransac_inliers;
+  ransac.min_inliers = kMinRansacInliers;
   ransac.seed = seed;
   const RansacPose found = estimate_rigid_motion(in_world, in_cam, sigma, ransac);
   if (!found.ok) return std::nullopt;
@@ -63,14 +67,14 @@ std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const 
 }
 
 std::optional<PlaceFit> fit_to_area(const Map& map, KeyframeId keyframe, const Rigid3& cam_from_world,
-                                    const MapArea& area, const Optics& optics, const LoopOptions& options) {
+                                    const MapArea& area, const Optics& optics) {
   const RgbdFeatures& features = *map.keyframe(keyframe)->features;
   PlaceFit fit;
   fit.cam_from_world = cam_from_world;
-  for (const double radius : {options.radius_first, options.radius}) {
+  for (const float radius : kSearchRadii) {
     ProjectionMatchOptions match;
-    match.radius = static_cast<float>(radius);
-    match.max_distance = options.match_distance;
+    match.radius = radius;
+    match.max_distance = kMatchDistance;
     match.ratio = 0.9f;
     std::vector<uint8_t> visible(area.points.size(), 0);
     const auto matches = match_by_projection(area.points, features, optics.camera, fit.cam_from_world,

@@ -7,7 +7,6 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
-#include "dkb/loop/loop_options.h"
 #include "dkb/map/map.h"
 #include "dkb/matching/candidates.h"
 
@@ -41,11 +40,11 @@ struct PlaceFit {
 // Descriptors matched without any guess, then one rigid motion between the keyframe's points and the area's by RANSAC
 // (3-D to 3-D). The keyframe's pose in the area's world, or nothing. Deterministic for a seed.
 std::optional<Rigid3> locate_in_area(const Map& map, KeyframeId keyframe, const MapArea& area, const Optics& optics,
-                                     const LoopOptions& options, uint64_t seed);
+                                     uint64_t seed);
 
 // Guided matching by projection, and the pose refined on it; twice, the second time within less. Nothing when too few
 // points for a pose are found. Deterministic.
 std::optional<PlaceFit> fit_to_area(const Map& map, KeyframeId keyframe, const Rigid3& cam_from_world,
-                                    const MapArea& area, const Optics& optics, const LoopOptions& options);
+                                    const MapArea& area, const Optics& optics);
 
 }  // namespace dkb

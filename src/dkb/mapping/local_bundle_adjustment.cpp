@@ -5,17 +5,8 @@
 #include <cmath>
 
 #include "dkb/mapping/ba_window.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
-
-void LocalBaOptions::check() const {
-  require_option(free_keyframes >= 1, "free_keyframes", free_keyframes, "at least 1");
-  require_option(fixed_keyframes >= 1, "fixed_keyframes", fixed_keyframes, "at least 1");
-  require_option(iterations_first >= 1, "iterations_first", iterations_first, "at least 1");
-  require_option(iterations_second >= 1, "iterations_second", iterations_second, "at least 1");
-  weights.check();
-}
 
 LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
                                       double scale_factor, const LocalBaOptions& options) {
@@ -53,7 +44,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   if (options.weighted) set_geometric_weights(problem, options.weights);
 
   BaOptions ba;
-  ba.rounds = {options.iterations_first, options.iterations_second};
+  ba.rounds = {4, 6};               // [steps] before and after outliers are told apart
   ba.prefilter = options.weighted;  // DKB section 3.3 leaves gross errors out beforehand
   const BaResult result = bundle_adjust(problem, ba);
 

@@ -12,13 +12,10 @@
 namespace dkb {
 
 struct LocalBaOptions {
-  int free_keyframes = 12;    // the newest keyframe and its best covisible ones, >= 1
-  int fixed_keyframes = 20;   // others that see their points, those with most first, >= 1
-  int iterations_first = 4;   // [steps] before outliers are told apart, >= 1
-  int iterations_second = 6;  // [steps] after, >= 1
-  bool weighted = true;       // geometric weights of DKB section 3.3 (switch BA of the paper's ablation)
+  int free_keyframes = 12;   // the newest keyframe and its best covisible ones, >= 1
+  int fixed_keyframes = 20;  // others that see their points, those with most first, >= 1
+  bool weighted = true;      // geometric weights of DKB section 3.3 (switch BA of the paper's ablation)
   GeometricWeightOptions weights;
-  void check() const;
 };
 
 struct LocalBaReport {

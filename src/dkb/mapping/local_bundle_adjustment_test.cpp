@@ -193,18 +193,5 @@ TEST_F(LocalBa, WeightsAreAtWorkOnlyWhenAskedFor) {
   EXPECT_NE(light, heavy);
 }
 
-TEST(LocalBaOptions, AreChecked) {
-  const auto rejects = [](auto change) {
-    LocalBaOptions options;
-    change(options);
-    EXPECT_THROW(options.check(), InvalidOption);
-  };
-  rejects([](auto& o) { o.free_keyframes = 0; });
-  rejects([](auto& o) { o.fixed_keyframes = 0; });
-  rejects([](auto& o) { o.iterations_first = 0; });
-  rejects([](auto& o) { o.iterations_second = 0; });
-  rejects([](auto& o) { o.weights.edge_weight = 0; });
-}
-
 }  // namespace
 }  // namespace dkb

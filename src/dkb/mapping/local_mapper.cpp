@@ -5,24 +5,21 @@
 #include <cmath>
 
 #include "dkb/matching/candidates.h"
-#include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 
 namespace dkb {
+namespace {
 
-void MappingOptions::check() const {
-  require_option(min_shared_points >= 1, "min_shared_points", min_shared_points, "at least 1");
-  require_option(min_found_ratio >= 0 && min_found_ratio <= 1, "min_found_ratio", min_found_ratio, "0 ... 1");
-  require_option(probation_keyframes >= 1, "probation_keyframes", probation_keyframes, "at least 1");
-  require_option(min_observers >= 2, "min_observers", min_observers, "at least 2");
-  require_option(redundant_share >= 0 && redundant_share <= 1, "redundant_share", redundant_share, "0 ... 1");
-  require_option(redundant_observers >= 1, "redundant_observers", redundant_observers, "at least 1");
-  require_option(fusion_keyframes >= 0, "fusion_keyframes", fusion_keyframes, "at least 0");
-  require_option(fusion_radius > 0, "fusion_radius", fusion_radius, "greater than 0 px");
-  require_option(seam_tolerance >= 1, "seam_tolerance", seam_tolerance, "at least 1");
-  creation.check();
-  ba.check();
-}
+constexpr int kMinSharedPoints = 15;     // that make two keyframes covisible
+constexpr double kMinFoundRatio = 0.25;  // found / visible below which a young point is dropped
+constexpr int kProbationKeyframes = 3;   // after its birth that a point is on probation
+constexpr int kMinObservers = 2;         // keyframes that must see a point by the end of its probation
+constexpr int kRedundantObservers = 3;   // others at the same scale or finer that make a keyframe's point redundant
+constexpr int kFusionKeyframes = 10;     // covisible keyframes whose points are fused with a new keyframe's
+constexpr double kFusionRadius = 3.0;    // [px] at the finest level
+constexpr double kSeamTolerance = 2.0;   // factor on radius and error limit of fusion where a loop was just closed
+
+}  // namespace
 
 LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
                          const MappingOptions& options, Map map)
@@ -32,9 +29,8 @@ LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, do
       levels_(levels),
       options_(options),
       map_(std::move(map)) {
-  options_.check();
   for (PointId id : map_.live_points())
-    if (map_.keyframe_count() - 1 - map_.point(id)->born_at < options_.probation_keyframes) young_.push_back(id);
+    if (map_.keyframe_count() - 1 - map_.point(id)->born_at < kProbationKeyframes) young_.push_back(id);
 }
 
 MapView LocalMapper::process(const KeyframePacket& packet) {
@@ -43,12 +39,12 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   if (packet.id == kNoKeyframe) return map_.snapshot();
   insert(packet);
   cull_points(packet.id);
-  const auto triangulated = triangulate_new_points(map_, packet.id, camera_, noise_, scale_factor_, options_.creation);
+  const auto triangulated = triangulate_new_points(map_, packet.id, camera_, noise_, scale_factor_);
   young_.insert(young_.end(), triangulated.begin(), triangulated.end());
   report_.points_created += static_cast<int>(triangulated.size());
   refresh(triangulated);
   fuse_neighbours(packet.id);
-  map_.update_covisibility(packet.id, options_.min_shared_points);
+  map_.update_covisibility(packet.id, kMinSharedPoints);
   if (map_.live_keyframe_count() > 1) {
     const Stopwatch ba;
     const LocalBaReport adjusted =
@@ -75,11 +71,11 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
     if (map_.live_keyframe(k) != nullptr) near.push_back(k);
   for (KeyframeId k : correction.far_side)
     if (map_.live_keyframe(k) != nullptr) far.push_back(k);
-  for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), options_.seam_tolerance);
-  for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), options_.seam_tolerance);
+  for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), kSeamTolerance);
+  for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), kSeamTolerance);
   near.insert(near.end(), far.begin(), far.end());
   refresh(map_.points_of(near));
-  for (KeyframeId k : near) map_.update_covisibility(k, options_.min_shared_points);
+  for (KeyframeId k : near) map_.update_covisibility(k, kMinSharedPoints);
   times_.add("map_correction", whole.ms());
   return map_.snapshot();
 }
@@ -126,7 +122,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   report_.points_created += static_cast<int>(born.size());
   young_.insert(young_.end(), born.begin(), born.end());
   refresh(map_.points_of({packet.id}));
-  map_.update_covisibility(packet.id, options_.min_shared_points);
+  map_.update_covisibility(packet.id, kMinSharedPoints);
   const auto& covisible = map_.keyframe(packet.id)->covisible;
   if (!covisible.empty())
     map_.set_parent(packet.id, covisible.front().keyframe);
@@ -140,13 +136,12 @@ void LocalMapper::cull_points(KeyframeId newest) {
     const MapPoint* p = map_.point(id);
     if (p == nullptr) continue;
     const int age = newest - p->born_at;
-    const bool rarely_found = p->found < options_.min_found_ratio * p->visible;
-    const bool rarely_seen =
-        age >= options_.probation_keyframes && static_cast<int>(p->observations.size()) < options_.min_observers;
+    const bool rarely_found = p->found < kMinFoundRatio * p->visible;
+    const bool rarely_seen = age >= kProbationKeyframes && static_cast<int>(p->observations.size()) < kMinObservers;
     if (rarely_found || rarely_seen) {
       map_.remove_point(id);
       ++report_.points_culled;
-    } else if (age < options_.probation_keyframes) {
+    } else if (age < kProbationKeyframes) {
       still_young.push_back(id);
     }
   }
@@ -173,7 +168,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
   }
   const Keyframe& k = *map_.keyframe(keyframe);
   ProjectionMatchOptions match;
-  match.radius = static_cast<float>(tolerance * options_.fusion_radius);
+  match.radius = static_cast<float>(tolerance * kFusionRadius);
   match.max_distance = 50;
   match.ratio = 1.0f;
   const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_,
@@ -206,7 +201,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
 void LocalMapper::fuse_neighbours(KeyframeId id) {
   std::vector<KeyframeId> neighbours;
   for (const Covisible& c : map_.keyframe(id)->covisible)
-    if (static_cast<int>(neighbours.size()) < options_.fusion_keyframes) neighbours.push_back(c.keyframe);
+    if (static_cast<int>(neighbours.size()) < kFusionKeyframes) neighbours.push_back(c.keyframe);
   for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, map_.points_of({id}));
   const std::vector<PointId> all = map_.points_of(neighbours);
   report_.points_fused += fuse_into(id, all);
@@ -223,13 +218,13 @@ void LocalMapper::cull_keyframes(KeyframeId newest) {
       const MapPoint* p = map_.point(k->points[f]);
       if (p == nullptr) continue;
       ++points;
-      if (static_cast<int>(p->observations.size()) <= options_.redundant_observers) continue;
+      if (static_cast<int>(p->observations.size()) <= kRedundantObservers) continue;
       const int octave = k->features->keypoints[f].octave;
       int as_fine = 0;
       for (const Observation& o : p->observations)
         as_fine += o.keyframe != c.keyframe &&
                    map_.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)].octave <= octave + 1;
-      redundant += as_fine >= options_.redundant_observers;
+      redundant += as_fine >= kRedundantObservers;
     }
     if (points > 0 && redundant > options_.redundant_share * points) {
       map_.cull_keyframe(c.keyframe);

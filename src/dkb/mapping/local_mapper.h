@@ -15,18 +15,8 @@
 namespace dkb {
 
 struct MappingOptions {
-  int min_shared_points = 15;     // [points] shared points that make two keyframes covisible, >= 1
-  double min_found_ratio = 0.25;  // found / visible below which a young point is dropped, 0 ... 1
-  int probation_keyframes = 3;    // [keyframes] after its birth that a point is on probation, >= 1
-  int min_observers = 2;          // keyframes that must see a point by the end of its probation, >= 2
-  double redundant_share = 0.9;   // a keyframe is culled when this share of its points ..., 0 ... 1
-  int redundant_observers = 3;    // ... is seen by so many others at the same scale or finer, >= 1
-  int fusion_keyframes = 10;      // covisible keyframes whose points are fused with a new keyframe's, >= 0
-  double fusion_radius = 3.0;     // [px] at the finest level, > 0
-  double seam_tolerance = 2.0;    // factor on radius and error limit of fusion where a loop was just closed, >= 1
-  PointCreationOptions creation;
+  double redundant_share = 0.9;  // a keyframe is culled when this share of its points is seen well elsewhere, 0 ... 1
   LocalBaOptions ba;
-  void check() const;
 };
 
 struct MappingReport {

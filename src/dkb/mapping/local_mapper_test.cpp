@@ -248,21 +248,5 @@ TEST(RefreshPoint, TakesTheDescriptorNearestToTheOthers) {
   EXPECT_LT((refreshed.normal - Eigen::Vector3f(0, 0, -1)).norm(), 1e-6F) << "the sides cancel";
 }
 
-TEST(MappingOptions, AreChecked) {
-  const auto rejects = [](auto change) {
-    MappingOptions options;
-    change(options);
-    EXPECT_THROW(options.check(), InvalidOption);
-  };
-  rejects([](auto& o) { o.min_shared_points = 0; });
-  rejects([](auto& o) { o.min_found_ratio = 1.5; });
-  rejects([](auto& o) { o.probation_keyframes = 0; });
-  rejects([](auto& o) { o.min_observers = 1; });
-  rejects([](auto& o) { o.redundant_share = -0.1; });
-  rejects([](auto& o) { o.fusion_radius = 0; });
-  rejects([](auto& o) { o.creation.neighbours = -1; });
-  rejects([](auto& o) { o.ba.free_keyframes = 0; });
-}
-
 }  // namespace
 }  // namespace dkb

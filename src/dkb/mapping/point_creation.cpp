@@ -6,10 +6,12 @@
 #include <cmath>
 #include <optional>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
+
+constexpr int kMaxDistance = 50;        // [bits] largest Hamming distance of an epipolar match
+constexpr double kChi2Epipolar = 3.84;  // squared distance to the epipolar line over sigma^2 (1 d.o.f., 95 %)
+constexpr double kChi2Pixel = 5.991;    // squared reprojection error over sigma^2 (2 d.o.f., 95 %)
 
 // Point nearest to two rays, from the least squares of both; nothing when they are parallel or it lies behind.
 std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a,
@@ -63,14 +65,6 @@ DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& desc
 
 }  // namespace
 
-void PointCreationOptions::check() const {
-  require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
-  require_option(min_parallax_deg > 0, "min_parallax_deg", min_parallax_deg, "greater than 0 degrees");
-  require_option(max_distance >= 0 && max_distance <= 256, "max_distance", max_distance, "0 ... 256 bits");
-  require_option(chi2_epipolar > 0, "chi2_epipolar", chi2_epipolar, "greater than 0");
-  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "greater than 0");
-}
-
 std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera,
                                             const SensorNoise& noise, double scale_factor,
                                             const PointCreationOptions& options) {
@@ -86,7 +80,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
     if (b_from_a.translation.norm() < 0.02) continue;  // [m] nothing can be triangulated over so short a base
     const Eigen::Matrix3d rotation_b_from_a = b_from_a.matrix3();
     const Eigen::Matrix3d essential = skew(b_from_a.translation) * rotation_b_from_a;
-    const std::vector<FreeFeature> free_b = free_features(b, options.chi2_epipolar, sigmas);
+    const std::vector<FreeFeature> free_b = free_features(b, kChi2Epipolar, sigmas);
     struct Found {
       int feature_a, feature_b, distance;
       Eigen::Vector3d point;
@@ -101,7 +95,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const Eigen::Vector3d line_px(line.x() / camera.fx, line.y() / camera.fy,
                                     line.z() - line.x() * camera.cx / camera.fx - line.y() * camera.cy / camera.fy);
       const DescriptorMatch best =
-          best_on_line(line_px, a.features->descriptors[fa], free_b, *b.features, options.max_distance);
+          best_on_line(line_px, a.features->descriptors[fa], free_b, *b.features, kMaxDistance);
       if (best.feature < 0) continue;
       const Keypoint& kb = b.features->keypoints[static_cast<size_t>(best.feature)];
       const Eigen::Vector3d world_ray_a = (world_from_a.rotation * ray_a).normalized();
@@ -114,8 +108,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
         const double sigma = sigmas[static_cast<size_t>(k.octave)];
-        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > options.chi2_pixel * sigma * sigma)
-          return false;
+        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * sigma * sigma) return false;
         return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < 3 * noise.depth_sigma(k.depth);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;

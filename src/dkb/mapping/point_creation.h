@@ -12,16 +12,12 @@ namespace dkb {
 struct PointCreationOptions {
   int neighbours = 6;             // covisible keyframes to triangulate with, >= 0 (0 = depth alone makes points)
   double min_parallax_deg = 1.0;  // [deg] between the rays of a new point, > 0
-  int max_distance = 50;          // [bits] largest Hamming distance of an epipolar match, 0 ... 256
-  double chi2_epipolar = 3.84;    // squared distance to the epipolar line over sigma^2, > 0 (1 d.o.f., 95 %)
-  double chi2_pixel = 5.991;      // squared reprojection error over sigma^2, > 0
-  void check() const;
 };
 
 // Makes points from features of `newest` that show none yet, by matching them along epipolar lines in covisible
 // keyframes and triangulating. The ids of the new points, increasing.
 std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera,
                                             const SensorNoise& noise, double scale_factor,
-                                            const PointCreationOptions& options);
+                                            const PointCreationOptions& options = {});
 
 }  // namespace dkb

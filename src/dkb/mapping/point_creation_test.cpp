@@ -138,18 +138,5 @@ TEST_F(PointCreation, ASecondCallFindsNothingMore) {
   EXPECT_TRUE(create().empty());
 }
 
-TEST(PointCreationOptions, AreChecked) {
-  const auto rejects = [](auto change) {
-    PointCreationOptions options;
-    change(options);
-    EXPECT_THROW(options.check(), InvalidOption);
-  };
-  rejects([](auto& o) { o.neighbours = -1; });
-  rejects([](auto& o) { o.min_parallax_deg = 0; });
-  rejects([](auto& o) { o.max_distance = 257; });
-  rejects([](auto& o) { o.chi2_epipolar = 0; });
-  rejects([](auto& o) { o.chi2_pixel = -1; });
-}
-
 }  // namespace
 }  // namespace dkb

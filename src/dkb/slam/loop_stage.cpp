@@ -3,25 +3,12 @@
 
 #include <algorithm>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
 
 constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
 
 }  // namespace
-
-void LoopStageOptions::check() const {
-  loop.check();
-  global_ba.check();
-  require_option(loop_latency.base > 0, "loop.latency", loop_latency.base, "greater than 0 s");
-  require_option(loop_latency.per_keyframe >= 0, "loop.latency_per_keyframe", loop_latency.per_keyframe,
-                 "at least 0 s");
-  require_option(global_ba_latency.base > 0, "global_ba.latency", global_ba_latency.base, "greater than 0 s");
-  require_option(global_ba_latency.per_keyframe >= 0, "global_ba.latency_per_keyframe", global_ba_latency.per_keyframe,
-                 "at least 0 s");
-}
 
 LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, const LocalBaOptions& local_ba,
                      uint64_t seed, bool threaded)
@@ -42,18 +29,15 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
           },
           {.name = "loop search", .threaded = threaded, .priority = ThreadPriority::background}),
       adjustment_(
-          [optics, local_ba, ba = options.global_ba](const Task& task) {
+          [optics, local_ba](const Task& task) {
             const Stopwatch watch;
             Result result;
             result.generation = task.generation;
-            result.correction =
-                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, ba));
+            result.correction = std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba));
             result.ms = watch.ms();
             return result;
           },
-          {.name = "global bundle adjustment", .threaded = threaded, .priority = ThreadPriority::background}) {
-  options_.check();
-}
+          {.name = "global bundle adjustment", .threaded = threaded, .priority = ThreadPriority::background}) {}
 
 void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip) {
   const int keyframes = view->live_keyframe_count();

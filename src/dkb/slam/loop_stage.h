@@ -22,10 +22,8 @@ struct BackgroundLatency {
 
 struct LoopStageOptions {
   LoopOptions loop;
-  GlobalBaOptions global_ba;
   BackgroundLatency loop_latency{1.0 / 3, 0.02 / 30};
   BackgroundLatency global_ba_latency{0.5, 0.4 / 30};
-  void check() const;
 };
 
 // Loop closing and global bundle adjustment beside tracking and mapping, each on its own thread. Both work on views

@@ -32,7 +32,7 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
     mapper.apply(*correction);
   }
   if (!is_joined(mapper.map())) return std::nullopt;
-  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba, options.loop_closing.global_ba));
+  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba));
   result.map = mapper.map();
   return result;
 }

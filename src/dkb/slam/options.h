@@ -5,8 +5,6 @@
 #include <string>
 
 #include "dkb/dense/dense_options.h"
-#include "dkb/dynamics/mover_tracker.h"
-#include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
@@ -24,10 +22,10 @@ namespace dkb {
 
 // How the stages run. None of it changes a dataset run's result, except mapper_latency.
 struct PipelineOptions {
-  bool threaded = true;    // mapping on its own thread; false: the same bytes from one thread
-  bool realtime = false;   // never wait for mapping; take its results when they are there
+  bool threaded = true;          // mapping on its own thread; false: the same bytes from one thread
+  bool realtime = false;         // never wait for mapping; take its results when they are there
   double mapper_latency = 0.06;  // [s] after which mapping becomes visible to tracking, in whole frames, > 0
-  int mapper_queue = 4;    // [keyframes] outstanding at most in a real-time run, >= 1
+  int mapper_queue = 4;          // [keyframes] outstanding at most in a real-time run, >= 1
 };
 
 // What the stages are made from.
@@ -44,8 +42,6 @@ struct SlamOptions {
   ReadoutOptions readout;
   bool final_ba = false;  // adjust the whole map once more at the end
   DynamicsOptions dynamics;
-  PointEvidenceOptions evidence;
-  MoverTrackerOptions movers;
   DenseOptions dense;
   bool dense_map = false;  // keep what the dense map is made of
   PipelineOptions pipeline;

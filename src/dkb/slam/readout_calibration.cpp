@@ -4,28 +4,20 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
 constexpr int kMinMatches = 30;
+constexpr double kStepSd = 5e-4;       // [s] uncertainty of a step below which it is taken
+constexpr double kMaxReadout = 0.033;  // [s] largest readout believed in: a frame's time at 30 Hz
 }  // namespace
-
-void ReadoutOptions::check() const {
-  require_option(step_sd > 0, "readout.step_sd", step_sd, "greater than 0 s");
-  require_option(max_readout > 0, "readout.max_readout", max_readout, "greater than 0 s");
-}
 
 ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
                                        const ReadoutOptions& options)
     : camera_(camera),
       noise_(noise),
       scale_factor_(scale_factor),
-      options_(options),
       readout_(camera.readout),
-      known_(camera.readout > 0 || !options.estimate) {
-  options_.check();
-}
+      known_(camera.readout > 0 || !options.estimate) {}
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
                              const std::vector<std::optional<Eigen::Vector3d>>& positions) {
@@ -66,8 +58,8 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
   const Vector6d explained = factor.solve(pose_readout);
   information_ += std::max(0.0, readout_readout - explained.dot(pose_readout));
   gradient_ += readout_gradient - explained.dot(pose_gradient);
-  if (information_ * options_.step_sd * options_.step_sd < 1) return;
-  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, options_.max_readout);
+  if (information_ * kStepSd * kStepSd < 1) return;
+  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, kMaxReadout);
   information_ = gradient_ = 0;
 }
 

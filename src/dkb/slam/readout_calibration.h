@@ -12,10 +12,7 @@
 namespace dkb {
 
 struct ReadoutOptions {
-  bool estimate = true;        // when the camera's file does not tell the readout
-  double step_sd = 5e-4;       // [s] uncertainty of a step below which it is taken, > 0
-  double max_readout = 0.033;  // [s] largest readout believed in, > 0
-  void check() const;
+  bool estimate = true;  // when the camera's file does not tell the readout
 };
 
 // Learns how long a rolling shutter takes from the first row to the last, while the camera is in use. Rows that are
@@ -40,7 +37,6 @@ class ReadoutCalibration {
   CameraModel camera_;
   SensorNoise noise_;
   double scale_factor_;
-  ReadoutOptions options_;
   double readout_;
   bool known_;
   double information_ = 0, gradient_ = 0;  // of the step at work

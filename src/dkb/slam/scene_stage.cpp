@@ -8,13 +8,11 @@
 #include "dkb/util/errors.h"
 
 namespace dkb {
+namespace {
 
-void DynamicsOptions::check() const {
-  rivals.check();
-  motion.check();
-  carried.check();
-  require_option(support_cell >= 2 && support_cell <= 32, "dynamics.support_cell", support_cell, "2 ... 32 px");
-}
+constexpr int kSupportCell = 4;  // [px] cells of the motion segmentation when it only supports another detector
+
+}  // namespace
 
 SceneStage::SceneStage(const Camera& camera, const DynamicsOptions& options, const Detectors& detectors, bool threaded,
                        bool realtime)
@@ -25,14 +23,13 @@ SceneStage::SceneStage(const Camera& camera, const DynamicsOptions& options, con
       slow_(detectors.slow),
       carried_(camera, options.carried) {
   options_.rivals.flow = options_.carried.flow;
-  options_.check();
   schedule_.check();
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
   segments_motion_ = detectors.motion;
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
-  if (!segments_motion_) options_.motion.cell = options_.support_cell;
+  if (!segments_motion_) options_.motion.cell = kSupportCell;
   if (segments_motion_ || supports) motion_.emplace(camera, options_.motion);
   for (const auto& detector : prompt_) detector->reset();
   if (slow_ == nullptr) return;

@@ -20,8 +20,6 @@ struct DynamicsOptions {
   RivalFilterOptions rivals;
   MotionOptions motion;
   CarriedObjectsOptions carried;
-  int support_cell = 4;  // [px] cells of the motion segmentation when it only supports another detector, 2 ... 32
-  void check() const;
 };
 
 // What tracking knows before it looks at a frame.

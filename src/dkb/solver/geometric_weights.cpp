@@ -76,21 +76,13 @@ double adaptive_edge_weight(const BaProblem& problem, const std::vector<PointSha
   const double redundancy = std::min(planar.redundancy, edge.redundancy);
   const double trust = redundancy / (redundancy + options.adaptive_redundancy);
   const double weight = std::pow(planar.variance() / edge.variance(), trust);
-  return std::clamp(weight, options.adaptive_min, options.adaptive_max);
+  return std::clamp(weight, 1 / options.adaptive_max, options.adaptive_max);
 }
 
 }  // namespace
 
-void GeometricWeightOptions::check() const {
-  require_option(edge_weight > 0 && edge_weight <= 10, "edge_weight", edge_weight, "in (0, 10]");
-  require_option(adaptive_min > 0 && adaptive_min <= 1, "adaptive_min", adaptive_min, "in (0, 1]");
-  require_option(adaptive_max >= 1, "adaptive_max", adaptive_max, ">= 1");
-  require_option(adaptive_redundancy > 0, "adaptive_redundancy", adaptive_redundancy, "> 0");
-}
-
 GeometricWeights classify_points(std::span<const Eigen::Vector3d> centres_in_world, std::span<const int> observers,
                                  std::span<const int> first, const GeometricWeightOptions& options) {
-  options.check();
   if (first.empty() || first.front() != 0 || first.back() != static_cast<int>(observers.size()) ||
       !std::is_sorted(first.begin(), first.end())) {
     throw InputError("geometric weights: `first` must rise from 0 to the number of observers");

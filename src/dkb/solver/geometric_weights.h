@@ -14,11 +14,9 @@ struct GeometricWeightOptions {
   // The ratio of the two classes' residual variances, estimated from the residuals, instead of the fixed edge_weight.
   // Measures better over many seeds (docs/benchmarks.md).
   bool adaptive = true;
-  double edge_weight = 1.5;  // w of edge points where not adaptive, (0, 10]; planar points have 1     (DKB Table 1)
-  double adaptive_min = 0.5, adaptive_max = 2.0;  // limits of that ratio, 0 < min <= 1 <= max
-  double adaptive_redundancy = 200;               // redundant measurements at which the estimate counts half, > 0
-
-  void check() const;  // throws InvalidOption
+  double edge_weight = 1.5;   // w of edge points where not adaptive, (0, 10]; planar points have 1     (DKB Table 1)
+  double adaptive_max = 2.0;  // largest such ratio, and its inverse the smallest, >= 1
+  double adaptive_redundancy = 200;  // redundant measurements at which the estimate counts half, > 0
 };
 
 enum class PointShape : uint8_t { planar, edge };

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
 
@@ -22,12 +20,6 @@ std::vector<Covisible> votes_of(const std::vector<PointId>& points, const Map& m
 }
 
 }  // namespace
-
-void LocalMapOptions::check() const {
-  require_option(voted_keyframes >= 1, "voted_keyframes", voted_keyframes, "at least 1");
-  require_option(neighbours_of_each >= 0, "neighbours_of_each", neighbours_of_each, "at least 0");
-  require_option(keyframes >= 1, "keyframes", keyframes, "at least 1");
-}
 
 KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& map) {
   const auto ranked = votes_of(points, map);

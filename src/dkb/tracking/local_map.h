@@ -12,7 +12,6 @@ struct LocalMapOptions {
   int voted_keyframes = 30;    // keyframes that share most points with the frame, >= 1
   int neighbours_of_each = 5;  // covisible keyframes added for each of them, >= 0
   int keyframes = 60;          // at most so many in all, >= 1
-  void check() const;
 };
 
 // Keyframe that shares most of `points`, the older one in a tie; kNoKeyframe when none is in the map.
@@ -21,6 +20,6 @@ KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& 
 // The candidates around a frame that shows `points`: all points of the keyframes that see them and of their neighbours,
 // by increasing id.
 std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map,
-                                            const LocalMapOptions& options);
+                                            const LocalMapOptions& options = {});
 
 }  // namespace dkb

@@ -125,17 +125,5 @@ TEST(LocalMap, LeavesOutWhatWasRemovedOrFused) {
   EXPECT_EQ(ids_of(local_map_candidates({w.a[2]}, w.map, options)), (std::vector<PointId>{w.a[2], w.a[3], w.a[4]}));
 }
 
-TEST(LocalMap, RejectsOptionsOutOfRange) {
-  LocalMapOptions options;
-  options.voted_keyframes = 0;
-  EXPECT_THROW(options.check(), InvalidOption);
-  options = {};
-  options.neighbours_of_each = -1;
-  EXPECT_THROW(options.check(), InvalidOption);
-  options = {};
-  options.keyframes = 0;
-  EXPECT_THROW(options.check(), InvalidOption);
-}
-
 }  // namespace
 }  // namespace dkb

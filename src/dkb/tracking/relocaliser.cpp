@@ -6,12 +6,24 @@
 
 #include "dkb/matching/pose_observation.h"
 #include "dkb/tracking/descriptor_pose.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
 constexpr size_t kWellKnownObservers = 3;  // keyframes that see a point which is to be expected in view
+
+// Of what a lost camera is tried with. All figures: chosen on the twins, where no view is a place seen before.
+constexpr size_t kCandidates = 6;               // look-alike keyframes that are tried
+constexpr size_t kNeighbours = 4;               // covisible keyframes whose points are matched along with each one's
+constexpr int kMinMatches = 15;                 // by descriptor alone that make a candidate worth a try
+constexpr int kMinRansacInliers = 10;           // of these, that must agree on a pose
+constexpr float kRadius = 10, kRadiusFine = 4;  // [px] first and second search nearby that pose
+
+constexpr double kMinShare = 0.1;        // of the map's well-known points in view that must be found
+constexpr double kMinSimilarity = 0.7;   // of those points that the image shows at all, that must look as they did
+constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
+constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
+constexpr double kClearLead = 0.03;      // ... unless they look less alike by this share; rivals make all worthless
 
 bool same_place(const Rigid3& a, const Rigid3& b) {
   return (centre_in_world(a) - centre_in_world(b)).norm() < 0.1 &&
@@ -20,51 +32,23 @@ bool same_place(const Rigid3& a, const Rigid3& b) {
 
 }  // namespace
 
-void RelocalisationOptions::check() const {
-  require_option(candidates >= 1, "candidates", candidates, "at least 1");
-  require_option(neighbours >= 0, "neighbours", neighbours, "at least 0");
-  require_option(min_matches >= 6, "min_matches", min_matches, "at least 6");
-  require_option(min_ransac_inliers >= 6, "min_ransac_inliers", min_ransac_inliers, "at least 6");
-  require_option(radius > 0, "radius", radius, "greater than 0 px");
-  require_option(radius_fine > 0, "radius_fine", radius_fine, "greater than 0 px");
-  require_option(min_inliers >= 6, "min_inliers", min_inliers, "at least 6");
-  require_option(min_share >= 0 && min_share <= 1, "min_share", min_share, "0 ... 1");
-  require_option(min_similarity >= 0 && min_similarity <= 1, "min_similarity", min_similarity, "0 ... 1");
-  require_option(max_position_sd > 0, "max_position_sd", max_position_sd, "greater than 0 m");
-  require_option(min_similarity_far >= 0 && min_similarity_far <= 1, "min_similarity_far", min_similarity_far,
-                 "0 ... 1");
-  require_option(ambiguity >= 0 && ambiguity <= 1, "ambiguity", ambiguity, "0 ... 1");
-  require_option(clear_lead >= 0 && clear_lead <= 1, "clear_lead", clear_lead, "0 ... 1");
-  require_option(max_distance >= 0, "max_distance", max_distance, "at least 0 m");
-  require_option(max_speed >= 0, "max_speed", max_speed, "at least 0 m/s");
-}
-
 Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-                         const RelocalisationOptions& options, const LocalMapOptions& local_map, uint64_t seed)
-    : camera_(camera),
-      noise_(noise),
-      scale_factor_(scale_factor),
-      levels_(levels),
-      options_(options),
-      local_map_(local_map),
-      seed_(seed) {
-  options_.check();
-}
+                         uint64_t seed)
+    : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), seed_(seed) {}
 
 std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFeatures& features,
                                               const IgnoresPoint& ignores, PointAppearance* appearance) const {
   std::vector<PoseProposal> proposals = propose(map, features, ignores, appearance);
   int most = 0;
   for (const PoseProposal& p : proposals) most = std::max(most, p.inliers);
-  std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < options_.ambiguity * most; });
+  std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < kAmbiguity * most; });
   // Of look-alike places the true one differs least from what is seen.
   const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.similarity() > b.similarity(); };
   std::stable_sort(proposals.begin(), proposals.end(), better);
   if (proposals.empty() || !proposals.front().verified) return std::nullopt;
   PoseProposal& best = proposals.front();
   for (const PoseProposal& other : proposals)
-    if (!same_place(other.cam_from_world, best.cam_from_world) &&
-        other.similarity() > best.similarity() - options_.clear_lead)
+    if (!same_place(other.cam_from_world, best.cam_from_world) && other.similarity() > best.similarity() - kClearLead)
       return std::nullopt;
   return std::move(best);
 }
@@ -75,7 +59,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
   for (size_t f = 0; f < features.features.size(); ++f)
     if (!features.on_mover(f)) still.push_back(features.features.descriptors[f]);
   std::vector<PoseProposal> proposals;
-  for (const PlaceMatch& like : map.similar_keyframes(still, static_cast<size_t>(options_.candidates))) {
+  for (const PlaceMatch& like : map.similar_keyframes(still, kCandidates)) {
     // A keyframe that sees what an earlier one led to would lead there again.
     const auto& points = map.keyframe(like.id)->points;
     const bool explained = std::any_of(proposals.begin(), proposals.end(), [&](const PoseProposal& p) {
@@ -83,7 +67,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
       const auto shared = std::count_if(p.points.begin(), p.points.end(), [&](PointId id) {
         return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
       });
-      return shared >= options_.min_matches;
+      return shared >= kMinMatches;
     });
     if (explained) continue;
     if (auto proposal = propose_from(map, like.id, features, ignores, appearance))
@@ -100,10 +84,10 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
   if (!coarse) return std::nullopt;
   proposal.cam_from_world = *coarse;
-  std::vector<Candidate> nearby = local_map_candidates(proposal.points, map, local_map_);
+  std::vector<Candidate> nearby = local_map_candidates(proposal.points, map);
   std::erase_if(nearby, [&](const Candidate& c) { return ignores(c.id); });
-  if (!search(nearby, options_.radius, features, proposal)) return std::nullopt;
-  if (!search(nearby, options_.radius_fine, features, proposal)) return std::nullopt;
+  if (!search(nearby, kRadius, features, proposal)) return std::nullopt;
+  if (!search(nearby, kRadiusFine, features, proposal)) return std::nullopt;
   verify(map, nearby, features, appearance, proposal);
   return proposal;
 }
@@ -116,7 +100,7 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
   for (size_t f = 0; f < keyframe.points.size(); ++f)
     if (const MapPoint* seen = map.point(keyframe.points[f]))
       known.push_back({seen->id, seen->position, keyframe.features->descriptors[f]});
-  const size_t neighbours = std::min(keyframe.covisible.size(), static_cast<size_t>(options_.neighbours));
+  const size_t neighbours = std::min(keyframe.covisible.size(), kNeighbours);
   for (size_t n = 0; n < neighbours; ++n)
     for (PointId p : map.keyframe(keyframe.covisible[n].keyframe)->points)
       if (const MapPoint* seen = map.point(p)) known.push_back({seen->id, seen->position, seen->descriptor});
@@ -129,18 +113,18 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
 
   RansacOptions ransac;
   ransac.seed = seed_ + static_cast<uint64_t>(id);
-  ransac.min_inliers = options_.min_ransac_inliers;
-  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.min_matches, ransac);
+  ransac.min_inliers = kMinRansacInliers;
+  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, kMinMatches, ransac);
   if (!found) return std::nullopt;
   points = std::move(found->points);
   return found->cam_from_world;
 }
 
 // Matches the map nearby anew under the proposal's pose and refines it.
-bool Relocaliser::search(const std::vector<Candidate>& nearby, double radius, const MatchableFeatures& features,
+bool Relocaliser::search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,
                          PoseProposal& proposal) const {
   ProjectionMatchOptions match;
-  match.radius = static_cast<float>(radius);
+  match.radius = radius;
   const auto matches = match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
                                            match, nullptr, nullptr);
   std::vector<PoseObservation> observations;
@@ -148,7 +132,7 @@ bool Relocaliser::search(const std::vector<Candidate>& nearby, double radius, co
     observations.push_back(pose_observation(features.features.keypoints[static_cast<size_t>(m.feature)],
                                             nearby[static_cast<size_t>(m.candidate)].position, noise_, scale_factor_));
   const PoseEstimate pose = optimise_pose(camera_, proposal.cam_from_world, observations);
-  if (!pose.ok || pose.inliers < options_.min_ransac_inliers) return false;
+  if (!pose.ok || pose.inliers < kMinRansacInliers) return false;
   proposal.cam_from_world = pose.cam_from_world;
   proposal.inliers = pose.inliers;
   proposal.position_sd = std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
@@ -189,9 +173,9 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
     if (!same) continue;
     ++(*same ? proposal.similar : proposal.changed);
   }
-  proposal.verified =
-      proposal.inliers >= options_.min_inliers && proposal.found >= options_.min_share * proposal.well_known &&
-      proposal.similarity() >= options_.min_similarity && proposal.position_sd <= options_.max_position_sd;
+  proposal.verified = proposal.inliers >= kMinRelocalisationInliers &&
+                      proposal.found >= kMinShare * proposal.well_known && proposal.similarity() >= kMinSimilarity &&
+                      proposal.position_sd <= kMaxPositionSd;
 }
 
 }  // namespace dkb

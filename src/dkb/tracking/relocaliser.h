@@ -14,24 +14,7 @@
 
 namespace dkb {
 
-struct RelocalisationOptions {
-  int candidates = 6;               // look-alike keyframes that are tried, >= 1
-  int neighbours = 4;               // covisible keyframes whose points are matched along with each one's, >= 0
-  int min_matches = 15;             // matches by descriptor alone that make a candidate worth a try, >= 6
-  int min_ransac_inliers = 10;      // of these, that must agree on a pose, >= 6
-  double radius = 10.0;             // [px] first search nearby that pose; the second is within `radius_fine`, > 0
-  double radius_fine = 4.0;         // [px] > 0
-  int min_inliers = 40;             // points that the final pose rests on, >= 6
-  double min_share = 0.1;           // of the map's well-known points in view that must be found, 0 ... 1
-  double min_similarity = 0.7;      // of those points that the image shows at all, that must look as they did, 0 ... 1
-  double min_similarity_far = 0.9;  // the same for a place that the camera cannot have come to since its loss, 0 ... 1
-  double max_distance = 1.0;        // [m] such a place is farther than this from where the camera was lost, >= 0
-  double max_speed = 2.0;           // [m/s] and this for every second since, >= 0
-  double max_position_sd = 0.01;    // [m] standard deviation of the camera's place, > 0
-  double ambiguity = 0.5;           // poses elsewhere with this share of the most inliers rival the best, 0 ... 1 ...
-  double clear_lead = 0.03;         // ... unless they look less alike by this share; rivals make all worthless, 0 ... 1
-  void check() const;
-};
+constexpr int kMinRelocalisationInliers = 40;  // map points that the pose of a camera found again rests on
 
 // A pose that a similar keyframe led to, with what speaks for and against it.
 struct PoseProposal {
@@ -42,7 +25,7 @@ struct PoseProposal {
   int well_known = 0, found = 0;  // well-known map points that should be in view; of these, found
   int similar = 0, changed = 0;   // of these, that look the same in the image; that look different, or are seen through
   double position_sd = 0;         // [m]
-  bool verified = false;          // it meets the options
+  bool verified = false;          // enough of the map is found from there, and looks the same
 
   double similarity() const { return similar + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
 };
@@ -52,8 +35,7 @@ struct PoseProposal {
 // Deterministic for a seed. Features that may lie on movers take no part.
 class Relocaliser {
  public:
-  Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-              const RelocalisationOptions& options, const LocalMapOptions& local_map, uint64_t seed);
+  Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, uint64_t seed);
 
   // True for points that must not be matched.
   using IgnoresPoint = std::function<bool(PointId)>;
@@ -72,7 +54,7 @@ class Relocaliser {
  private:
   std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                     const IgnoresPoint& ignores, std::vector<PointId>& points) const;
-  bool search(const std::vector<Candidate>& nearby, double radius, const MatchableFeatures& features,
+  bool search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,
               PoseProposal& proposal) const;
   void verify(const Map& map, const std::vector<Candidate>& nearby, const MatchableFeatures& features,
               PointAppearance* appearance, PoseProposal& proposal) const;
@@ -81,8 +63,6 @@ class Relocaliser {
   SensorNoise noise_;
   double scale_factor_;
   int levels_;
-  RelocalisationOptions options_;
-  LocalMapOptions local_map_;
   uint64_t seed_;
 };
 

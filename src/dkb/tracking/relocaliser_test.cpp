@@ -17,9 +17,7 @@ bool ignores_none(PointId) {
 
 class RelocaliserTest : public ::testing::Test {
  protected:
-  Relocaliser relocaliser(const RelocalisationOptions& options = {}) const {
-    return {camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options, {}, 1};
-  }
+  Relocaliser relocaliser() const { return {camera, {}, TestScene::kScaleFactor, TestScene::kLevels, 1}; }
   // Keyframes in a row that see the scene from its own origin, set down at `scene_from_world` in the map's world.
   void map_scene(const TestScene& scene, const Rigid3& scene_from_world = {}) {
     const KeyframeId first = map.keyframe_count();

@@ -7,35 +7,23 @@
 #include <utility>
 
 #include "dkb/matching/pose_observation.h"
-#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
+constexpr double kEstablishedAfter = 0.65;   // [s] since its birth that a point may be found where a mover is
+constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map points is renewed at least so often
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
-constexpr double kGuessFactor = 2.0;         // on the noise of points at a guessed depth
+constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
+constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth
+constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
+
+// A place farther from where the camera was lost than this is one that it cannot have come to ...
+constexpr double kMaxDistance = 1.0;       // [m]
+constexpr double kMaxSpeed = 2.0;          // [m/s] more for every second since
+constexpr double kMinSimilarityFar = 0.9;  // ... unless so many of the points in view there look as they did
 
 }  // namespace
-
-void TrackingOptions::check() const {
-  require_option(initial_points >= 10, "initial_points", initial_points, "at least 10");
-  require_option(min_matches >= 6, "min_matches", min_matches, "at least 6");
-  require_option(min_inliers >= 6, "min_inliers", min_inliers, "at least 6");
-  require_option(close_depth > 0, "close_depth", close_depth, "greater than 0 m");
-  require_option(min_new_points >= 0, "min_new_points", min_new_points, "at least 0");
-  require_option(radius_last_frame > 0, "radius_last_frame", radius_last_frame, "greater than 0 px");
-  require_option(radius_wide > 0, "radius_wide", radius_wide, "greater than 0 px");
-  require_option(radius_local_map > 0, "radius_local_map", radius_local_map, "greater than 0 px");
-  require_option(odometry_sigma_factor == 0 || odometry_sigma_factor >= 1, "odometry_sigma_factor",
-                 odometry_sigma_factor, "0 or at least 1");
-  require_option(match_distance >= 0 && match_distance <= 256, "match_distance", match_distance, "0 ... 256 bits");
-  require_option(match_ratio >= 0 && match_ratio <= 1, "match_ratio", match_ratio, "0 ... 1");
-  require_option(established_after >= 0, "tracking.established_after", established_after, "at least 0 s");
-  require_option(refresh_after > 0, "tracking.refresh_after", refresh_after, "greater than 0 s");
-  require_option(new_map_after >= 0, "tracking.new_map_after", new_map_after, "at least 0 s");
-  local_map.check();
-  relocalisation.check();
-}
 
 Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
                  const TrackingOptions& options, uint64_t seed)
@@ -45,9 +33,8 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       levels_(levels),
       options_(options),
       seed_(seed),
-      relocaliser_(camera, noise, scale_factor, levels, options.relocalisation, options.local_map, seed),
+      relocaliser_(camera, noise, scale_factor, levels, seed),
       odometry_(camera, scale_factor, options.close_depth) {
-  options_.check();
   noise_.check();
 }
 
@@ -115,8 +102,7 @@ void Tracker::reset_motion() {
 }
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match) const {
-  return {feature, match.point_in_world, options_.odometry_sigma_factor * (match.guessed ? kGuessFactor : 1.0),
-          !match.guessed};
+  return {feature, match.point_in_world, kOdometryFactor * (match.guessed ? kGuessFactor : 1.0), !match.guessed};
 }
 
 PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs,
@@ -135,8 +121,8 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {
-  if (candidates_made_ && now - *candidates_made_ < options_.refresh_after) return;
-  candidates_ = local_map_candidates(points, map_.view(), options_.local_map);
+  if (candidates_made_ && now - *candidates_made_ < kRefreshAfter) return;
+  candidates_ = local_map_candidates(points, map_.view());
   for (Candidate& c : candidates_) c.established = established(c.id, now);
   candidates_made_ = now;
 }
@@ -146,7 +132,7 @@ bool Tracker::established(PointId id, double now) const {
   const MapPoint* p = map_.view().point(id);
   if (p == nullptr || p->observations.size() < 2) return false;
   const Keyframe& birth = *map_.view().keyframe(birth_keyframe(id));
-  return birth.frame < 0 || birth.timestamp + options_.established_after <= now;
+  return birth.frame < 0 || birth.timestamp + kEstablishedAfter <= now;
 }
 
 // Features on movers that showed no well-known point end here: mapping never sees them.
@@ -200,8 +186,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   }
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
-  match.max_distance = options_.match_distance;
-  match.ratio = static_cast<float>(options_.match_ratio);
+  match.max_distance = kMatchDistance;
+  match.ratio = kMatchRatio;
   std::vector<uint8_t> visible(candidates.size(), 0);
   const auto matches = match_by_projection(candidates, frame.matchable(), camera_, initial, scale_factor_, levels_,
                                            match, &taken, &visible);
@@ -212,7 +198,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
   const size_t in_map = pairs.size();
-  if (options_.odometry_sigma_factor > 0 && last_) {
+  if (last_) {
     for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
     const std::vector<Candidate> others = odometry_.candidates(*last_);
     for (const auto& m : match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match,
@@ -320,21 +306,17 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
 bool Tracker::within_travel_distance(const PoseProposal& found, double timestamp) const {
   if (!last_) return true;
   if (map_.root(last_->reference) != map_.root(found.keyframe)) return false;
-  const RelocalisationOptions& o = options_.relocalisation;
   const double distance = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
-  return distance <= o.max_distance + o.max_speed * (timestamp - last_->timestamp);
+  return distance <= kMaxDistance + kMaxSpeed * (timestamp - last_->timestamp);
 }
 
 bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
   auto found = relocaliser_.find(
       map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
   if (!found) return false;
-  if (!within_travel_distance(*found, frame.timestamp) &&
-      found->similarity() < options_.relocalisation.min_similarity_far)
-    return false;
+  if (!within_travel_distance(*found, frame.timestamp) && found->similarity() < kMinSimilarityFar) return false;
   candidates_made_.reset();
-  return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.min_inliers,
-                         found->points, frame);
+  return track_local_map(found->cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->points, frame);
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the

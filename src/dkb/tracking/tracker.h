@@ -21,23 +21,10 @@
 namespace dkb {
 
 struct TrackingOptions {
-  int initial_points = 100;            // features with depth that the first frame of a map needs, >= 10
-  int min_matches = 20;                // matches with the last frame that make a pose worth trying, >= 6
-  int min_inliers = 20;                // inliers of the final pose; fewer: lost, >= 6
-  double close_depth = 6.0;            // [m] depths below make map points at once, > 0
-  int min_new_points = 100;            // nearest depths that make points at a keyframe whatever close_depth says, >= 0
-  double radius_last_frame = 10.0;     // [px] search around the motion model's prediction, > 0
-  double radius_wide = 30.0;           // [px] second try, > 0
-  double radius_local_map = 4.0;       // [px] search for local map points under the first pose, > 0
-  double odometry_sigma_factor = 2.0;  // on the noise of what shows visual-odometry points, >= 1; 0 = without them
-  int match_distance = 90;             // [bits] largest Hamming distance of a match with a map point, 0 ... 256
-  double match_ratio = 0.8;            // best over second best distance of such a match, 0 ... 1
-  double established_after = 0.65;  // [s] since its birth that a point may be found where a mover is suspected, >= 0
-  double refresh_after = 0.15;      // [s] the choice of local map points is renewed at least so often, > 0
-  double new_map_after = 1.0;  // [s] lost in a row, each frame good enough to start a map, until one is; 0 = never
-  LocalMapOptions local_map;
-  RelocalisationOptions relocalisation;
-  void check() const;
+  int initial_points = 100;  // features with depth that the first frame of a map needs, >= 10
+  int min_inliers = 20;      // inliers of the final pose; fewer: lost, >= 6
+  double close_depth = 6.0;  // [m] depths below make map points at once, > 0
+  double new_map_after = 1;  // [s] lost in a row, each frame good enough to start a map, until one is; 0 = never
 };
 
 // A map point where a pose puts it.
@@ -89,6 +76,9 @@ class Tracker {
   void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
  private:
+  static constexpr int kMatchDistance = 90;       // [bits] largest Hamming distance of a match with a map point
+  static constexpr double kRadiusLocalMap = 4.0;  // [px] search for local map points under the first pose
+
   struct Pair {
     int feature = -1;
     Eigen::Vector3d point_in_world;

@@ -7,6 +7,11 @@
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
+namespace {
+
+constexpr int kMinNewPoints = 100;  // nearest depths that make points at a keyframe, however far they are
+
+}  // namespace
 
 void Tracker::take_reports(KeyframePacket& packet) {
   for (auto& [point, visibility] : visibility_) {
@@ -73,7 +78,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   }
   std::sort(by_depth.begin(), by_depth.end());
   for (const auto& [z, f] : by_depth) {
-    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= options_.min_new_points) break;
+    if (z > options_.close_depth && static_cast<int>(packet.new_points.size()) >= kMinNewPoints) break;
     const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
     ProvisionalPoint p;
     p.id = make_point_id(id, f);

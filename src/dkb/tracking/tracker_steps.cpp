@@ -10,8 +10,12 @@ namespace {
 
 // What the camera may do between two frames; beyond it the pose is a mistake, or the camera is to be sought. Ten times
 // a brisk walk, and twice the fastest turn of a head.
-constexpr double kMaxSpeed = 15;  // [m/s]
-constexpr double kMaxRate = 15;   // [rad/s]
+constexpr double kMaxVelocity = 15;         // [m/s]
+constexpr double kMaxAngularVelocity = 15;  // [rad/s]
+
+constexpr double kRadiusLastFrame = 10.0;  // [px] search around the motion model's prediction
+constexpr double kRadiusWide = 30.0;       // [px] the same around the last pose
+constexpr int kMinMatches = 20;            // with the last frame that make a pose worth trying
 
 }  // namespace
 
@@ -31,15 +35,15 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   }
   ProjectionMatchOptions match;
   match.radius = static_cast<float>(radius);
-  match.max_distance = options_.match_distance;
+  match.max_distance = kMatchDistance;
   match.ratio = 0.9f;
   const auto matches =
       match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
-  if (static_cast<int>(matches.size()) < options_.min_matches) return std::nullopt;
+  if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
   std::vector<Pair> pairs;
   for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
   const PoseEstimate pose = refine(predicted, pairs, features.features);
-  if (!pose.ok || pose.inliers < options_.min_matches / 2) return std::nullopt;
+  if (!pose.ok || pose.inliers < kMinMatches / 2) return std::nullopt;
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
       points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
@@ -57,8 +61,8 @@ std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::
   }
   RansacOptions ransac;
   ransac.seed = seed_;
-  auto found = pose_by_descriptors(known, frame.matchable(), camera_, noise_, scale_factor_, options_.min_matches, ransac);
-  if (!found || found->inliers < options_.min_matches || !plausible_motion(found->cam_from_world, frame.timestamp))
+  auto found = pose_by_descriptors(known, frame.matchable(), camera_, noise_, scale_factor_, kMinMatches, ransac);
+  if (!found || found->inliers < kMinMatches || !plausible_motion(found->cam_from_world, frame.timestamp))
     return std::nullopt;
   points = std::move(found->points);
   return found->cam_from_world;
@@ -83,9 +87,9 @@ bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
   std::vector<PointId> points(frame.points.size(), kNoPoint);
   std::optional<Rigid3> pose;
   for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, prior))
-    if (!pose) pose = track_last_frame(expected, options_.radius_last_frame, features, points);
+    if (!pose) pose = track_last_frame(expected, kRadiusLastFrame, features, points);
   if (!pose) pose = match_last_frame(frame, points);
-  if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
+  if (!pose) pose = track_last_frame(last_->cam_from_world, kRadiusWide, features, points);
   if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
@@ -94,14 +98,14 @@ bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
     pose = near->cam_from_world;
     points = std::move(near->points);
   }
-  return pose && track_local_map(*pose, options_.radius_local_map, options_.min_inliers, points, frame);
+  return pose && track_local_map(*pose, kRadiusLocalMap, options_.min_inliers, points, frame);
 }
 
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
   const Rigid3 motion = cam_from_world * last_->cam_from_world.inverse();
   const double seconds = timestamp - last_->timestamp;
-  return motion.translation.norm() <= kMaxSpeed * seconds &&
-         vector_from_rotation(motion.rotation).norm() <= kMaxRate * seconds;
+  return motion.translation.norm() <= kMaxVelocity * seconds &&
+         vector_from_rotation(motion.rotation).norm() <= kMaxAngularVelocity * seconds;
 }
 
 bool Tracker::moved_plausibly_from_last(const TrackedFrame& frame) const {

@@ -253,24 +253,5 @@ TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
   EXPECT_TRUE(tracker.track(1, kFrameTime, features_at).wants_first_keyframe);
 }
 
-TEST(TrackingOptions, AreChecked) {
-  const auto rejects = [](auto change) {
-    TrackingOptions options;
-    change(options);
-    EXPECT_THROW(options.check(), InvalidOption);
-  };
-  rejects([](auto& o) { o.initial_points = 9; });
-  rejects([](auto& o) { o.min_matches = 5; });
-  rejects([](auto& o) { o.close_depth = 0; });
-  rejects([](auto& o) { o.radius_local_map = -1; });
-  rejects([](auto& o) { o.match_distance = 257; });
-  rejects([](auto& o) { o.match_ratio = 1.5; });
-  rejects([](auto& o) { o.local_map.keyframes = 0; });
-  rejects([](auto& o) { o.new_map_after = -1; });
-  rejects([](auto& o) { o.relocalisation.candidates = 0; });
-  rejects([](auto& o) { o.relocalisation.min_share = 1.1; });
-  EXPECT_NO_THROW(TrackingOptions().check());
-}
-
 }  // namespace
 }  // namespace dkb
