@@ -17,7 +17,6 @@
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/map/map_file.h"
-#include "dkb/slam/options.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
@@ -127,8 +126,8 @@ DetectorChoice detector_choice(const RunArguments& args, const Options& options,
   DetectorChoice choice = args.detection;
   for (const DatasetPair& pair : source.pairs()) choice.stamps_ns.push_back(pair.stamp_ns);
   if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
-  if (options.internal().dynamics.filter != FilterKind::none) return choice;
-  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || args.preset == "orb";
+  if (options.dynamics.filter != FilterKind::none) return choice;
+  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
   if (asked_for) choice.masks.clear();
   choice.kinds = "none";
   choice.boxes.clear();
@@ -216,7 +215,7 @@ int run(const RunArguments& args) {
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
   else
     fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
-               options.internal().tracking.initial_points);
+               options.tracking.initial_points);
   return 1;
 }
 
@@ -229,7 +228,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--camera", args->camera, "Camera file, or fr1, fr2, fr3, bonn");
   command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
   command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
-  command->add_option("--set", args->set, "key=value, any setting of config.yaml; may be repeated");
+  command->add_option("--set", args->set,
+                      "key=value, any setting of config.yaml, or experiment.NAME=value; may be repeated");
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
   command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) {
     args->has_seed = true;

@@ -37,10 +37,10 @@ variants:
     model: ${MODEL}
     filter: box
     disable: [kf, ba]
-    set: {features.count: 900, mapping.ba.edge_weight: 1.7}
+    set: {features.count: 900, experiment.mapping.ba.edge_weight: 1.7}
   default:
 sweep:
-  setting: mapping.ba.edge_weight
+  setting: experiment.mapping.ba.edge_weight
   label: w
   values: [1.0, 1.5]
   published_choice: 1.5
@@ -85,7 +85,7 @@ TEST(BenchSuite, SaysWhatToRun) {
   EXPECT_EQ(mine.disable, (std::vector<std::string>{"kf", "ba"}));
   EXPECT_EQ(mine.set.at("features.count"), "900");
   EXPECT_EQ(s.variants[4].name, "w=1.5");
-  EXPECT_EQ(s.variants[4].set.at("mapping.ba.edge_weight"), "1.5");
+  EXPECT_EQ(s.variants[4].set.at("experiment.mapping.ba.edge_weight"), "1.5");
   EXPECT_EQ(s.variants[4].preset, "paper");
   EXPECT_EQ(s.variants[4].swept, 1.5);
 }
@@ -121,7 +121,7 @@ TEST(BenchSuite, FaultsAreOneLineWithThePlace) {
       {replaced(kSuite, "path: rgbd", "pth: rgbd"), "path"},
       {replaced(kSuite, "  room:", "  ../room:"), "must be made of letters"},
       {replaced(kSuite, "values: [1.0, 1.5]", "values: [1.0]"), "at least two values"},
-      {replaced(kSuite, "mapping.ba.edge_weight\n  label", "mapping.ba.edge_wight\n  label"), "edge_weight"},
+      {replaced(kSuite, "experiment.mapping.ba.edge_weight\n  label", "experiment.mapping.ba.edge_wight\n  label"), "edge_weight"},
       {"sequences: {a: {path: b}}\n", "has no variants"},
       {"variants: {a: }\n", "has no sequences"},
       {"{{{", "is not valid YAML"},

@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "dkb/evaluation/trajectory_error.h"
+#include "dkb/util/test_data.h"
 
 namespace dkb::test {
 namespace fs = std::filesystem;
@@ -36,12 +37,19 @@ size_t Finished::error_lines() const {
   return n;
 }
 
-Program::Program(const std::vector<std::string>& arguments, long max_file_size) {
+Program::Program(const std::vector<std::string>& arguments, long max_file_size,
+                 const std::vector<std::string>& environment) {
   std::vector<std::string> words = {DKB_SLAM_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& w : words) argv.push_back(w.data());
   argv.push_back(nullptr);
+  std::vector<char*> envp;
+  for (char** v = environ; *v != nullptr; ++v) envp.push_back(*v);
+  // The first of a name counts.
+  std::vector<std::string> added = environment;
+  for (std::string& v : added) envp.insert(envp.begin(), v.data());
+  envp.push_back(nullptr);
   const std::string out = folder_ / "out", err = folder_ / "err";
   pid_ = fork();
   if (pid_ < 0) throw std::runtime_error("cannot fork");
@@ -55,7 +63,7 @@ Program::Program(const std::vector<std::string>& arguments, long max_file_size) 
       setrlimit(RLIMIT_FSIZE, &limit);
       std::signal(SIGXFSZ, SIG_IGN);
     }
-    execv(argv[0], argv.data());
+    execve(argv[0], argv.data(), envp.data());
     _exit(127);
   }
 }
@@ -81,22 +89,37 @@ Finished Program::wait() {
   return {WIFEXITED(status_) ? WEXITSTATUS(status_) : 1000 + WTERMSIG(status_), read_text(folder_ / "out"), err()};
 }
 
-Finished run_program(const std::vector<std::string>& arguments, long max_file_size) {
-  return Program(arguments, max_file_size).wait();
+Finished run_program(const std::vector<std::string>& arguments, long max_file_size,
+                     const std::vector<std::string>& environment) {
+  return Program(arguments, max_file_size, environment).wait();
 }
 
 fs::path sequence() {
-  const fs::path folder = DKB_TEST_SEQUENCE;
+  return simulated(DKB_TEST_SEQUENCE,
+                   {"--scene", "room", "--people", "0", "--seed", "3", "--frames", std::to_string(kSequenceFrames)});
+}
+
+fs::path simulated(const fs::path& folder, const std::vector<std::string>& arguments) {
   if (fs::exists(folder / "associations.txt")) return folder;
   // Written beside and moved into place, so that programs that start at the same time do not meet.
   const fs::path mine = folder.string() + "." + std::to_string(getpid());
-  const Finished made = run_program({"simulate", "--out", mine.string(), "--scene", "room", "--people", "0", "--seed",
-                                     "3", "--frames", std::to_string(kSequenceFrames)});
+  std::vector<std::string> words = {"simulate", "--out", mine.string()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const Finished made = run_program(words);
   if (made.exit_code != 0) throw std::runtime_error("simulate failed: " + made.err);
   std::error_code taken;
   fs::rename(mine, folder, taken);
   if (taken) fs::remove_all(mine);
   return folder;
+}
+
+fs::path outside_data(const std::string& name) {
+  const fs::path path = test_data() / name;
+  return fs::exists(path) ? path : fs::path();
+}
+
+std::string no_outside_data(const std::string& name) {
+  return "skipped: " + name + " is not at hand; name the folder that has it in DKB_DATA";
 }
 
 void copy_sequence(const fs::path& folder, int frames, bool own_images) {
@@ -135,12 +158,14 @@ void write_text(const fs::path& file, const std::string& text) {
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }
 
-SlamRun::SlamRun(const fs::path& dataset, const fs::path& out_folder, const std::vector<std::string>& more)
+SlamRun::SlamRun(const fs::path& dataset, const fs::path& out_folder, const std::vector<std::string>& more,
+                 const std::vector<std::string>& environment)
     : out(out_folder) {
-  std::vector<std::string> arguments = {"run",        dataset.string(), "--out",  out.string(),
-                                        "--detector", "none",           "--quiet"};
+  std::vector<std::string> arguments = {"run", dataset.string(), "--out", out.string(), "--quiet"};
+  if (std::find(more.begin(), more.end(), "--detector") == more.end())
+    arguments.insert(arguments.end(), {"--detector", "none"});
   arguments.insert(arguments.end(), more.begin(), more.end());
-  finished = run_program(arguments);
+  finished = run_program(arguments, -1, environment);
   if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
 }
 

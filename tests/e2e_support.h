@@ -32,9 +32,11 @@ struct Finished {
 };
 
 // dkb-slam, started with these arguments. With `max_file_size` [bytes] every write beyond fails, as on a full disk.
+// `environment` holds NAME=VALUE to add to the test's own.
 class Program {
  public:
-  explicit Program(const std::vector<std::string>& arguments, long max_file_size = -1);
+  explicit Program(const std::vector<std::string>& arguments, long max_file_size = -1,
+                   const std::vector<std::string>& environment = {});
   ~Program();
   pid_t pid() const { return pid_; }
   std::string err() const;  // what it has printed so far
@@ -47,11 +49,23 @@ class Program {
   bool ended_ = false;
   int status_ = 0;
 };
-Finished run_program(const std::vector<std::string>& arguments, long max_file_size = -1);
+Finished run_program(const std::vector<std::string>& arguments, long max_file_size = -1,
+                     const std::vector<std::string>& environment = {});
 
 // A simulated sequence of 40 frames at 640 x 480 in TUM layout, without people, the same for all tests. Made on demand.
 constexpr int kSequenceFrames = 40;
 std::filesystem::path sequence();
+
+// `folder`, made by `simulate` with these arguments unless it is there already.
+std::filesystem::path simulated(const std::filesystem::path& folder, const std::vector<std::string>& arguments);
+
+// A file or folder of data that does not belong to the project, such as "models/yolov5n_320x256.onnx": in the folder
+// that the environment variable DKB_DATA names, without it in ../shared/data beside the checkout. Empty when it is not
+// there; the test then has nothing to do:
+//   const std::filesystem::path model = outside_data(name);
+//   if (model.empty()) GTEST_SKIP() << no_outside_data(name);
+std::filesystem::path outside_data(const std::string& name);
+std::string no_outside_data(const std::string& name);
 
 // Its first `frames` pairs in a folder that may be changed: own lists and camera file, own copies of the images when
 // `own_images`, else links to them.
@@ -59,10 +73,10 @@ void copy_sequence(const std::filesystem::path& folder, int frames, bool own_ima
 
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
-// `run` on `dataset` without a detector, finished, with its results in `out`.
+// `run` on `dataset`, finished, with its results in `out`; without a detector unless `more` names one.
 struct SlamRun {
   SlamRun(const std::filesystem::path& dataset, const std::filesystem::path& out_folder,
-          const std::vector<std::string>& more = {});
+          const std::vector<std::string>& more = {}, const std::vector<std::string>& environment = {});
   std::filesystem::path out;
   Finished finished;
   nlohmann::json stats;  // of stats.json, where it is

@@ -110,7 +110,7 @@ std::vector<Case> cases() {
       {"unknown option", "detectr", [](const fs::path&) {}, {"--detectr", "none"}},
       {"unknown setting", "features.count", [](const fs::path&) {}, {"--set", "featurs.count=5"}},
       {"setting of another type", "features.count", [](const fs::path&) {}, {"--set", "features.count=many"}},
-      {"setting out of range", "mapper_latency", [](const fs::path&) {}, {"--set", "pipeline.mapper_latency=0"}},
+      {"setting out of range", "pipeline.mapper_latency: 0 is out of range", [](const fs::path&) {}, {"--set", "pipeline.mapper_latency=0"}},
       {"unknown preset", "papre", [](const fs::path&) {}, {"--preset", "papre"}},
       {"unknown detector", "yolos", [](const fs::path&) {}, {"--detector", "yolos"}},
       {"missing boxes file", "none.txt", [](const fs::path&) {}, {"--detector", "file", "--boxes", "@/none.txt"}},

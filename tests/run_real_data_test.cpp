@@ -11,8 +11,9 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(RunRealData, FollowsEveryFrameOfAHandHeldKinect) {
-  const fs::path dataset = test_data() / "rgbd_dataset_freiburg1_xyz";
-  if (!fs::exists(dataset / "associations.txt")) GTEST_SKIP() << "skipped: no recorded sequence at " << dataset;
+  const std::string name = "rgbd_dataset_freiburg1_xyz";
+  const fs::path dataset = outside_data(name);
+  if (dataset.empty()) GTEST_SKIP() << no_outside_data(name);
   const TempFolder temp;
   const SlamRun run(dataset, temp / "out", {"--max-frames", "60"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;

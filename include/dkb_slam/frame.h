@@ -29,11 +29,11 @@ struct MotionPrior {
 
 /// A pair of images as the caller has them. The views are read during the call and may be gone after it.
 struct FrameInput {
-  int64_t stamp_ns = 0;              ///< of the colour image, middle of the exposure; rises from frame to frame
-  ImageView colour;                  ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
-  ImageView depth;                   ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
-  int64_t depth_stamp_ns = -1;       ///< of the depth image; -1 = the colour image's
-  std::optional<MotionPrior> prior;  ///< where something else knows of the motion
+  int64_t stamp_ns = 0;  ///< of the colour image, middle of the exposure; rises from frame to frame
+  ImageView colour;      ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
+  ImageView depth;       ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
+  std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image; nothing = the colour image's
+  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion
 };
 
 /// A pair of images, checked, copied and never changed again. Copies of it share the images. A frame may be made on

@@ -47,7 +47,7 @@ struct DKB_SLAM_API Camera {
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0;     ///< radial k, tangential p, in OpenCV's order k1 k2 p1 p2 k3
   double k3 = 0;                             ///< the third radial coefficient
   double depth_factor = 5000.0;              ///< [units per metre] of integer depth images, > 0
-  double fps = 30.0;                         ///< [1/s] nominal frame rate, > 0
+  double fps = 0;                            ///< [1/s] nominal frame rate; 0 = as the first five stamps say
   double readout = 0.0;                      ///< [s] rolling shutter, first to last row's exposure; 0 = unknown or none
   double depth_min = 0.2, depth_max = 10.0;  ///< [m] depth outside is taken for missing
 

@@ -3,8 +3,9 @@
 /// What can be set.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <memory>
+#include <map>
 #include <string>
 
 #include "dkb_slam/geometry.h"
@@ -12,43 +13,136 @@
 
 namespace dkb {
 
-struct SlamOptions;  // the library's own
+/// Which features are kept from tracking: one family per way that published systems answer it, on the same back end.
+enum class FilterKind {
+  none,       ///< nothing is removed
+  box,        ///< every feature in a box of a movable class (as Crowd-SLAM does)
+  epipolar,   ///< features in boxes that leave their epipolar lines (as DS-SLAM and SG-SLAM do)
+  multiview,  ///< features before surfaces that earlier keyframes saw (as DynaSLAM's geometry does)
+  paper,      ///< flow residual and Gaussian depth test in boxes (DKB section 3.1)
+  standard,   ///< silhouettes by depth and motion: our own; "default" in text
+};
 
-/// Settings by their keys, as they stand in config.yaml and docs/settings.md, and what is set by programs alone.
+/// Who decides that a frame becomes a keyframe.
+enum class KeyframePolicyKind {
+  adaptive,  ///< parallax, match quality and visibility (DKB section 3.2)
+  baseline,  ///< few tracked points, or a long wait
+};
+
+/// The settings of config.yaml, by the names they have there, and what programs alone set. Fields may be set directly;
+/// check() and Slam's constructor judge them. docs/settings.md is the same list as a table.
 class DKB_SLAM_API Options {
  public:
-  /// Starts from "default", our best; "paper", DKB-SLAM as printed; or "orb", that without its three contributions.
-  /// Throws InputError naming the nearest one.
-  explicit Options(const std::string& preset = "default");
-  Options(const Options& other);
-  Options& operator=(const Options& other);
-  ~Options();
+  uint64_t seed = 1;  ///< of every source of randomness
+
+  struct Features {
+    int count = 1000;            ///< [features] wanted per image, at least 1
+    int levels = 8;              ///< of the image pyramid, 1 ... 16
+    double scale = 1.2;          ///< size of a level over the next smaller one, above 1, at most 4
+    int fast_threshold = 20;     ///< [grey levels] contrast of a corner, fast_threshold_min ... 254
+    int fast_threshold_min = 7;  ///< [grey levels] the same where an image has no such corners, 1 ... 254
+  } features;
+
+  struct Noise {
+    double pixel_sigma = 1.0;               ///< [px] standard deviation of a corner on the finest level, above 0
+    double depth_sigma_base = 0.0012;       ///< [m] standard deviation of depth at 0.4 m, above 0
+    double depth_sigma_quadratic = 0.0019;  ///< [1/m] its growth with (z - 0.4 m)^2, at least 0
+    double depth_sigma_factor = 10.0;       ///< on both, for edges, registration and calibration, at least 1
+  } noise;
+
+  struct Tracking {
+    double close_depth = 6.0;  ///< [m] depths below make map points at once, above 0
+    int initial_points = 100;  ///< [features] with depth that a map's first frame needs, at least 10
+    int min_inliers = 20;      ///< [points] that a pose rests on; with fewer tracking is lost, at least 6
+    double new_map_after = 1;  ///< [s] lost in a row until a new map is begun; 0 = never, at least 0
+  } tracking;
+
+  struct Keyframes {
+    KeyframePolicyKind policy = KeyframePolicyKind::adaptive;  ///< who decides that a frame becomes a keyframe
+    int min_frames_between = 2;  ///< [frames] from a keyframe to the next (adaptive policy), at least 1
+  } keyframes;
+
+  struct Mapping {
+    double redundant_share = 0.9;  ///< of a keyframe's points seen elsewhere that makes it redundant, 0 ... 1
+    struct LocalBa {
+      int free_keyframes = 12;   ///< [keyframes] that local bundle adjustment moves, at least 1
+      int fixed_keyframes = 20;  ///< [keyframes] held still beside them, at least 1
+      bool weighted = true;      ///< points weigh by their geometry (DKB section 3.3)
+    } ba;
+  } mapping;
+
+  struct Loop {
+    bool enabled = true;   ///< close loops and join maps
+    int min_inliers = 50;  ///< [points] of the map that a loop rests on, at least 10
+  } loop;
+
+  struct GlobalBa {
+    bool final = false;  ///< adjust the whole map once more at the end
+  } global_ba;
+
+  struct Readout {
+    bool estimate = true;  ///< learn the rolling shutter's readout where the camera's is unknown
+  } readout;
+
+  struct Dynamics {
+    FilterKind filter = FilterKind::standard;  ///< which features are kept from tracking
+    struct Motion {
+      int cell = 4;            ///< [px] side of the cells whose motion is judged, 2 ... 32
+      double memory = 6;       ///< [s] time constant in which what stands still is no longer a mover, above 0
+      double threshold = 0.5;  ///< score from which a cell moves; a frame adds at most 1, above 0, at most 2
+    } motion;
+  } dynamics;
+
+  struct Dense {
+    double voxel = 0.02;          ///< [m] side of a voxel of the dense map, 0.005 ... 0.2
+    double truncation = 0.06;     ///< [m] distances to a surface are kept up to here, 2 ... 20 voxels
+    double max_depth = 4.0;       ///< [m] depths beyond tell of free space only, 0.5 ... 20
+    double grid_cell = 0.05;      ///< [m] side of a cell of the occupancy grid, 0.01 ... 1
+    double obstacle_low = 0.10;   ///< [m] above the floor: what is lower can be driven over, above 0
+    double obstacle_high = 1.50;  ///< [m] what is higher can be driven under, above obstacle_low
+    int threads = 2;              ///< of the fusion, whose result does not depend on it, 1 ... 64
+  } dense;
+
+  struct Pipeline {
+    double mapper_latency = 0.06;  ///< [s] after which tracking sees a keyframe's mapping, in whole frames, above 0
+    int mapper_queue = 4;          ///< [keyframes] that may wait for mapping in a real-time run, at least 1
+  } pipeline;
 
   bool threaded = true;  ///< mapping, detection and loop search on threads of their own; false: the same bytes from one
   bool realtime = false;   ///< never wait for them but for the first detection; results may differ from run to run
   bool dense_map = false;  ///< keep what Slam::dense_map() needs: about 0.5 MB per keyframe
   Rigid3 base_from_cam;    ///< mount: the world is the robot's base at the first tracked frame
 
-  /// Sets one setting from text ("features.count", "1200"). `where` opens the message of what it throws: InputError for
-  /// an unknown key, with the nearest one, for a value of another type, or one out of range.
+  /// Starts from "default", our best; "paper", DKB-SLAM as printed; or "orb", that without its three contributions.
+  /// Throws InputError naming the nearest one.
+  explicit Options(const std::string& preset = "default");
+  const std::string& preset() const { return preset_; }
+
+  /// Sets one setting from text ("features.count", "1200"), or "preset", which sets all of them. Keys that begin with
+  /// "experiment." reach what only studies of the method change; they are not promised to last. `where` opens the
+  /// message of what it throws: InputError for an unknown key, with the nearest one, and for a value of another type;
+  /// InvalidOption for one out of range.
   void set(const std::string& key, const std::string& value, const std::string& where = "");
   /// Sets "key=value".
   void assign(const std::string& assignment, const std::string& where = "");
-  /// Sets what a YAML file holds, as written by to_yaml(). Throws InputError with file and line.
+  /// Sets what a YAML file holds, as written by to_yaml(), its preset first. Throws InputError with file and line.
   void load(const std::filesystem::path& path);
   /// Switches parts off, by comma: dr (rejecting what moves), kf (adaptive keyframes), ba (weighted bundle adjustment),
   /// loop (loop closing).
   void disable(const std::string& parts);
-  /// Every setting with its value and meaning, sorted by key.
+  /// The preset and every setting, a line each with its unit, meaning, range and default; experiments that were set.
   std::string to_yaml() const;
   /// Throws InvalidOption naming the whole key.
   void check() const;
 
-  SlamOptions& internal() { return *values_; }
-  const SlamOptions& internal() const { return *values_; }
+  /// What was set of "experiment.", by key.
+  const std::map<std::string, std::string>& experiments() const { return experiments_; }
 
  private:
-  std::unique_ptr<SlamOptions> values_;
+  void start_from(const std::string& preset, const std::string& where);
+
+  std::string preset_;
+  std::map<std::string, std::string> experiments_;
 };
 
 }  // namespace dkb

@@ -10,18 +10,9 @@
 #include "dkb/detection/detection.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb_slam/options.h"
 
 namespace dkb {
-
-// Which features move? One family per way that published systems answer it, on the same back end.
-enum class FilterKind {
-  none,       // nothing is removed
-  box,        // every feature in a box of a movable class (as Crowd-SLAM does)
-  epipolar,   // features in boxes that leave their epipolar lines (as DS-SLAM and SG-SLAM do)
-  multiview,  // features before surfaces that earlier keyframes saw (as DynaSLAM's geometry does)
-  paper,      // flow residual and Gaussian depth test in boxes (DKB section 3.1)
-  standard,   // silhouettes by depth and motion: our own
-};
 
 // A corner of the current image, with what flow and depth tell of it.
 struct FilterFeature {

@@ -29,7 +29,7 @@ void bind(Settings* settings, CameraModel* c) {
   settings->bind("p1", &c->p1, "[1] tangential distortion");
   settings->bind("p2", &c->p2, "[1]");
   settings->bind("depth_factor", &c->depth_factor, "[units per metre] of integer depth images");
-  settings->bind("fps", &c->fps, "[1/s] nominal frame rate");
+  settings->bind("fps", &c->fps, "[1/s] nominal frame rate; 0 = as the first five stamps say");
   settings->bind("depth_min", &c->depth_min, "[m] nearer depth is treated as missing");
   settings->bind("readout", &c->readout,
                  "[s] rolling shutter: first row's exposure to the last row's; 0 = global shutter");

@@ -39,7 +39,7 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
           "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
     auto detector = std::make_shared<OnnxDetector>(OnnxOptions{.model = choice.model, .labels = choice.labels},
                                                    camera.width, camera.height);
-    const int frames = detector->frames_per_detection();
+    const int frames = detector->frames_per_detection(camera.fps > 0 ? camera.fps : 30);
     made.schedule.every = choice.every > 0 ? choice.every : frames + 1;
     made.schedule.latency = choice.latency > 0 ? choice.latency : frames + 1;
     made.slow = std::move(detector);

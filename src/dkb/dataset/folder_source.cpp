@@ -3,6 +3,7 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -23,6 +24,12 @@ CameraChoice camera_of(const std::filesystem::path& folder, const FolderOptions&
   }
 }
 
+double rate_of(const std::vector<DatasetPair>& pairs) {
+  std::vector<int64_t> stamps;
+  for (size_t i = 0; i < pairs.size() && i < 5; ++i) stamps.push_back(pairs[i].stamp_ns);
+  return frame_rate_of(stamps);
+}
+
 std::string described(const TumDataset& dataset, const CameraChoice& camera) {
   return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
 }
@@ -35,7 +42,9 @@ FolderSource::FolderSource(const std::filesystem::path& folder, const FolderOpti
               [&] {
                 const CameraChoice choice = camera_of(folder, options);
                 description_ = described(dataset_, choice);
-                return camera_ = choice.camera;
+                camera_ = choice.camera;
+                if (camera_.fps == 0) camera_.fps = rate_of(dataset_.pairs);
+                return camera_;
               }(),
               {.threaded = options.threaded}) {}
 

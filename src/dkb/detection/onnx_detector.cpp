@@ -180,12 +180,12 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 
 OnnxDetector::~OnnxDetector() = default;
 
-int OnnxDetector::frames_per_detection() const {
+int OnnxDetector::frames_per_detection(double frames_per_second) const {
   constexpr double kMsPerPixel = 0.45e-3, kNanoBytes = 8e6;  // measured on the nano models, which lie below these bytes
-  constexpr double kFrameMs = 1000.0 / 30, kReserve = 1.15;  // p95 above the mean
+  constexpr double kReserve = 1.15;  // p95 above the mean
   const double ms =
       kMsPerPixel * input_width_ * input_height_ * std::max(1.0, static_cast<double>(model_bytes_) / kNanoBytes);
-  return static_cast<int>(std::ceil(kReserve * ms / kFrameMs));
+  return static_cast<int>(std::ceil(kReserve * ms * frames_per_second / 1000));
 }
 
 Detections OnnxDetector::detect(const DetectorInput& image) {

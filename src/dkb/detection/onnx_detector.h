@@ -47,10 +47,10 @@ class OnnxDetector final : public Detector {
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "yolo"; }
 
-  // [frames of a 30 Hz camera] that one detection takes on one core of a desktop computer, estimated from the sizes of
+  // [frames] that one detection takes on one core of a desktop computer, estimated from the sizes of
   // the file and of the input alone, so that runs do not depend on the machine: for the schedule where the user names
   // none. YOLOv5n takes 36 ms at 320 x 256 and 141 ms at 640 x 480 (2 and 5 frames), YOLOX-nano 71 ms at 416 x 416 (3).
-  int frames_per_detection() const;
+  int frames_per_detection(double frames_per_second) const;
 
   int input_width() const { return input_width_; }    // [px] of the network
   int input_height() const { return input_height_; }  // [px]

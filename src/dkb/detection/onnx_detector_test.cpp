@@ -266,7 +266,7 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
   EXPECT_EQ(detector.head(), GetParam().head);
   EXPECT_EQ(detector.input_width(), GetParam().width);
   EXPECT_EQ(detector.input_height(), GetParam().height);
-  EXPECT_EQ(detector.frames_per_detection(), GetParam().frames);
+  EXPECT_EQ(detector.frames_per_detection(30), GetParam().frames);
   for (const size_t i : {size_t{2}, size_t{12}}) {
     const RgbdImage image = read_jpeg(files.at(i));
     const Detections found = detector.detect(image);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
@@ -10,39 +11,40 @@
 namespace dkb {
 
 struct PointEvidenceOptions {
-  // Times that a point must lie on a mover, less twice the times it was found still, to be retracted, >= 1.
-  int min_observations = 10;
-  void check() const {
-    require_option(min_observations >= 1, "dynamics.evidence_observations", min_observations, "at least 1");
-  }
+  // [s] that a point must be seen on a mover, less twice the time it is found still, to be retracted, > 0.
+  double seconds = 0.32;
+  void check() const { require_option(seconds > 0, "dynamics.evidence_seconds", seconds, "greater than 0 s"); }
 };
 
-// What the frames say of each map point over time: was it on a mover, or did it fit the still world?
+// What the frames say of each map point over time: is it on a mover, or does it fit the still world? Deterministic.
 class PointEvidence {
  public:
   explicit PointEvidence(PointEvidenceOptions options) : options_(options) { options_.check(); }
-  void on_mover(PointId point) { ++suspicion_[point]; }
-  void fits_still_world(PointId point) {
-    const auto it = suspicion_.find(point);
-    if (it != suspicion_.end() && (it->second -= 2) <= 0) suspicion_.erase(it);
-  }
-  // Points with enough against them, increasing; each once.
-  std::vector<PointId> take_convicted() {
-    std::vector<PointId> convicted;
-    for (auto it = suspicion_.begin(); it != suspicion_.end();) {
-      if (it->second >= options_.min_observations) {
-        convicted.push_back(it->first);
-        it = suspicion_.erase(it);
-      } else {
-        ++it;
-      }
+
+  // Points that were found still, and points that stand on a mover, in the frame of `timestamp` [s]. Returns those with
+  // enough against them by now, increasing; each once.
+  std::vector<PointId> weigh(double timestamp, const std::vector<PointId>& still, const std::vector<PointId>& on_mover) {
+    // After a gap a frame is no more than one look: four are needed at any rate.
+    const double seconds = std::clamp(timestamp - timestamp_, 0.0, kMaxLook);
+    timestamp_ = timestamp;
+    for (PointId point : still) {
+      const auto it = suspicion_.find(point);
+      if (it != suspicion_.end() && (it->second -= 2 * seconds) <= 0) suspicion_.erase(it);
     }
+    for (PointId point : on_mover) suspicion_[point] += seconds;
+    std::vector<PointId> convicted;
+    for (const auto& [point, suspicion] : suspicion_)
+      if (suspicion >= options_.seconds) convicted.push_back(point);
+    for (PointId point : convicted) suspicion_.erase(point);
     return convicted;
   }
 
  private:
+  static constexpr double kMaxLook = 0.1;  // [s]
+
   PointEvidenceOptions options_;
-  std::map<PointId, int> suspicion_;
+  double timestamp_ = 0;                  // of the frame weighed last
+  std::map<PointId, double> suspicion_;  // [s]
 };
 
 }  // namespace dkb

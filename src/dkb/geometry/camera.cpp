@@ -29,7 +29,7 @@ void CameraModel::check() const {
   require_option(std::isfinite(k3), "k3", k3, "finite");
   require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
                  "greater than 0 units per metre");
-  require_option(std::isfinite(fps) && fps > 0 && fps <= 1000, "fps", fps, "greater than 0 and at most 1000");
+  require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
   require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
   require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");
   require_option(std::isfinite(depth_max) && depth_max > depth_min, "depth_max", depth_max, "greater than depth_min");
@@ -64,6 +64,7 @@ Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const
 
 std::optional<CameraModel> builtin_camera(const std::string& name) {
   CameraModel c;
+  c.fps = 30;
   if (name == "fr1") {
     c.readout = kKinectReadout;
     c.fx = 517.3, c.fy = 516.5, c.cx = 318.6, c.cy = 255.3;

@@ -97,7 +97,7 @@ int bytes_per_pixel(PixelFormat format) {
 }
 
 Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.stamp_ns), prior_(input.prior) {
-  depth_stamp_ns_ = input.depth_stamp_ns < 0 ? stamp_ns_ : input.depth_stamp_ns;
+  depth_stamp_ns_ = input.depth_stamp_ns.value_or(stamp_ns_);
   check_view(input.colour, false, camera);
   check_view(input.depth, true, camera);
   if (prior_) check_prior(*prior_);

@@ -159,6 +159,7 @@ Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<I
   Impl& m = *impl_;
   m.options = options;
   const double scale = options.width / 640.0;
+  m.camera.fps = 30;
   m.camera.width = options.width;
   m.camera.height = options.height;
   m.camera.fx = m.camera.fy = 525.0 * scale;

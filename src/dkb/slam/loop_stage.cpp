@@ -2,7 +2,6 @@
 #include "dkb/slam/loop_stage.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "dkb/util/errors.h"
 
@@ -13,17 +12,15 @@ constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
 
 }  // namespace
 
-FrameIndex BackgroundLatency::operator()(int keyframes) const {
-  return static_cast<FrameIndex>(std::ceil(base + per_keyframe * keyframes));
-}
-
 void LoopStageOptions::check() const {
   loop.check();
   global_ba.check();
-  for (const BackgroundLatency& l : {loop_latency, global_ba_latency}) {
-    require_option(l.base >= 1, "latency", l.base, "at least 1 frame");
-    require_option(l.per_keyframe >= 0, "latency_per_keyframe", l.per_keyframe, "at least 0 frames");
-  }
+  require_option(loop_latency.base > 0, "loop.latency", loop_latency.base, "greater than 0 s");
+  require_option(loop_latency.per_keyframe >= 0, "loop.latency_per_keyframe", loop_latency.per_keyframe,
+                 "at least 0 s");
+  require_option(global_ba_latency.base > 0, "global_ba.latency", global_ba_latency.base, "greater than 0 s");
+  require_option(global_ba_latency.per_keyframe >= 0, "global_ba.latency_per_keyframe", global_ba_latency.per_keyframe,
+                 "at least 0 s");
 }
 
 LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, const LocalBaOptions& local_ba,
@@ -58,17 +55,17 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
   options_.check();
 }
 
-void LoopStage::offer(const MapView& view, FrameIndex now, bool may_skip) {
+void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip) {
   const int keyframes = view->live_keyframe_count();
   for (; next_ < view->keyframe_count(); ++next_) {
     if (!options_.loop.enabled || view->live_keyframe(next_) == nullptr) continue;
     if (may_skip && search_.outstanding() >= kMaxLate) continue;
     // Never before the search before it, however many keyframes were culled meanwhile.
-    search_due_ = std::max(search_due_, now + options_.loop_latency(keyframes));
+    search_due_ = std::max(search_due_, now + rate.frames(options_.loop_latency(keyframes)));
     search_.push({view, next_, generation_}, search_due_);
   }
   if (adjustment_wanted_ && adjustment_.outstanding() == 0) {
-    adjustment_.push({view, kNoKeyframe, generation_}, now + options_.global_ba_latency(keyframes));
+    adjustment_.push({view, kNoKeyframe, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
     adjustment_wanted_ = false;
   }
 }

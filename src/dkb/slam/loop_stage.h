@@ -7,23 +7,24 @@
 
 #include "dkb/loop/global_adjustment.h"
 #include "dkb/loop/loop_closer.h"
+#include "dkb/slam/frame_rate.h"
 #include "dkb/util/due_stage.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
 
-// When background results become visible: issue + ceil(base + per_keyframe * keyframes of the map).
+// When background results become visible: so many seconds after they were asked for, in whole frames.
 struct BackgroundLatency {
-  double base = 0;          // [frames] >= 1
-  double per_keyframe = 0;  // [frames] >= 0
-  FrameIndex operator()(int keyframes) const;
+  double base = 0;          // [s] > 0
+  double per_keyframe = 0;  // [s] >= 0, times the keyframes of the map
+  double operator()(int keyframes) const { return base + per_keyframe * keyframes; }
 };
 
 struct LoopStageOptions {
   LoopOptions loop;
   GlobalBaOptions global_ba;
-  BackgroundLatency loop_latency{10, 0.02};
-  BackgroundLatency global_ba_latency{15, 0.4};
+  BackgroundLatency loop_latency{1.0 / 3, 0.02 / 30};
+  BackgroundLatency global_ba_latency{0.5, 0.4 / 30};
   void check() const;
 };
 
@@ -38,7 +39,7 @@ class LoopStage {
 
   // `view` as tracking took it at `now`; it must hold all corrections handed out so far. Keyframes that are new in it
   // are searched for loops. `may_skip`: leave keyframes out while the search is late (real-time runs).
-  void offer(const MapView& view, FrameIndex now, bool may_skip);
+  void offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip);
   // Keyframes below `first` are not searched: they were there before.
   void start_at(KeyframeId first) { next_ = first; }
   // Has the whole map adjusted with the next view that is offered.

@@ -18,7 +18,7 @@
 #include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/scene_stage.h"
 #include "dkb/tracking/tracker.h"
-#include "dkb/util/settings.h"
+#include "dkb_slam/options.h"
 
 namespace dkb {
 
@@ -26,13 +26,11 @@ namespace dkb {
 struct PipelineOptions {
   bool threaded = true;    // mapping on its own thread; false: the same bytes from one thread
   bool realtime = false;   // never wait for mapping; take its results when they are there
-  int mapper_latency = 2;  // [frames] after which a keyframe's mapping becomes visible to tracking, >= 1
+  double mapper_latency = 0.06;  // [s] after which mapping becomes visible to tracking, in whole frames, > 0
   int mapper_queue = 4;    // [keyframes] outstanding at most in a real-time run, >= 1
-  void check() const;
 };
 
-enum class KeyframePolicyKind { adaptive, baseline };
-
+// What the stages are made from.
 struct SlamOptions {
   OrbOptions features;
   DepthOptions depth;
@@ -53,24 +51,12 @@ struct SlamOptions {
   PipelineOptions pipeline;
   uint64_t seed = 1;     // reaches every source of randomness
   Rigid3 base_from_cam;  // mount: the world is the robot's base at the first tracked frame
-
-  void check() const;
 };
 
-// The built-in presets: "default" is our best; "paper" is DKB-SLAM as printed; "orb" is that with all of its three
-// contributions off, an ORB-SLAM3-like baseline. Throws InputError naming the nearest one.
-SlamOptions preset(const std::string& name);
+// The stages' options: those of the preset, then the settings, then the experiments.
+SlamOptions expand(const Options& options);
 
-// The switches of the paper's ablation (and of --disable).
-struct DisabledParts {
-  bool dynamic_removal = false;  // DR: no filter
-  bool keyframes = false;        // KF: the baseline rule instead of the adaptive one
-  bool weighted_ba = false;      // BA: all points weigh the same
-  bool loop = false;             // no loop closing
-};
-void disable_parts(SlamOptions& options, const DisabledParts& parts);
-
-// Binds every field to its dotted key, e.g. "tracking.close_depth".
-void bind_settings(Settings& settings, SlamOptions& options);
+// Every setting as a row of docs/settings.md.
+std::string settings_table();
 
 }  // namespace dkb

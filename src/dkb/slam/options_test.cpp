@@ -2,93 +2,179 @@
 #include "dkb/slam/options.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/files.h"
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
 
-TEST(SlamOptions, DefaultsAreInRange) {
-  EXPECT_NO_THROW(SlamOptions().check());
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
 }
 
-TEST(SlamOptions, EverySettingSurvivesItsYaml) {
-  SlamOptions written, read;
-  Settings a, b;
-  bind_settings(a, written);
-  bind_settings(b, read);
-  for (const SettingEntry& e : a.entries()) {
-    EXPECT_FALSE(e.doc.empty()) << e.key;
-    double number = 0;
-    if (e.value == "true" || e.value == "false") {
-      a.set(e.key, e.value == "true" ? "false" : "true", "test");
-    } else if (parse_number(e.value, &number)) {
-      a.set(e.key,
-            e.value.find_first_of(".e") == std::string::npos ? std::to_string(static_cast<long>(number) + 1)
-                                                             : std::to_string(number * 0.75),
-            "test");
-    }
+std::string refusal(const std::string& assignment) {
+  Options options;
+  return test::input_error_of([&] { options.assign(assignment, "--set"); });
+}
+
+struct YamlFile {
+  explicit YamlFile(const std::string& text)
+      : path(std::filesystem::temp_directory_path() / ("dkb_options_" + std::to_string(getpid()) + ".yaml")) {
+    std::ofstream(path) << text;
   }
-  EXPECT_NE(a.to_yaml(), b.to_yaml());
-  b.load_yaml_text(a.to_yaml(), "config.yaml");
-  EXPECT_EQ(a.to_yaml(), b.to_yaml());
+  ~YamlFile() { std::filesystem::remove(path); }
+  std::filesystem::path path;
+};
+
+TEST(Options, TheirPageIsWhatTheProgramSays) {
+  const std::string page = read_file(std::filesystem::path(DKB_SOURCE_DIR) / "docs" / "settings.md");
+  EXPECT_NE(page.find(settings_table()), std::string::npos) << "docs/settings.md must hold this table:\n"
+                                                            << settings_table();
 }
 
-TEST(SlamOptions, SettingsReachTheirFields) {
-  SlamOptions options;
-  Settings settings;
-  bind_settings(settings, options);
-  settings.set_assignment("features.count=777", "--set");
-  settings.set_assignment("tracking.close_depth=2.5", "--set");
-  settings.set_assignment("mapping.ba.weighted=false", "--set");
-  settings.set_assignment("pipeline.mapper_latency=3", "--set");
-  settings.set_assignment("dynamics.motion.settle=0.75", "--set");
-  settings.set_assignment("dynamics.motion.smoothing.distance=0.3", "--set");
-  EXPECT_EQ(options.features.count, 777);
-  EXPECT_EQ(options.tracking.close_depth, 2.5);
-  EXPECT_FALSE(options.mapping.ba.weighted);
-  EXPECT_EQ(options.pipeline.mapper_latency, 3);
-  EXPECT_EQ(options.dynamics.motion.settle, 0.75);
-  EXPECT_EQ(options.dynamics.motion.smoothing.distance, 0.3);
+TEST(Options, AreFortyAtMostAndALineEach) {
+  EXPECT_LE(lines_of(settings_table()).size(), 40u + 2u);
+  const std::vector<std::string> lines = lines_of(Options().to_yaml());
+  EXPECT_EQ(lines.front().rfind("preset: default", 0), 0u);
+  const auto is_setting = [](const std::string& line) { return line.find(": ") != std::string::npos; };
+  EXPECT_LE(std::count_if(lines.begin(), lines.end(), is_setting), 40);
+  for (const std::string& line : lines)
+    if (is_setting(line) && &line != &lines.front()) {
+      EXPECT_NE(line.find("default "), std::string::npos) << line;
+    }
 }
 
-TEST(SlamOptions, AMisspeltSettingNamesTheNearestOne) {
-  SlamOptions options;
-  Settings settings;
-  bind_settings(settings, options);
-  const std::string message = test::input_error_of([&] { settings.set_assignment("featurs.count=5", "--set"); });
-  EXPECT_NE(message.find("featurs.count"), std::string::npos) << message;
-  EXPECT_NE(message.find("features.count"), std::string::npos) << message;
+TEST(Options, DefaultsOfTheHeaderAreThoseOfTheStages) {
+  Options header;
+  header.seed = 1;
+  header.features = {};
+  header.noise = {};
+  header.tracking = {};
+  header.keyframes = {};
+  header.mapping = {};
+  header.loop = {};
+  header.global_ba = {};
+  header.readout = {};
+  header.dynamics = {};
+  header.dense = {};
+  header.pipeline = {};
+  EXPECT_EQ(header.to_yaml(), Options().to_yaml());
+  EXPECT_NO_THROW(header.check());
 }
 
-TEST(SlamOptions, ValuesOutOfRangeAreRejectedWhereverTheyStand) {
-  const auto rejects = [](auto change) {
-    SlamOptions options;
+TEST(Options, ReachTheStages) {
+  Options options;
+  options.assign("features.count=777");
+  options.tracking.close_depth = 2.5;
+  options.assign("mapping.ba.weighted=false");
+  options.pipeline.mapper_latency = 0.1;
+  options.assign("experiment.mapping.ba.edge_weight=1.7");
+  options.realtime = true;
+  const SlamOptions stages = expand(options);
+  EXPECT_EQ(stages.features.count, 777);
+  EXPECT_EQ(stages.tracking.close_depth, 2.5);
+  EXPECT_FALSE(stages.mapping.ba.weighted);
+  EXPECT_EQ(stages.pipeline.mapper_latency, 0.1);
+  EXPECT_EQ(stages.mapping.ba.weights.edge_weight, 1.7);
+  EXPECT_TRUE(stages.pipeline.realtime);
+}
+
+TEST(Options, SurviveTheirYaml) {
+  Options written("paper");
+  written.seed = 7;
+  written.features.scale = 1.0 / 3.0 + 1;
+  written.dynamics.filter = FilterKind::standard;
+  written.loop.enabled = false;
+  written.set("experiment.keyframes.normals", "oriented");
+  const YamlFile file(written.to_yaml());
+  Options read("orb");
+  read.set("experiment.mapping.ba.edge_weight", "1.2");
+  read.load(file.path);
+  EXPECT_EQ(read.preset(), "paper");
+  EXPECT_EQ(read.to_yaml(), written.to_yaml());
+  EXPECT_EQ(expand(read).adaptive_keyframes.normals, NormalSum::oriented);
+}
+
+TEST(Options, AYamlsPresetComesFirstWhereverItStands) {
+  const YamlFile file("features: {count: 500}\npreset: orb\n");
+  Options options;
+  options.load(file.path);
+  EXPECT_EQ(options.features.count, 500);
+  EXPECT_EQ(options.dynamics.filter, FilterKind::none);
+}
+
+TEST(Options, ExperimentsAreWrittenOnlyWhenSet) {
+  Options options("paper");
+  EXPECT_EQ(options.to_yaml().find("experiment"), std::string::npos);
+  options.set("experiment.mapping.ba.edge_weight", "1.7");
+  EXPECT_NE(options.to_yaml().find("experiment:\n  mapping:\n    ba:\n      edge_weight: 1.7"), std::string::npos);
+}
+
+TEST(Options, ErrorsNameTheWholeKey) {
+  EXPECT_EQ(refusal("features.count=-5"), "--set: features.count: -5 is out of range; it must be at least 1");
+  EXPECT_EQ(refusal("experiment.mapping.ba.edge_weight=20"),
+            "--set: experiment.mapping.ba.edge_weight: 20 is out of range; it must be above 0, at most 10");
+  EXPECT_EQ(refusal("dynamics.filter=paprr"),
+            "--set: dynamics.filter: \"paprr\" is not one of none, box, epipolar, multiview, paper, default");
+  const auto rejects = [](const std::string& key, auto change) {
+    Options options;
     change(options);
-    EXPECT_THROW(options.check(), InvalidOption);
+    const std::string message = test::input_error_of([&] { options.check(); });
+    EXPECT_EQ(message.rfind(key + ": ", 0), 0u) << message;
   };
-  rejects([](auto& o) { o.features.count = 0; });
-  rejects([](auto& o) { o.depth.edge_fraction = 0; });
-  rejects([](auto& o) { o.noise.pixel_sigma = 0; });
-  rejects([](auto& o) { o.tracking.min_inliers = 0; });
-  rejects([](auto& o) { o.baseline_keyframes.frames_between = 0; });
-  rejects([](auto& o) { o.mapping.min_observers = 0; });
-  rejects([](auto& o) { o.pipeline.mapper_latency = 0; });
-  rejects([](auto& o) { o.pipeline.mapper_queue = 0; });
+  rejects("features.count", [](auto& o) { o.features.count = 0; });
+  rejects("features.fast_threshold", [](auto& o) { o.features.fast_threshold = 5; });
+  rejects("noise.pixel_sigma", [](auto& o) { o.noise.pixel_sigma = std::nan(""); });
+  rejects("tracking.min_inliers", [](auto& o) { o.tracking.min_inliers = 0; });
+  rejects("dense.truncation", [](auto& o) { o.dense.truncation = 3; });
+  rejects("dense.obstacle_high", [](auto& o) { o.dense.obstacle_high = 0.05; });
+  rejects("pipeline.mapper_latency", [](auto& o) { o.pipeline.mapper_latency = 0; });
+  rejects("dynamics.filter", [](auto& o) { o.dynamics.filter = static_cast<FilterKind>(99); });
+  rejects("experiment.keyframes.threshold_max", [](auto& o) { o.set("experiment.keyframes.threshold_max", "1"); });
+}
+
+TEST(Options, AMisspeltKeyNamesTheNearestOne) {
+  EXPECT_EQ(refusal("featurs.count=5"), "--set: unknown key \"featurs.count\" (did you mean \"features.count\"?)");
+}
+
+TEST(Options, AKeyOfEarlierVersionsSaysWhatBecameOfIt) {
+  EXPECT_EQ(refusal("mapping.ba.edge_weight=2"),
+            "--set: \"mapping.ba.edge_weight\" is \"experiment.mapping.ba.edge_weight\" now, and not promised to stay");
+  for (const char* key : {"tracking.min_matches", "loop.latency_per_keyframe", "dynamics.silhouette"})
+    EXPECT_EQ(refusal(std::string(key) + "=2"),
+              "--set: \"" + std::string(key) +
+                  "\" was a setting of earlier versions and is fixed now; docs/settings.md lists what can be set");
 }
 
 TEST(Presets, OnlyThePapersWeightIsFixed) {
-  EXPECT_TRUE(preset("default").mapping.ba.weights.adaptive);
-  EXPECT_FALSE(preset("paper").mapping.ba.weights.adaptive);
-  EXPECT_EQ(preset("paper").mapping.ba.weights.edge_weight, 1.5);
-  EXPECT_TRUE(preset("paper").mapping.ba.weighted);
-  EXPECT_FALSE(preset("orb").mapping.ba.weighted);
+  EXPECT_TRUE(expand(Options("default")).mapping.ba.weights.adaptive);
+  EXPECT_FALSE(expand(Options("paper")).mapping.ba.weights.adaptive);
+  EXPECT_EQ(expand(Options("paper")).mapping.ba.weights.edge_weight, 1.5);
+  EXPECT_TRUE(Options("paper").mapping.ba.weighted);
+  EXPECT_FALSE(Options("orb").mapping.ba.weighted);
 }
 
 TEST(Presets, AnUnknownOneIsNamed) {
-  EXPECT_NO_THROW(preset("default").check());
-  EXPECT_NE(test::input_error_of([] { preset("defalt"); }).find("default"), std::string::npos);
+  EXPECT_NE(test::input_error_of([] { Options("defalt"); }).find("default"), std::string::npos);
+}
+
+TEST(Presets, TheOrbOneIsThePapersWithItsPartsOff) {
+  Options paper("paper");
+  paper.disable("dr,kf,ba");
+  const std::string a = paper.to_yaml(), b = Options("orb").to_yaml();
+  EXPECT_EQ(a.substr(a.find('\n')), b.substr(b.find('\n')));
 }
 
 }  // namespace

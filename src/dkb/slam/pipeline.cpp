@@ -10,6 +10,7 @@ namespace dkb {
 // One frame, as in DKB section 3: features, what moves, pose, keyframe decision. Mapping happens beside it.
 FrameResult Pipeline::process(const Frame& frame) {
   last_stamp_ns_ = frame.stamp_ns();
+  rate_.add(last_stamp_ns_);
   FrameResult result;
   const Stopwatch waiting;
   take_due_map();
@@ -32,14 +33,14 @@ FrameResult Pipeline::process(const Frame& frame) {
 }
 
 void Pipeline::finish() {
-  const FrameIndex due = next_frame_ + options_.pipeline.mapper_latency;
+  const FrameIndex due = mapping_due();
   KeyframePacket report = tracker_.make_report();
   if (next_keyframe_ > 0 && !localize_only_) mapping_.push(std::move(report), due);
   bool adjusted_last = !options_.final_ba;
   while (true) {
     if (const auto view = mapping_.drain()) take_view(*view);
     if (localize_only_ || next_keyframe_ == 0) break;
-    loop_.offer(tracker_.map().shared_view(), next_frame_, false);
+    loop_.offer(tracker_.map().shared_view(), next_frame_, rate_, false);
     auto corrections = loop_.take_due(std::numeric_limits<FrameIndex>::max(), true);
     if (corrections.empty() && loop_.idle()) {
       if (adjusted_last) break;

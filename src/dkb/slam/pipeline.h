@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
+#include "dkb/slam/frame_rate.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
 #include "dkb/slam/odometry_frame.h"
@@ -55,6 +57,10 @@ class Pipeline {
   std::vector<Event> take_events();
 
  private:
+  // When what mapping is given now becomes visible. It must not fall, also when the rate has just become known.
+  FrameIndex mapping_due() {
+    return mapping_due_ = std::max(mapping_due_, next_frame_ + rate_.frames(options_.pipeline.mapper_latency));
+  }
   void take_due_map();
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
@@ -85,7 +91,9 @@ class Pipeline {
   std::optional<DenseMapper> dense_;
 
   // What the next frame needs of the one before.
+  FrameRate rate_;
   FrameIndex next_frame_ = 0;
+  FrameIndex mapping_due_ = 0;  // of what was given to mapping last
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   double crowded_share_ = 0;  // of its features that movers took

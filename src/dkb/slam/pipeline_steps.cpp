@@ -42,6 +42,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
       movers_(context.camera, options_.movers),
       odometry_(options_.base_from_cam),
+      rate_(context.camera.fps),
       camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
       mapping_(LocalMapper(context.camera, options_.noise, options_.features.scale, options_.features.levels,
@@ -86,8 +87,8 @@ void Pipeline::take_due_map() {
   const auto view = mapping_.take_due(next_frame_, wait);
   if (view) take_view(*view);
   if (!localize_only_) {
-    if (view && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, !wait);
-    correct(loop_.take_due(next_frame_, wait), next_frame_ + options_.pipeline.mapper_latency);
+    if (view && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, rate_, !wait);
+    correct(loop_.take_due(next_frame_, wait), mapping_due());
   }
   record_.add_time("wait_mapper", watch.ms());
 }
@@ -184,12 +185,9 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
 // Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
 void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   if (!tracked.tracked() || scene.mask.empty()) return;
-  std::vector<PointId> matched;
+  std::vector<PointId> matched, on_mover;
   for (PointId p : tracked.points)
-    if (p != kNoPoint) {
-      evidence_.fits_still_world(p);
-      matched.push_back(p);
-    }
+    if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());
   const DepthImage& depth = scene.extracted.image().depth;
   for (const PointInView& point : tracker_.points_in_view()) {
@@ -200,9 +198,9 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
     const double surface = depth(x, y);
     if (std::abs(surface - point.depth) < 0.05 * surface + 0.05 &&
         !std::binary_search(matched.begin(), matched.end(), point.id))
-      evidence_.on_mover(point.id);
+      on_mover.push_back(point.id);
   }
-  tracker_.retract(evidence_.take_convicted());
+  tracker_.retract(evidence_.weigh(tracked.timestamp, matched, on_mover));
 }
 
 KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracked) {
@@ -262,7 +260,7 @@ void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
   for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;
   recent_keyframes_.push_back({tracked.index, id, tracked.features});
   while (recent_keyframes_.front().frame < tracked.index - 2 * scenes_.memory()) recent_keyframes_.pop_front();
-  mapping_.push(std::move(packet), tracked.index + options_.pipeline.mapper_latency);
+  mapping_.push(std::move(packet), mapping_due());
   tracked.reference = id;
   tracked.cam_from_reference = {};
   if (dense_) {

@@ -73,23 +73,14 @@ class EventOutlet {
   std::deque<Event> waiting_;
 };
 
-SlamOptions options_of(const Options& options) {
-  SlamOptions values = options.internal();
-  values.pipeline.threaded = options.threaded;
-  values.pipeline.realtime = options.realtime;
-  values.dense_map = options.dense_map;
-  values.base_from_cam = options.base_from_cam;
-  return values;
-}
-
 }  // namespace
 
 class Slam::Impl {
  public:
   Impl(const Camera& camera, const Options& given, Detectors detectors, std::shared_ptr<KeyframePolicy> policy)
-      : options(given), context{camera, options_of(given), std::move(detectors), std::move(policy)} {
+      : options(given), context{camera, expand(given), std::move(detectors), std::move(policy)} {
     context.camera.check();
-    context.options.check();
+    given.check();
     context.detectors.schedule.check();
     start({});
   }

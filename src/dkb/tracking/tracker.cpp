@@ -30,9 +30,9 @@ void TrackingOptions::check() const {
                  odometry_sigma_factor, "0 or at least 1");
   require_option(match_distance >= 0 && match_distance <= 256, "match_distance", match_distance, "0 ... 256 bits");
   require_option(match_ratio >= 0 && match_ratio <= 1, "match_ratio", match_ratio, "0 ... 1");
-  require_option(established_frames >= 0, "established_frames", established_frames, "at least 0");
-  require_option(refresh_frames >= 1, "refresh_frames", refresh_frames, "at least 1");
-  require_option(new_map_after >= 0, "new_map_after", new_map_after, "at least 0 frames");
+  require_option(established_after >= 0, "tracking.established_after", established_after, "at least 0 s");
+  require_option(refresh_after > 0, "tracking.refresh_after", refresh_after, "greater than 0 s");
+  require_option(new_map_after >= 0, "tracking.new_map_after", new_map_after, "at least 0 s");
   local_map.check();
   relocalisation.check();
 }
@@ -53,7 +53,7 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
 
 Rigid3 Tracker::take_view(MapView view) {
   map_.take_view(std::move(view));
-  candidates_made_ = -1;
+  candidates_made_.reset();
   std::erase_if(provisional_, [&](const auto& p) { return map_.view().keyframe(p.second.keyframe) != nullptr; });
   std::erase_if(retracted_, [&](PointId id) {
     return map_.view().keyframe(birth_keyframe(id)) != nullptr && map_.view().point(id) == nullptr;
@@ -134,17 +134,19 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   return optimise_pose(camera_, initial, observations);
 }
 
-void Tracker::refresh_candidates(const std::vector<PointId>& points, FrameIndex index) {
-  if (candidates_made_ >= 0 && index - candidates_made_ < options_.refresh_frames) return;
+void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {
+  if (candidates_made_ && now - *candidates_made_ < options_.refresh_after) return;
   candidates_ = local_map_candidates(points, map_.view(), options_.local_map);
-  for (Candidate& c : candidates_) c.established = established(c.id, index);
-  candidates_made_ = index;
+  for (Candidate& c : candidates_) c.established = established(c.id, now);
+  candidates_made_ = now;
 }
 
-bool Tracker::established(PointId id, FrameIndex now) const {
+// Keyframes of a map that was loaded are of another clock, and old.
+bool Tracker::established(PointId id, double now) const {
   const MapPoint* p = map_.view().point(id);
   if (p == nullptr || p->observations.size() < 2) return false;
-  return map_.view().keyframe(birth_keyframe(id))->frame + options_.established_frames <= now;
+  const Keyframe& birth = *map_.view().keyframe(birth_keyframe(id));
+  return birth.frame < 0 || birth.timestamp + options_.established_after <= now;
 }
 
 // Features on movers that showed no well-known point end here: mapping never sees them.
@@ -170,7 +172,7 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
 
 bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                               TrackedFrame& frame) {
-  refresh_candidates(points, frame.index);
+  refresh_candidates(points, frame.timestamp);
   const RgbdFeatures& features = *frame.features;
   std::vector<uint8_t> taken(features.size(), 0);
   std::vector<PointId> matched;
@@ -330,7 +332,7 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
   if (!within_travel_distance(*found, frame.timestamp) &&
       found->similarity() < options_.relocalisation.min_similarity_far)
     return false;
-  candidates_made_ = -1;
+  candidates_made_.reset();
   return track_local_map(found->cam_from_world, options_.radius_local_map, options_.relocalisation.min_inliers,
                          found->points, frame);
 }
@@ -341,7 +343,7 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const MotionPrior* pri
   if (!unconfirmed_) return false;
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
-  candidates_made_ = -1;
+  candidates_made_.reset();
   if (last_->index + 1 == frame.index && track_from_last(frame, prior)) return true;
   last_ = std::move(before_loss);
   state_ = TrackingState::lost;
@@ -354,12 +356,14 @@ bool Tracker::start_map(TrackedFrame& frame) {
   for (size_t f = 0; f < frame.features->size(); ++f)
     with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
   if (with_depth < options_.initial_points) return false;
-  if (state_ == TrackingState::lost && (options_.new_map_after == 0 || ++lost_frames_ < options_.new_map_after))
-    return false;
+  if (state_ == TrackingState::lost) {
+    if (!lost_since_) lost_since_ = frame.timestamp;
+    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < options_.new_map_after) return false;
+  }
   frame.inliers = with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : start_;
   drop_unmatched_suspects(frame);
-  candidates_made_ = -1;
+  candidates_made_.reset();
   velocity_.reset();
   return true;
 }
@@ -399,13 +403,13 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     frame.starts_map = input.may_start_map && start_map(frame);
     if (frame.starts_map) {
       state_ = TrackingState::tracking;
-      lost_frames_ = 0;
+      lost_since_.reset();
       last_ = frame;
     }
     frame.state = state_;
     return frame;
   }
-  lost_frames_ = 0;
+  lost_since_.reset();
   unconfirmed_.reset();
   if (!last_ || frame.timestamp <= last_->timestamp) {
     velocity_.reset();

@@ -32,10 +32,9 @@ struct TrackingOptions {
   double odometry_sigma_factor = 2.0;  // on the noise of what shows visual-odometry points, >= 1; 0 = without them
   int match_distance = 90;             // [bits] largest Hamming distance of a match with a map point, 0 ... 256
   double match_ratio = 0.8;            // best over second best distance of such a match, 0 ... 1
-  int established_frames =
-      20;                  // [frames] since a point's birth before it may be found where a mover is suspected, >= 0
-  int refresh_frames = 5;  // [frames] the choice of local map points is renewed at least so often, >= 1
-  int new_map_after = 30;  // [frames] lost in a row, each good enough to start a map, until one is started; 0 = never
+  double established_after = 0.65;  // [s] since its birth that a point may be found where a mover is suspected, >= 0
+  double refresh_after = 0.15;      // [s] the choice of local map points is renewed at least so often, > 0
+  double new_map_after = 1.0;  // [s] lost in a row, each frame good enough to start a map, until one is; 0 = never
   LocalMapOptions local_map;
   RelocalisationOptions relocalisation;
   void check() const;
@@ -100,10 +99,10 @@ class Tracker {
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                          std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_last_frame(const MatchableFeatures& features, std::vector<PointId>& points) const;
+  std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;
   std::vector<Rigid3> expected_poses(double dt, const MotionPrior* prior) const;
   bool track_from_last(TrackedFrame& frame, const MotionPrior* prior);
-  bool plausible_motion(const Rigid3& cam_from_world) const;
+  bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance);
   bool moved_plausibly_from_last(const TrackedFrame& frame) const;
   bool confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior);
@@ -114,10 +113,10 @@ class Tracker {
                        TrackedFrame& frame);
   bool is_retracted(PointId id) const;
   void take_reports(KeyframePacket& packet);
-  void refresh_candidates(const std::vector<PointId>& points, FrameIndex index);
+  void refresh_candidates(const std::vector<PointId>& points, double now);
   Vector6d velocity_to(const TrackedFrame& frame) const;
   void refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
-  bool established(PointId id, FrameIndex now) const;
+  bool established(PointId id, double now) const;
   static void drop_unmatched_suspects(TrackedFrame& frame);
   void finish(TrackedFrame& frame);
 
@@ -141,9 +140,9 @@ class Tracker {
   OdometryPoints odometry_;                  // from the last frame
   std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
   std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
-  int lost_frames_ = 0;                      // in a row that could have started a map
+  std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map
   std::vector<Candidate> candidates_;        // from the view
-  FrameIndex candidates_made_ = -1;          // frame of the last refresh; -1 = the view is newer
+  std::optional<double> candidates_made_;    // [s] nothing = the view is newer
 };
 
 }  // namespace dkb

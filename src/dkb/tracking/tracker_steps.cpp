@@ -8,9 +8,10 @@
 namespace dkb {
 namespace {
 
-// What the camera may do from one frame to the next; beyond it is taken as lost and sought.
-constexpr double kMaxTranslation = 0.5;  // [m]
-constexpr double kMaxRotation = 0.5;     // [rad]
+// What the camera may do between two frames; beyond it the pose is a mistake, or the camera is to be sought. Ten times
+// a brisk walk, and twice the fastest turn of a head.
+constexpr double kMaxSpeed = 15;  // [m/s]
+constexpr double kMaxRate = 15;   // [rad/s]
 
 }  // namespace
 
@@ -25,7 +26,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (!at) continue;
     Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), scale_factor_);
     c.id = id;
-    c.established = established(id, last_->index);
+    c.established = established(id, last_->timestamp);
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
@@ -47,7 +48,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
 
 // By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
 // the last place of each point finds just enough wrong ones for a wrong pose.
-std::optional<Rigid3> Tracker::match_last_frame(const MatchableFeatures& features, std::vector<PointId>& points) const {
+std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const {
   std::vector<DescribedPoint> known;
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
@@ -56,8 +57,9 @@ std::optional<Rigid3> Tracker::match_last_frame(const MatchableFeatures& feature
   }
   RansacOptions ransac;
   ransac.seed = seed_;
-  auto found = pose_by_descriptors(known, features, camera_, noise_, scale_factor_, options_.min_matches, ransac);
-  if (!found || found->inliers < options_.min_matches || !plausible_motion(found->cam_from_world)) return std::nullopt;
+  auto found = pose_by_descriptors(known, frame.matchable(), camera_, noise_, scale_factor_, options_.min_matches, ransac);
+  if (!found || found->inliers < options_.min_matches || !plausible_motion(found->cam_from_world, frame.timestamp))
+    return std::nullopt;
   points = std::move(found->points);
   return found->cam_from_world;
 }
@@ -82,27 +84,29 @@ bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
   std::optional<Rigid3> pose;
   for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, prior))
     if (!pose) pose = track_last_frame(expected, options_.radius_last_frame, features, points);
-  if (!pose) pose = match_last_frame(features, points);
+  if (!pose) pose = match_last_frame(frame, points);
   if (!pose) pose = track_last_frame(last_->cam_from_world, options_.radius_wide, features, points);
   if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); }, {});
-    if (!near || !plausible_motion(near->cam_from_world)) return false;
+    if (!near || !plausible_motion(near->cam_from_world, frame.timestamp)) return false;
     pose = near->cam_from_world;
     points = std::move(near->points);
   }
   return pose && track_local_map(*pose, options_.radius_local_map, options_.min_inliers, points, frame);
 }
 
-bool Tracker::plausible_motion(const Rigid3& cam_from_world) const {
+bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
   const Rigid3 motion = cam_from_world * last_->cam_from_world.inverse();
-  return motion.translation.norm() <= kMaxTranslation && vector_from_rotation(motion.rotation).norm() <= kMaxRotation;
+  const double seconds = timestamp - last_->timestamp;
+  return motion.translation.norm() <= kMaxSpeed * seconds &&
+         vector_from_rotation(motion.rotation).norm() <= kMaxRate * seconds;
 }
 
 bool Tracker::moved_plausibly_from_last(const TrackedFrame& frame) const {
   return last_ && last_->index + 1 == frame.index && state_ != TrackingState::lost &&
-         plausible_motion(frame.cam_from_world);
+         plausible_motion(frame.cam_from_world, frame.timestamp);
 }
 
 }  // namespace dkb

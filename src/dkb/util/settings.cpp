@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "dkb/util/errors.h"
@@ -120,89 +121,122 @@ void Settings::add(const std::string& key, Binding binding) {
     if (other == key || is_section(other, key) || is_section(key, other))
       throw std::logic_error("setting " + key + " clashes with " + other);
   }
+  binding.initial = binding.write();
   bindings_.emplace(key, std::move(binding));
 }
 
+namespace {
+
+template <class Number>
+bool read_number(const std::string& text, Number* field) {
+  if constexpr (std::is_floating_point_v<Number>) {
+    double parsed = 0;
+    if (!parse_number(text, &parsed) || !std::isfinite(parsed) || !std::isfinite(static_cast<Number>(parsed)))
+      return false;
+    *field = static_cast<Number>(parsed);
+    return true;
+  } else {
+    Number parsed = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+    if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
+    *field = parsed;
+    return true;
+  }
+}
+
+}  // namespace
+
+std::string SettingEntry::unit() const {
+  const std::string unit = doc.starts_with('[') ? doc.substr(1, doc.find(']') - 1) : "";
+  return unit == "1" ? "" : unit;
+}
+
+std::string SettingEntry::meaning() const {
+  return doc.starts_with('[') && doc.find("] ") != std::string::npos ? doc.substr(doc.find("] ") + 2) : doc;
+}
+
+std::string Range::text() const {
+  if (std::isfinite(max))
+    return above_min ? "above " + number_to_text(min) + ", at most " + number_to_text(max)
+                     : number_to_text(min) + " ... " + number_to_text(max);
+  if (!std::isfinite(min)) return "";
+  return (above_min ? "above " : "at least ") + number_to_text(min);
+}
+
+template <class Number>
+void Settings::bind_number(const std::string& key, Number* field, const std::string& doc, const Range& range) {
+  const char* type = std::is_floating_point_v<Number> ? "a number"
+                     : std::is_signed_v<Number>       ? "a whole number"
+                                                      : "a whole number, not negative";
+  add(key, {doc, type, range.text(), [field](const std::string& text) { return read_number(text, field); },
+            [field] { return number_to_text(*field); },
+            [field, range] { return range.contains(static_cast<double>(*field)); }});
+}
+
+void Settings::bind(const std::string& key, int* field, const std::string& doc, const Range& range) {
+  bind_number(key, field, doc, range);
+}
+void Settings::bind(const std::string& key, int64_t* field, const std::string& doc, const Range& range) {
+  bind_number(key, field, doc, range);
+}
+void Settings::bind(const std::string& key, uint64_t* field, const std::string& doc) {
+  bind_number(key, field, doc, {});
+}
+void Settings::bind(const std::string& key, float* field, const std::string& doc, const Range& range) {
+  bind_number(key, field, doc, range);
+}
+void Settings::bind(const std::string& key, double* field, const std::string& doc, const Range& range) {
+  bind_number(key, field, doc, range);
+}
+
 void Settings::bind(const std::string& key, bool* field, const std::string& doc) {
-  add(key, {doc, "", "true or false",
+  add(key, {doc, "true or false", "true, false",
             [field](const std::string& text) {
               if (text != "true" && text != "false") return false;
               *field = text == "true";
               return true;
             },
-            [field] { return std::string(*field ? "true" : "false"); }});
-}
-
-namespace {
-
-template <class Integer>
-bool read_integer(const std::string& text, Integer* field) {
-  Integer parsed = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
-  *field = parsed;
-  return true;
-}
-
-template <class Real>
-bool read_real(const std::string& text, Real* field) {
-  double parsed = 0;
-  if (!parse_number(text, &parsed) || !std::isfinite(parsed) || !std::isfinite(static_cast<Real>(parsed))) return false;
-  *field = static_cast<Real>(parsed);
-  return true;
-}
-
-}  // namespace
-
-void Settings::bind(const std::string& key, int* field, const std::string& doc) {
-  add(key, {doc, "", "a whole number", [field](const std::string& text) { return read_integer(text, field); },
-            [field] { return number_to_text(*field); }});
-}
-
-void Settings::bind(const std::string& key, int64_t* field, const std::string& doc) {
-  add(key, {doc, "", "a whole number", [field](const std::string& text) { return read_integer(text, field); },
-            [field] { return number_to_text(*field); }});
-}
-
-void Settings::bind(const std::string& key, uint64_t* field, const std::string& doc) {
-  add(key,
-      {doc, "", "a whole number, not negative", [field](const std::string& text) { return read_integer(text, field); },
-       [field] { return number_to_text(*field); }});
-}
-
-void Settings::bind(const std::string& key, float* field, const std::string& doc) {
-  add(key, {doc, "", "a number", [field](const std::string& text) { return read_real(text, field); },
-            [field] { return number_to_text(*field); }});
-}
-
-void Settings::bind(const std::string& key, double* field, const std::string& doc) {
-  add(key, {doc, "", "a number", [field](const std::string& text) { return read_real(text, field); },
-            [field] { return number_to_text(*field); }});
+            [field] { return std::string(*field ? "true" : "false"); }, [] { return true; }});
 }
 
 void Settings::bind(const std::string& key, std::string* field, const std::string& doc) {
-  add(key, {doc, "", "a text",
+  add(key, {doc, "a text", "",
             [field](const std::string& text) {
               *field = text;
               return true;
             },
-            [field] { return yaml_quoted(*field); }});
+            [field] { return yaml_quoted(*field); }, [] { return true; }});
 }
 
 void Settings::set(const std::string& key, const std::string& value, const std::string& where) {
   const auto it = bindings_.find(key);
   if (it == bindings_.end())
     throw InputError(where + ": unknown key \"" + excerpt(key) + "\"" + did_you_mean(key, keys()));
-  if (!it->second.read(value))
-    throw InputError(where + ": " + key + ": \"" + excerpt(value) + "\" is not " + it->second.expected);
-  it->second.where = where;
+  Binding& b = it->second;
+  const std::string before = b.write();
+  if (!b.read(value)) throw InputError(where + ": " + key + ": \"" + excerpt(value) + "\" is not " + b.expected);
+  if (!b.in_range()) {
+    b.read(before);
+    throw InvalidOption(where + ": " + key, excerpt(value), b.range);
+  }
+  b.where = where;
 }
 
-void Settings::set_assignment(const std::string& assignment, const std::string& where) {
+void Settings::check() const {
+  for (const auto& [key, b] : bindings_)
+    if (!b.in_range()) throw InvalidOption(key, b.write(), b.range);
+}
+
+std::pair<std::string, std::string> split_assignment(const std::string& assignment, const std::string& where) {
   const size_t equals = assignment.find('=');
   if (equals == std::string::npos)
     throw InputError(where + ": \"" + excerpt(assignment) + "\" has no value; write key=value");
-  set(assignment.substr(0, equals), assignment.substr(equals + 1), where);
+  return {assignment.substr(0, equals), assignment.substr(equals + 1)};
+}
+
+void Settings::set_assignment(const std::string& assignment, const std::string& where) {
+  const auto [key, value] = split_assignment(assignment, where);
+  set(key, value, where);
 }
 
 void Settings::load_yaml(const std::filesystem::path& path) {
@@ -210,6 +244,11 @@ void Settings::load_yaml(const std::filesystem::path& path) {
 }
 
 void Settings::load_yaml_text(const std::string& text, const std::string& name) {
+  for (const SettingLine& line : parse_yaml(text, name)) set(line.key, line.value, line.where);
+}
+
+std::vector<SettingLine> Settings::parse_yaml(const std::string& text, const std::string& name) const {
+  std::vector<SettingLine> lines;
   if (text.size() > kMaxYamlBytes) throw InputError(name + ": is too large for a settings file");
   if (text.find('\0') != std::string::npos) throw InputError(name + ": is not a text file");
   YAML::Node root;
@@ -221,7 +260,6 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
 
   // Every node that is entered has a key of its own that is a known one or a known section, so that aliases cannot make
   // the walk long.
-  const std::vector<std::string> known = keys();
   std::set<std::string> seen;
   const std::function<void(const YAML::Node&, const std::string&, int)> walk =
       [&](const YAML::Node& node, const std::string& prefix, int depth) {
@@ -236,14 +274,12 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
           if (!first.IsScalar()) throw InputError(where + ": a key must be a word");
           const std::string key = prefix + first.Scalar();
           if (!seen.insert(key).second) throw InputError(where + ": key \"" + excerpt(key) + "\" is given twice");
-          const auto at = std::lower_bound(known.begin(), known.end(), key + ".");
-          const bool is_section = at != known.end() && at->compare(0, key.size() + 1, key + ".") == 0;
-          if (is_section) {
+          if (has_section(key)) {
             walk(second, key + ".", depth + 1);
           } else if (bindings_.count(key) != 0 && !second.IsScalar()) {
             throw InputError(where + ": " + key + ": has no value; it must be " + bindings_.at(key).expected);
           } else {
-            set(key, second.IsScalar() ? second.Scalar() : "", where);
+            lines.push_back({key, second.IsScalar() ? second.Scalar() : "", where});
           }
         }
       };
@@ -252,12 +288,18 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
   } catch (const YAML::Exception& e) {
     throw InputError(place(name, e.mark) + ": is not valid YAML (" + excerpt(e.msg) + ")");
   }
+  return lines;
 }
 
 std::string Settings::to_yaml() const {
+  return settings_yaml(entries());
+}
+
+std::string settings_yaml(const std::vector<SettingEntry>& entries) {
   std::string out;
   std::vector<std::string> open;  // sections of the line before
-  for (const auto& [key, binding] : bindings_) {
+  for (const SettingEntry& entry : entries) {
+    const std::string& key = entry.key;
     std::vector<std::string> parts;
     for (size_t start = 0;;) {
       const size_t dot = key.find('.', start);
@@ -271,8 +313,8 @@ std::string Settings::to_yaml() const {
     while (common < open.size() && common < parts.size() && open[common] == parts[common]) ++common;
     for (size_t i = common; i < parts.size(); ++i) out += std::string(2 * i, ' ') + parts[i] + ":\n";
     open = parts;
-    out += std::string(2 * parts.size(), ' ') + leaf + ": " + binding.write();
-    if (!binding.doc.empty()) out += "  # " + binding.doc;
+    out += std::string(2 * parts.size(), ' ') + leaf + ": " + entry.value;
+    if (!entry.doc.empty()) out += "  # " + entry.doc;
     out += "\n";
   }
   return out;
@@ -280,7 +322,8 @@ std::string Settings::to_yaml() const {
 
 std::vector<SettingEntry> Settings::entries() const {
   std::vector<SettingEntry> result;
-  for (const auto& [key, binding] : bindings_) result.push_back({key, binding.write(), binding.doc, binding.where});
+  for (const auto& [key, binding] : bindings_)
+    result.push_back({key, binding.write(), binding.doc, binding.where, binding.initial, binding.range});
   return result;
 }
 
@@ -288,6 +331,11 @@ std::vector<std::string> Settings::keys() const {
   std::vector<std::string> result;
   for (const auto& [key, unused] : bindings_) result.push_back(key);
   return result;
+}
+
+bool Settings::has_section(const std::string& name) const {
+  const auto at = bindings_.lower_bound(name + ".");
+  return at != bindings_.end() && at->first.starts_with(name + ".");
 }
 
 std::string Settings::where(const std::string& key) const {

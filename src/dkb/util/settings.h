@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -27,15 +30,44 @@ bool parse_number(std::string_view text, double* value);  // accepts nan and inf
 
 // One setting as it stands.
 struct SettingEntry {
-  std::string key;    // dotted, e.g. "features.count"
-  std::string value;  // as written by to_yaml()
-  std::string doc;    // unit in brackets and meaning, e.g. "[px] border without features"
-  std::string where;  // where it was set ("--set", "file.yaml:7"); empty = default
+  std::string key;              // dotted, e.g. "features.count"
+  std::string value;            // as written by to_yaml()
+  std::string doc;              // unit in brackets and meaning, e.g. "[px] border without features"
+  std::string where;            // where it was set ("--set", "file.yaml:7"); empty = default
+  std::string initial;          // the value when it was bound
+  std::string range;            // what it may be: "0.5 ... 20", "true, false", "red, green"; may be empty
+  std::string unit() const;     // of its doc
+  std::string meaning() const;  // its doc without the unit
 };
 
+// The numbers that a setting may take.
+struct Range {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool above_min = false;  // min itself is out
+  bool contains(double value) const {
+    return (above_min ? value > min : value >= min) && value <= max && std::isfinite(value);
+  }
+  std::string text() const;  // "at least 1", "0 ... 1"; empty for all numbers
+};
+
+// The values of an enum as text.
+template <class Enum>
+using Names = std::vector<std::pair<std::string, Enum>>;
+
+// One line of a settings file, with the place it comes from ("file.yaml:7").
+struct SettingLine {
+  std::string key, value, where;
+};
+
+// Key and value of "key=value". Throws InputError beginning with `where`.
+std::pair<std::string, std::string> split_assignment(const std::string& assignment, const std::string& where);
+
+// Lines of YAML, sections nested, doc as comment. The entries must be sorted by key.
+std::string settings_yaml(const std::vector<SettingEntry>& entries);
+
 // Gives names to the fields of options structs, so that the command line and YAML files can set them. The structs stay
-// the owners: a bound field must outlive the Settings, and its value when bound is the default. Range checks are the
-// structs' own check().
+// the owners: a bound field must outlive the Settings, and its value when bound is the default.
 class Settings {
  public:
   Settings() = default;
@@ -44,52 +76,61 @@ class Settings {
 
   // Throws std::logic_error when `key` is taken, or is the section of another key.
   void bind(const std::string& key, bool* field, const std::string& doc);
-  void bind(const std::string& key, int* field, const std::string& doc);
-  void bind(const std::string& key, int64_t* field, const std::string& doc);
+  void bind(const std::string& key, int* field, const std::string& doc, const Range& range = {});
+  void bind(const std::string& key, int64_t* field, const std::string& doc, const Range& range = {});
   void bind(const std::string& key, uint64_t* field, const std::string& doc);
-  void bind(const std::string& key, float* field, const std::string& doc);
-  void bind(const std::string& key, double* field, const std::string& doc);
+  void bind(const std::string& key, float* field, const std::string& doc, const Range& range = {});
+  void bind(const std::string& key, double* field, const std::string& doc, const Range& range = {});
   void bind(const std::string& key, std::string* field, const std::string& doc);
   // An enum set by name. Names must be distinct and cover the field's value.
   template <class Enum>
-  void bind(const std::string& key, Enum* field, const std::vector<std::pair<std::string, Enum>>& names,
-            const std::string& doc);
+  void bind(const std::string& key, Enum* field, const std::string& doc, const Names<Enum>& names);
 
   // `where` opens the messages: "--set", "preset.yaml:7". Throws InputError for an unknown key (with the nearest valid
-  // one) and for a value of another type.
+  // one) and for a value of another type, InvalidOption for one out of range; the field keeps its value then.
   void set(const std::string& key, const std::string& value, const std::string& where);
   // "key=value", as given to --set.
   void set_assignment(const std::string& assignment, const std::string& where);
   // Nested maps and dotted keys may be mixed; a key may occur once. Throws InputError with file:line.
   void load_yaml(const std::filesystem::path& path);
   void load_yaml_text(const std::string& text, const std::string& name);
+  // The lines of such a text, in its order, with keys and values still to be judged by set().
+  std::vector<SettingLine> parse_yaml(const std::string& text, const std::string& name) const;
+  // Throws InvalidOption for the first field that is out of range.
+  void check() const;
 
   // Every setting with its effective value, sorted by key, nested, doc as comment. Loading it gives the same values.
   std::string to_yaml() const;
   std::vector<SettingEntry> entries() const;  // sorted by key
   std::vector<std::string> keys() const;      // sorted
+  bool has(const std::string& key) const { return bindings_.contains(key); }
+  bool has_section(const std::string& name) const;
   // Where the key was last set; empty while it has its default. Throws std::logic_error for a key never bound.
   std::string where(const std::string& key) const;
 
  private:
   struct Binding {
-    std::string doc, where;
+    std::string doc;
     std::string expected;                          // "a whole number", for messages
+    std::string range;                             // of its values, in words
     std::function<bool(const std::string&)> read;  // false: not of this type; the field is unchanged then
     std::function<std::string()> write;
+    std::function<bool()> in_range;
+    std::string where = "", initial = "";
   };
   void add(const std::string& key, Binding binding);
+  template <class Number>
+  void bind_number(const std::string& key, Number* field, const std::string& doc, const Range& range);
 
   std::map<std::string, Binding> bindings_;
 };
 
 template <class Enum>
-void Settings::bind(const std::string& key, Enum* field, const std::vector<std::pair<std::string, Enum>>& names,
-                    const std::string& doc) {
+void Settings::bind(const std::string& key, Enum* field, const std::string& doc, const Names<Enum>& names) {
   Binding b;
   b.doc = doc;
-  b.expected = "one of";
-  for (size_t i = 0; i < names.size(); ++i) b.expected += (i == 0 ? " " : ", ") + names[i].first;
+  for (size_t i = 0; i < names.size(); ++i) b.range += (i == 0 ? "" : ", ") + names[i].first;
+  b.expected = "one of " + b.range;
   b.read = [field, names](const std::string& text) {
     for (const auto& [name, value] : names)
       if (name == text) {
@@ -98,10 +139,13 @@ void Settings::bind(const std::string& key, Enum* field, const std::vector<std::
       }
     return false;
   };
-  b.write = [field, names, key] {
+  b.write = [field, names] {
     for (const auto& [name, value] : names)
       if (value == *field) return name;
-    throw std::logic_error(key + ": its value has no name");
+    return std::to_string(static_cast<int>(*field));
+  };
+  b.in_range = [field, names] {
+    return std::any_of(names.begin(), names.end(), [field](const auto& n) { return n.second == *field; });
   };
   add(key, std::move(b));
 }

@@ -32,7 +32,7 @@ void bind(Settings* s, Options* o) {
   s->bind("seed", &o->seed, "of all randomness");
   s->bind("filter.flow.gain", &o->gain, "[px]");
   s->bind("filter.name", &o->name, "name");
-  s->bind("filter.colour", &o->colour, {{"red", Colour::red}, {"green", Colour::green}}, "colour");
+  s->bind("filter.colour", &o->colour, "colour", {{"red", Colour::red}, {"green", Colour::green}});
 }
 
 TEST(NearestName, FindsMisspellingsAndRefusesStrangers) {

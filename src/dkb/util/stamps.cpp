@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/util/stamps.h"
 
+#include <algorithm>
+
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -29,6 +31,14 @@ std::string stamp_text(int64_t ns) {
   fraction.insert(0, 9 - fraction.size(), '0');
   if (fraction.ends_with("000")) fraction.resize(6);
   return (ns < 0 ? "-" : "") + std::to_string(size / kNsPerSecond) + "." + fraction;
+}
+
+double frame_rate_of(const std::vector<int64_t>& stamps_ns) {
+  std::vector<int64_t> intervals;
+  for (size_t i = 1; i < stamps_ns.size(); ++i) intervals.push_back(stamps_ns[i] - stamps_ns[i - 1]);
+  std::sort(intervals.begin(), intervals.end());
+  if (intervals.empty() || intervals[intervals.size() / 2] <= 0) return 30;
+  return std::clamp(std::round(1e9 / static_cast<double>(intervals[intervals.size() / 2])), 1.0, 1000.0);
 }
 
 }  // namespace dkb

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dkb {
 
@@ -30,5 +31,8 @@ std::optional<int64_t> parse_stamp_ns(std::string_view text);
 
 // The stamp as decimal seconds, with six digits or, where these do not suffice, nine.
 std::string stamp_text(int64_t ns);
+
+// [1/s] by the median of the intervals between rising stamps, rounded, 1 ... 1000; 30 where there is none.
+double frame_rate_of(const std::vector<int64_t>& stamps_ns);
 
 }  // namespace dkb
