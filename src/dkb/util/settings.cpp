@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "dkb/util/errors.h"
-#include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
 
 namespace dkb {
@@ -42,25 +41,6 @@ std::string number_to_text(T value) {
   char buffer[64];
   const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
   return std::string(buffer, end);
-}
-
-std::string yaml_quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    const auto u = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (u < 0x20 || u == 0x7F) {
-      const char* digits = "0123456789ABCDEF";
-      out += "\\x";
-      out += digits[u >> 4];
-      out += digits[u & 15];
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
 }
 
 // What a message quotes of `text`.
@@ -131,9 +111,8 @@ template <class Number>
 bool read_number(const std::string& text, Number* field) {
   if constexpr (std::is_floating_point_v<Number>) {
     double parsed = 0;
-    if (!parse_number(text, &parsed) || !std::isfinite(parsed) || !std::isfinite(static_cast<Number>(parsed)))
-      return false;
-    *field = static_cast<Number>(parsed);
+    if (!parse_number(text, &parsed) || !std::isfinite(parsed)) return false;
+    *field = parsed;
     return true;
   } else {
     Number parsed = 0;
@@ -176,14 +155,8 @@ void Settings::bind_number(const std::string& key, Number* field, const std::str
 void Settings::bind(const std::string& key, int* field, const std::string& doc, const Range& range) {
   bind_number(key, field, doc, range);
 }
-void Settings::bind(const std::string& key, int64_t* field, const std::string& doc, const Range& range) {
-  bind_number(key, field, doc, range);
-}
 void Settings::bind(const std::string& key, uint64_t* field, const std::string& doc) {
   bind_number(key, field, doc, {});
-}
-void Settings::bind(const std::string& key, float* field, const std::string& doc, const Range& range) {
-  bind_number(key, field, doc, range);
 }
 void Settings::bind(const std::string& key, double* field, const std::string& doc, const Range& range) {
   bind_number(key, field, doc, range);
@@ -197,15 +170,6 @@ void Settings::bind(const std::string& key, bool* field, const std::string& doc)
               return true;
             },
             [field] { return std::string(*field ? "true" : "false"); }, [] { return true; }});
-}
-
-void Settings::bind(const std::string& key, std::string* field, const std::string& doc) {
-  add(key, {doc, "a text", "",
-            [field](const std::string& text) {
-              *field = text;
-              return true;
-            },
-            [field] { return yaml_quoted(*field); }, [] { return true; }});
 }
 
 void Settings::set(const std::string& key, const std::string& value, const std::string& where) {
@@ -232,15 +196,6 @@ std::pair<std::string, std::string> split_assignment(const std::string& assignme
   if (equals == std::string::npos)
     throw InputError(where + ": \"" + excerpt(assignment) + "\" has no value; write key=value");
   return {assignment.substr(0, equals), assignment.substr(equals + 1)};
-}
-
-void Settings::set_assignment(const std::string& assignment, const std::string& where) {
-  const auto [key, value] = split_assignment(assignment, where);
-  set(key, value, where);
-}
-
-void Settings::load_yaml(const std::filesystem::path& path) {
-  load_yaml_text(read_file(path), path.string());
 }
 
 void Settings::load_yaml_text(const std::string& text, const std::string& name) {

@@ -77,11 +77,8 @@ class Settings {
   // Throws std::logic_error when `key` is taken, or is the section of another key.
   void bind(const std::string& key, bool* field, const std::string& doc);
   void bind(const std::string& key, int* field, const std::string& doc, const Range& range = {});
-  void bind(const std::string& key, int64_t* field, const std::string& doc, const Range& range = {});
   void bind(const std::string& key, uint64_t* field, const std::string& doc);
-  void bind(const std::string& key, float* field, const std::string& doc, const Range& range = {});
   void bind(const std::string& key, double* field, const std::string& doc, const Range& range = {});
-  void bind(const std::string& key, std::string* field, const std::string& doc);
   // An enum set by name. Names must be distinct and cover the field's value.
   template <class Enum>
   void bind(const std::string& key, Enum* field, const std::string& doc, const Names<Enum>& names);
@@ -89,10 +86,7 @@ class Settings {
   // `where` opens the messages: "--set", "preset.yaml:7". Throws InputError for an unknown key (with the nearest valid
   // one) and for a value of another type, InvalidOption for one out of range; the field keeps its value then.
   void set(const std::string& key, const std::string& value, const std::string& where);
-  // "key=value", as given to --set.
-  void set_assignment(const std::string& assignment, const std::string& where);
   // Nested maps and dotted keys may be mixed; a key may occur once. Throws InputError with file:line.
-  void load_yaml(const std::filesystem::path& path);
   void load_yaml_text(const std::string& text, const std::string& name);
   // The lines of such a text, in its order, with keys and values still to be judged by set().
   std::vector<SettingLine> parse_yaml(const std::string& text, const std::string& name) const;

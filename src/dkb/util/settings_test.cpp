@@ -3,8 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
+#include <cmath>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
@@ -19,9 +18,8 @@ struct Options {
   bool on = true;
   int count = 1000;
   uint64_t seed = 1;
-  float gain = 0.1f;
+  double gain = 0.1;
   double scale = 1.2;
-  std::string name = "a \"b\"\n";
   Colour colour = Colour::green;
 };
 
@@ -31,7 +29,6 @@ void bind(Settings* s, Options* o) {
   s->bind("features.on", &o->on, "");
   s->bind("seed", &o->seed, "of all randomness");
   s->bind("filter.flow.gain", &o->gain, "[px]");
-  s->bind("filter.name", &o->name, "name");
   s->bind("filter.colour", &o->colour, "colour", {{"red", Colour::red}, {"green", Colour::green}});
 }
 
@@ -49,18 +46,16 @@ TEST(Settings, SetEveryTypeByName) {
   Settings s;
   bind(&s, &o);
   s.set("features.on", "false", "--set");
-  s.set_assignment("features.count=-7", "--set");
+  s.set("features.count", "-7", "--set");
   s.set("features.scale", "1e-3", "--set");
   s.set("seed", "18446744073709551615", "--set");
   s.set("filter.flow.gain", "2.5", "--set");
-  s.set_assignment("filter.name=x=y", "--set");
   s.set("filter.colour", "red", "--set");
   EXPECT_FALSE(o.on);
   EXPECT_EQ(o.count, -7);
   EXPECT_EQ(o.scale, 1e-3);
   EXPECT_EQ(o.seed, 18446744073709551615ull);
-  EXPECT_EQ(o.gain, 2.5f);
-  EXPECT_EQ(o.name, "x=y");
+  EXPECT_EQ(o.gain, 2.5);
   EXPECT_EQ(o.colour, Colour::red);
   EXPECT_EQ(s.where("seed"), "--set");
 }
@@ -83,19 +78,39 @@ TEST(Settings, MessagesNameKeyValueTypeAndNearestKey) {
             "--set: filter.colour: \"blue\" is not one of red, green");
   EXPECT_EQ(test::input_error_of([&] { s.set("features.on", "1", "--set"); }),
             "--set: features.on: \"1\" is not true or false");
-  EXPECT_EQ(test::input_error_of([&] { s.set_assignment("features.on", "--set"); }),
+  EXPECT_EQ(test::input_error_of([&] { split_assignment("features.on", "--set"); }),
             "--set: \"features.on\" has no value; write key=value");
   EXPECT_EQ(o.count, 1000) << "a refused value leaves the field alone";
+}
+
+TEST(Settings, ValuesOutOfRangeAreRefusedAndTheFieldKept) {
+  int count = 5;
+  double share = 0.5, factor = 2;
+  Settings s;
+  s.bind("count", &count, "[features]", {.min = 1});
+  s.bind("share", &share, "", {0, 1});
+  s.bind("factor", &factor, "", {.min = 0, .above_min = true});
+  EXPECT_EQ(test::input_error_of([&] { s.set("count", "0", "--set"); }),
+            "--set: count: 0 is out of range; it must be at least 1");
+  EXPECT_EQ(test::input_error_of([&] { s.set("share", "1.5", "a.yaml:3"); }),
+            "a.yaml:3: share: 1.5 is out of range; it must be 0 ... 1");
+  EXPECT_EQ(test::input_error_of([&] { s.set("factor", "0", "--set"); }),
+            "--set: factor: 0 is out of range; it must be above 0");
+  EXPECT_EQ(count, 5);
+  EXPECT_EQ(share, 0.5);
+  EXPECT_NO_THROW(s.check());
+  factor = std::nan("");
+  EXPECT_THROW(s.check(), InvalidOption);
 }
 
 TEST(Settings, YamlMayBeNestedOrDottedAndNamesFileAndLine) {
   Options o;
   Settings s;
   bind(&s, &o);
-  s.load_yaml_text("# comment\nfeatures:\n  count: 5\nfilter.flow.gain: 3\nfilter:\n  name: \"q\"\r\n", "a.yaml");
+  s.load_yaml_text("# comment\nfeatures:\n  count: 5\nfilter.flow.gain: 3\nfilter:\n  colour: red\r\n", "a.yaml");
   EXPECT_EQ(o.count, 5);
-  EXPECT_EQ(o.gain, 3.0f);
-  EXPECT_EQ(o.name, "q");
+  EXPECT_EQ(o.gain, 3.0);
+  EXPECT_EQ(o.colour, Colour::red);
   EXPECT_EQ(s.where("features.count"), "a.yaml:3");
   s.load_yaml_text("", "empty.yaml");
   s.load_yaml_text("features:\n#  count: 3\n", "commented.yaml");
@@ -117,7 +132,7 @@ TEST(Settings, YamlMayBeNestedOrDottedAndNamesFileAndLine) {
 
 TEST(Settings, WrittenYamlReadsBackTheSame) {
   Options o;
-  o.gain = 0.1f;
+  o.gain = 0.1;
   o.scale = 1.0 / 3.0;
   Settings s;
   bind(&s, &o);
@@ -131,16 +146,14 @@ TEST(Settings, WrittenYamlReadsBackTheSame) {
             "  colour: green  # colour\n"
             "  flow:\n"
             "    gain: 0.1  # [px]\n"
-            "  name: \"a \\\"b\\\"\\x0A\"  # name\n"
             "seed: 1  # of all randomness\n");
   Options back;
-  back.scale = 0, back.gain = 0, back.name = "", back.count = 0;
+  back.scale = 0, back.gain = 0, back.count = 0;
   Settings reader;
   bind(&reader, &back);
   reader.load_yaml_text(text, "config.yaml");
   EXPECT_EQ(back.scale, o.scale);
   EXPECT_EQ(back.gain, o.gain);
-  EXPECT_EQ(back.name, o.name);
   EXPECT_EQ(reader.to_yaml(), text);
 }
 
@@ -156,7 +169,7 @@ TEST(Settings, KeysThatClashAreAProgrammingError) {
 TEST(Settings, MutatedYamlThrowsNothingButInputErrors) {
   const std::string original =
       Settings().to_yaml() +
-      "# file\nfeatures:\n  count: 5\n  on: true\n  scale: 1.5\nfilter: {name: \"a\", colour: red}\n"
+      "# file\nfeatures:\n  count: 5\n  on: true\n  scale: 1.5\nfilter: {flow: {gain: 2}, colour: red}\n"
       "seed: 3\n";
   const std::string alphabet = "{}[]:,&*!|>'\"%@`#-?~ \n\t\r\\<0aZ.\xFF\x01";
   Random random(11);
