@@ -2,11 +2,10 @@
 // Save, load, localise: a map that is used again.
 #include <gtest/gtest.h>
 
-#include "dkb/dataset/camera_file.h"
-#include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/map/map_file.h"
-#include "dkb/slam/slam_system.h"
+#include "dkb_slam/slam.h"
+#include "dkb_slam/source.h"
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -92,26 +91,26 @@ TEST_F(Localise, MapsThatMeetAreMergedInTheWorldOfTheFirst) {
 }
 
 TEST_F(Localise, TheLibraryLoadsMapsLikewise) {
-  const CameraModel camera = Camera::load(sequence() / "camera.yaml");
-  RgbdReader reader(open_tum_dataset(sequence()).pairs, camera, {}, nullptr);
-  SlamSystem slam(camera), first(camera);
-  first.set_localise_only(true);
-  slam.load(load_map(map).map);
-  slam.set_localise_only(true);
-  const KeyframeId keyframes = slam.map()->keyframe_count();
-  while (const auto frame = reader.next()) {
-    const FrameResult in_map = slam.process(frame->image), in_none = first.process(frame->image);
-    EXPECT_EQ(in_map.state, frame->index == 0   ? TrackingState::lost
-                            : frame->index == 1 ? TrackingState::relocalised
-                                                : TrackingState::tracking);
+  const auto source = open_folder(sequence());
+  Slam slam(source->camera()), first(source->camera());
+  first.localize_only(true);
+  slam.load_map(map);
+  slam.localize_only(true);
+  const int keyframes = slam.map().keyframe_count();
+  EXPECT_EQ(keyframes, mapped.stats["keyframes"]);
+  for (SourceFrame next = source->next(); next.state == SourceState::frame; next = source->next()) {
+    const FrameResult in_map = slam.process(next.frame), in_none = first.process(next.frame);
+    EXPECT_EQ(in_map.state, next.index == 0   ? TrackingState::lost
+                            : next.index == 1 ? TrackingState::relocalised
+                                              : TrackingState::tracking);
     EXPECT_EQ(in_none.state, TrackingState::initialising) << "localise-only starts no map";
-    if (frame->index == 1) {
-      EXPECT_LT(in_map.odom_from_cam.translation.norm(), 1e-9) << "odometry begins where it is";
+    if (next.index == 1) {
+      EXPECT_LT(in_map.odom_from_cam->translation.norm(), 1e-9) << "odometry begins where it is";
     }
   }
   slam.finish();
-  EXPECT_EQ(slam.map()->keyframe_count(), keyframes);
-  EXPECT_EQ(first.map()->keyframe_count(), 0);
+  EXPECT_EQ(slam.map().keyframe_count(), keyframes);
+  EXPECT_EQ(first.map().keyframe_count(), 0);
   for (const TrajectoryFrame& k : slam.keyframes()) EXPECT_LT(k.frame, 0) << "keyframes of an earlier session";
 }
 

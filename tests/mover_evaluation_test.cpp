@@ -10,7 +10,7 @@ namespace {
 
 MoverRow row(double time, int id, const Eigen::Vector3d& position, float box_x = 0) {
   MoverRow r{time, std::to_string(time), {}};
-  r.mover = {id, "person", position, {0, 0, 0}, 0.05, {box_x, 0, 60, 100}};
+  r.mover = {id, "person", position, {0, 0, 0}, 0.05, Matrix6d::Zero(), {0, 0, 0}, {box_x, 0, 60, 100}};
   return r;
 }
 

@@ -56,8 +56,13 @@ FollowedScene follow(const std::vector<SimulatedFrame>& frames, const CameraMode
       const Box box{static_cast<float>(m.box_x), static_cast<float>(m.box_y), static_cast<float>(m.box_width),
                     static_cast<float>(m.box_height)};
       boxes.push_back({m.kind, box, 1});
-      scene.truth.push_back(
-          {f.image.timestamp, f.stamp, {m.id, m.kind, m.position_in_world, m.velocity_in_world, 0, box}});
+      Mover mover;
+      mover.id = m.id;
+      mover.class_name = m.kind;
+      mover.position_in_world = m.position_in_world;
+      mover.velocity_in_world = m.velocity_in_world;
+      mover.box = box;
+      scene.truth.push_back({f.image.timestamp, f.stamp, std::move(mover)});
     }
     MoverMask mask;
     if (mask_from == MaskFrom::truth)

@@ -18,7 +18,7 @@ const std::string kRow = "1.50,7,person,1,2,3,0.5,-0.5,0,0.04,10,20,30.5,40\n";
 
 MoverRow example() {
   MoverRow row{1.5, "1.50", {}};
-  row.mover = {7, "person", {1, 2, 3}, {0.5, -0.5, 0}, 0.04, {10, 20, 30.5f, 40}};
+  row.mover = {7, "person", {1, 2, 3}, {0.5, -0.5, 0}, 0.04, Matrix6d::Zero(), {0, 0, 0}, {10, 20, 30.5f, 40}};
   return row;
 }
 

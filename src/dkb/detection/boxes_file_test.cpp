@@ -5,6 +5,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/stamps.h"
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
@@ -44,10 +45,15 @@ TEST(BoxesFile, MissingFilesAreNamed) {
 }
 
 TEST(BoxesFile, WhatIsWrittenIsReadBack) {
-  const BoxesByTime boxes = {{1.25, {{"person", {1.5f, 2, 3, 4}, 0.5f}}, {}},
-                             {2.5, {{"dog", {5, 6, 7, 8.25f}, 1}, {"cat", {9, 8, 7, 6}, 0.125f}}, {}}};
-  EXPECT_EQ(parse_boxes(boxes_to_text(boxes), "b.txt", 640, 480), boxes);
-  const BoxesByTime spaced = {{1, {{"cell phone", {1, 2, 3, 4}, 1}}, {}}};
+  const BoxesByTime boxes = {{1.25, {{"person", {1.5f, 2, 3, 4}, 0.5f}}},
+                             {2.5, {{"dog", {5, 6, 7, 8.25f}, 1}, {"cat", {9, 8, 7, 6}, 0.125f}}}};
+  const BoxesByTime read = parse_boxes(boxes_to_text(boxes), "b.txt", 640, 480);
+  ASSERT_EQ(read.size(), boxes.size());
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    EXPECT_EQ(read[i].timestamp, boxes[i].timestamp);
+    EXPECT_EQ(read[i].boxes, boxes[i].boxes);
+  }
+  const BoxesByTime spaced = {{1, {{"cell phone", {1, 2, 3, 4}, 1}}}};
   EXPECT_EQ(parse_boxes(boxes_to_text(spaced), "b.txt", 640, 480)[0].boxes[0].class_name, "cell_phone");
 }
 
@@ -60,7 +66,7 @@ TEST(BoxesFile, AnyMutationIsReadOrRefused) {
     for (uint32_t k = 1 + random.below(4); k > 0; --k)
       text[random.below(static_cast<uint32_t>(text.size()))] = static_cast<char>(random.below(256));
     try {
-      for (const Detections& at : parse_boxes(text, "b.txt", 640, 480))
+      for (const TimedBoxes& at : parse_boxes(text, "b.txt", 640, 480))
         for (const Detection& d : at.boxes) {
           EXPECT_GT(d.box.w, 0);
           EXPECT_LE(d.box.x + d.box.w, 640);
@@ -74,12 +80,11 @@ TEST(BoxesFile, AnyMutationIsReadOrRefused) {
 }
 
 TEST(FileDetector, TakesTheNearestStampWithinTwoMilliseconds) {
-  FileDetector detector({{1.000, {{"a", {0, 0, 1, 1}, 1}}, {}}, {1.003, {{"b", {0, 0, 1, 1}, 1}}, {}}});
+  FileDetector detector(BoxesByTime{{1.000, {{"a", {0, 0, 1, 1}, 1}}}, {1.003, {{"b", {0, 0, 1, 1}, 1}}}});
   const auto class_at = [&](double stamp) {
-    RgbdImage image;
-    image.timestamp = stamp;
+    DetectorInput image;
+    image.stamp_ns = ns_from_seconds(stamp);
     const Detections found = detector.detect(image);
-    EXPECT_EQ(found.timestamp, stamp);
     return found.boxes.empty() ? "" : found.boxes[0].class_name;
   };
   EXPECT_EQ(class_at(1.0), "a");

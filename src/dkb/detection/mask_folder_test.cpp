@@ -62,13 +62,13 @@ TEST_F(MaskFolderTest, GivesTheMaskOfTheStampAndItsBoxes) {
   touch("12.500000.png");
   touch("notes.txt");
   MaskFolder detector(folder_, square, {12.4, 12.5, 12.6}, 40, 30);
-  RgbdImage image;
-  image.timestamp = 12.5;
+  DetectorInput image;
+  image.stamp_ns = 12'500'000'000;
   const Detections found = detector.detect(image);
   EXPECT_EQ(found.boxes, (std::vector<Detection>{{"mover", {20, 5, 10, 10}, 1.0f}}));
   EXPECT_EQ(found.mask(20, 5), 255);
   EXPECT_EQ(found.mask(19, 5), 0);
-  image.timestamp = 12.6;
+  image.stamp_ns = 12'600'000'000;
   EXPECT_TRUE(detector.detect(image).mask.empty());
 }
 

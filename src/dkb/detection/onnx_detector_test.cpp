@@ -13,6 +13,7 @@
 #include <string>
 
 #include "dkb/detection/onnx_graph_test_util.h"
+#include "dkb/image/rgbd_image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_data.h"
@@ -55,12 +56,16 @@ class OnnxDetectorTest : public testing::Test {
   fs::path folder_;
 };
 
-RgbdImage flat_image(int width, int height, Rgb colour) {
-  RgbdImage image;
-  image.timestamp = 7;
-  image.colour = ColourImage(width, height, colour);
-  image.grey = grey_from_colour(image.colour);
-  return image;
+Frame frame_of(ColourImage colour) {
+  auto image = std::make_shared<RgbdImage>();
+  image->grey = grey_from_colour(colour);
+  image->colour = std::move(colour);
+  return dkb::frame_of(std::move(image));
+}
+
+// What `detector` finds in an image of one colour.
+Detections detect_in(OnnxDetector& detector, int width, int height, Rgb colour) {
+  return detector.detect(detector_input(frame_of(ColourImage(width, height, colour))));
 }
 
 // 96 x 64: 12 x 8 + 6 x 4 + 3 x 2 = 126 cells. One prediction of class 0 in the first row, whose score is the first
@@ -92,19 +97,18 @@ TEST_F(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
   OnnxDetector detector(write(one_box(YoloHead::v5, 80, 1.0f)), 192, 128);
   EXPECT_EQ(detector.head(), YoloHead::v5);
   EXPECT_EQ(detector.input_width(), 96);
-  const Detections found = detector.detect(flat_image(192, 128, {204, 0, 0}));
+  const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
-  EXPECT_EQ(found.timestamp, 7);
   EXPECT_EQ(found.boxes[0].class_name, "person");
   EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);        // 204 / 255
   EXPECT_EQ(found.boxes[0].box, (Box{44, 22, 40, 20}));  // (32 - 10, 16 - 5, 20, 10) x 2
-  EXPECT_TRUE(detector.detect(flat_image(192, 128, {0, 0, 255})).boxes.empty());
+  EXPECT_TRUE(detect_in(detector, 192, 128, {0, 0, 255}).boxes.empty());
 }
 
 TEST_F(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
   OnnxDetector detector(write(one_v8_box(80)), 192, 128);
   EXPECT_EQ(detector.head(), YoloHead::v8);
-  const Detections found = detector.detect(flat_image(192, 128, {204, 0, 0}));
+  const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
   EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
   EXPECT_EQ(found.boxes[0].box, (Box{44, 22, 40, 20}));
@@ -113,8 +117,8 @@ TEST_F(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
 TEST_F(OnnxDetectorTest, YoloxGraphsGetBgrUpTo255) {
   OnnxDetector detector(write(one_box(YoloHead::yolox, 80, 1.0f / 255)), 96, 64);
   EXPECT_EQ(detector.head(), YoloHead::yolox);
-  EXPECT_TRUE(detector.detect(flat_image(96, 64, {204, 0, 0})).boxes.empty());
-  const Detections found = detector.detect(flat_image(96, 64, {0, 0, 204}));
+  EXPECT_TRUE(detect_in(detector, 96, 64, {204, 0, 0}).boxes.empty());
+  const Detections found = detect_in(detector, 96, 64, {0, 0, 204});
   ASSERT_EQ(found.boxes.size(), 0u + 1);
   EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
 }
@@ -129,7 +133,7 @@ TEST_F(OnnxDetectorTest, OpenYoloxGraphsTakeTheImagesShapeAt416) {
   EXPECT_EQ(detector.input_width(), 416);
   EXPECT_EQ(detector.input_height(), 320);  // 416 x 480 / 640 = 312, rounded up to a multiple of 32
   // 13 x 10 cells of 32 px; the last row covers input rows 288 ... 320, of which the image has 24, so it is clipped.
-  const Detections found = detector.detect(flat_image(640, 480, {9, 9, 9}));
+  const Detections found = detect_in(detector, 640, 480, {9, 9, 9});
   ASSERT_EQ(found.boxes.size(), 130u);
   EXPECT_NEAR(found.boxes[0].box.w, 32 * 640.0 / 416, 1e-3);
   EXPECT_NEAR(found.boxes[129].box.h, 24 * 480.0 / 312, 1e-2);
@@ -156,7 +160,8 @@ TEST_F(OnnxDetectorTest, SizesThatTheGraphCannotRunAreRefused) {
 TEST_F(OnnxDetectorTest, OnlyMovableClassesAreGiven) {
   OnnxOptions options = write(one_box(YoloHead::v5, 80, 1.0f));
   options.classes = "chair, dog";
-  EXPECT_TRUE(OnnxDetector(options, 96, 64).detect(flat_image(96, 64, {255, 0, 0})).boxes.empty());
+  OnnxDetector detector(options, 96, 64);
+  EXPECT_TRUE(detect_in(detector, 96, 64, {255, 0, 0}).boxes.empty());
   options.classes = "persn";
   EXPECT_NE(error_of(options).find("did you mean \"person\""), std::string::npos);
 }
@@ -167,13 +172,14 @@ TEST_F(OnnxDetectorTest, LabelsMustMatchTheGraph) {
   options.labels = folder_ / "labels.txt";
   std::ofstream(options.labels) << "robot\r\nperson\r\n\r\n";
   options.classes = "robot";
-  const Detections found = OnnxDetector(options, 96, 64).detect(flat_image(96, 64, {255, 0, 0}));
+  OnnxDetector detector(options, 96, 64);
+  const Detections found = detect_in(detector, 96, 64, {255, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
   EXPECT_EQ(found.boxes[0].class_name, "robot");
   for (const char* text : {"robot\n", "robot\nperson\ncat\n", "", "robot\n\nperson\n"}) {
     std::ofstream(options.labels) << text;
     try {
-      const OnnxDetector detector(options, 96, 64);
+      const OnnxDetector refused(options, 96, 64);
       ADD_FAILURE() << text;
     } catch (const InputError& e) {
       EXPECT_NE(std::string(e.what()).find("labels.txt"), std::string::npos) << e.what();
@@ -222,7 +228,7 @@ TEST_F(OnnxDetectorTest, InputsThatAreNoFloatImageAreRefused) {
 
 const fs::path kData = test_data();
 
-RgbdImage read_jpeg(const fs::path& path) {
+Frame read_jpeg(const fs::path& path) {
   const std::string bytes = read_file(path);
   jpeg_decompress_struct jpeg{};
   jpeg_error_mgr errors{};
@@ -232,16 +238,14 @@ RgbdImage read_jpeg(const fs::path& path) {
   jpeg_read_header(&jpeg, TRUE);
   jpeg.out_color_space = JCS_RGB;
   jpeg_start_decompress(&jpeg);
-  RgbdImage image;
-  image.colour = ColourImage(static_cast<int>(jpeg.output_width), static_cast<int>(jpeg.output_height));
+  ColourImage colour(static_cast<int>(jpeg.output_width), static_cast<int>(jpeg.output_height));
   while (jpeg.output_scanline < jpeg.output_height) {
-    JSAMPROW row = &image.colour.row(static_cast<int>(jpeg.output_scanline))->r;
+    JSAMPROW row = &colour.row(static_cast<int>(jpeg.output_scanline))->r;
     jpeg_read_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_decompress(&jpeg);
   jpeg_destroy_decompress(&jpeg);
-  image.grey = grey_from_colour(image.colour);
-  return image;
+  return frame_of(std::move(colour));
 }
 
 struct RealModel {
@@ -268,12 +272,12 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
   EXPECT_EQ(detector.input_height(), GetParam().height);
   EXPECT_EQ(detector.frames_per_detection(30), GetParam().frames);
   for (const size_t i : {size_t{2}, size_t{12}}) {
-    const RgbdImage image = read_jpeg(files.at(i));
-    const Detections found = detector.detect(image);
+    const Frame image = read_jpeg(files.at(i));
+    const Detections found = detector.detect(detector_input(image));
     const auto people = std::count_if(found.boxes.begin(), found.boxes.end(),
                                       [](const Detection& d) { return d.class_name == "person"; });
     EXPECT_EQ(people, 2) << files[i];
-    EXPECT_EQ(detector.detect(image), found);  // the same bytes again
+    EXPECT_EQ(detector.detect(detector_input(image)), found);  // the same bytes again
   }
 }
 

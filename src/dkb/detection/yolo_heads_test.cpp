@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "dkb/image/rgbd_image.h"
+
 namespace dkb {
 namespace {
 
@@ -53,19 +55,19 @@ TEST(Letterbox, ThereAndBackIsTheSameBox) {
     }
 }
 
-RgbdImage two_by_one() {
-  RgbdImage image;
-  image.colour = ColourImage(2, 1);
-  image.colour(0, 0) = {0, 51, 102};
-  image.colour(1, 0) = {255, 51, 204};
-  image.grey = grey_from_colour(image.colour);
-  return image;
+Frame two_by_one() {
+  auto image = std::make_shared<RgbdImage>();
+  image->colour = ColourImage(2, 1);
+  image->colour(0, 0) = {0, 51, 102};
+  image->colour(1, 0) = {255, 51, 204};
+  image->grey = grey_from_colour(image->colour);
+  return frame_of(std::move(image));
 }
 
 TEST(FillBlob, ResizesBetweenPixelCentresAndPadsWithGrey) {
   // 2 x 1 into 4 x 4 for v5: scaled to 4 x 2, rows 1 and 2; samples at -0.25 (held), 0.25, 0.75, 1.25 (held).
   std::vector<float> blob;
-  fill_blob(two_by_one(), Letterbox::fit(YoloHead::v5, 2, 1, 4, 4), YoloHead::v5, &blob);
+  fill_blob(detector_input(two_by_one()), Letterbox::fit(YoloHead::v5, 2, 1, 4, 4), YoloHead::v5, &blob);
   ASSERT_EQ(blob.size(), 48u);
   const float red[] = {0, 0.25f, 0.75f, 1};
   for (size_t x = 0; x < 4; ++x) {
@@ -79,14 +81,15 @@ TEST(FillBlob, ResizesBetweenPixelCentresAndPadsWithGrey) {
 
 TEST(FillBlob, YoloxGetsBlueFirstUpTo255) {
   std::vector<float> blob;
-  fill_blob(two_by_one(), Letterbox::fit(YoloHead::yolox, 2, 1, 2, 2), YoloHead::yolox, &blob);
+  fill_blob(detector_input(two_by_one()), Letterbox::fit(YoloHead::yolox, 2, 1, 2, 2), YoloHead::yolox, &blob);
   const std::vector<float> expected = {102, 204, 114, 114, 51, 51, 114, 114, 0, 255, 114, 114};
   EXPECT_EQ(blob, expected);
 }
 
 TEST(FillBlob, GreyImagesFeedAllChannels) {
-  RgbdImage image;
-  image.grey = GreyImage(2, 2, 51);
+  const GreyImage grey(2, 2, 51);
+  DetectorInput image;
+  image.grey = {grey.data(), 2, 2, 0, PixelFormat::grey8};
   std::vector<float> blob;
   fill_blob(image, Letterbox::fit(YoloHead::v8, 2, 2, 2, 2), YoloHead::v8, &blob);
   for (const float value : blob) EXPECT_FLOAT_EQ(value, 0.2f);

@@ -67,8 +67,9 @@ TEST_F(Mapping, LocalBundleAdjustmentCorrectsPoses) {
   error << 0.01, -0.008, 0.006, 0.004, -0.003, 0.005;
   const MapView view = mapper.process(packet(at(1), rigid3_from_tangent(error) * at(1), {}, [](int) { return true; }));
   EXPECT_LT(distance_between(view->keyframe(1)->cam_from_world, at(1)), 5e-4);
-  EXPECT_EQ(mapper.times().summaries().at("local_ba").count, 1U);
-  EXPECT_EQ(mapper.times().summaries().at("mapping").count, 2U);
+  const auto times = mapper.take_times().summaries();
+  EXPECT_EQ(times.at("local_ba").count, 1U);
+  EXPECT_EQ(times.at("mapping").count, 2U);
 }
 
 TEST_F(Mapping, PointsThatAreRarelyFoundWhereTheyShouldBeAreDropped) {

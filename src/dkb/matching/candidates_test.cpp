@@ -54,11 +54,12 @@ class CandidateMatching : public ::testing::Test {
       y.push_back(k.pixel.y());
     }
     features.grid = KeypointGrid(x, y, camera.width, camera.height);
-    return match_by_projection(candidates, features, camera, cam_from_world, 1.2, 8, options, taken, visible);
+    return match_by_projection(candidates, {features, motion}, camera, cam_from_world, 1.2, 8, options, taken, visible);
   }
 
   CameraModel camera = simple_camera();
   RgbdFeatures features;
+  std::vector<FeatureMotion> motion;
   ProjectionMatchOptions options;
   Rigid3 cam_from_world;
 };
@@ -86,7 +87,7 @@ TEST_F(CandidateMatching, ProjectsWithThePose) {
 TEST_F(CandidateMatching, WhereAMoverIsSuspectedOnlyEstablishedPointsAreFoundAndOnlyAtTheirDepth) {
   add_feature(100, 100, bits_set(0));
   Keypoint& k = features.keypoints[0];
-  k.suspect = true;
+  motion = {FeatureMotion::on_mover};
   Candidate c = at(100, 100);  // 2 m away
   k.depth = 2.0f;
   EXPECT_TRUE(match({c}).empty());

@@ -47,16 +47,27 @@ DetectionStage::DetectionStage(Detector& detector, const Camera& camera, const D
       stage_([this](const Task& task) { return detect(task); },
              {.name = "the detector", .threaded = threaded, .priority = ThreadPriority::background}) {}
 
-DetectionStage::Answer DetectionStage::detect(const Task& task) const {
+DetectionStage::Answer DetectionStage::detect(const Task& task) {
   const Stopwatch watch;
-  Answer answer{{task.index, task.frame.stamp_ns(), detector_.detect(detector_input(task.frame))}, "", 0};
-  answer.warning = make_fit(answer.due.detections, width_, height_);
+  Answer answer{{task.index, task.frame.stamp_ns(), {}}, threw_, "", 0};
+  if (threw_) return answer;
+  try {
+    answer.due.detections = detector_.detect(detector_input(task.frame));
+    const std::string wrong = make_fit(answer.due.detections, width_, height_);
+    if (!wrong.empty()) answer.warning = "the detector: " + wrong;
+  } catch (const std::exception& e) {
+    answer.failed = threw_ = true;
+    answer.warning = std::string("the detector failed: ") + e.what() + "; it is not asked again";
+  } catch (...) {
+    answer.failed = threw_ = true;
+    answer.warning = "the detector failed: it threw something that is no exception; it is not asked again";
+  }
   answer.ms = watch.ms();
   return answer;
 }
 
 void DetectionStage::offer(FrameIndex index, const Frame& frame) {
-  if (failed_ || index < next_) return;
+  if (index < next_) return;
   const bool first = next_ == 0;
   next_ = index + schedule_.every;
   if (realtime_ && !first) dropped_ += stage_.drop_waiting();  // only the newest image is worth waiting
@@ -78,18 +89,15 @@ std::vector<DueDetections> DetectionStage::exchange(FrameIndex index, const Fram
   std::vector<DueDetections> due;
   const Stopwatch watch;
   const bool waits = stage_.must_wait(index);
-  try {
-    while (auto answer = take(index)) {
-      answered_ = true;
+  while (auto answer = take(index)) {
+    answered_ = true;
+    if (!answer->warning.empty()) warnings_.push_back(std::move(answer->warning));
+    if (!answer->failed) {
       times_.add("detection", answer->ms);
-      if (!answer->warning.empty()) warnings_.push_back("the detector: " + answer->warning);
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;
       last_stamp_ = answer->due.stamp_ns;
-      due.push_back(std::move(answer->due));
     }
-  } catch (const InputError& e) {
-    if (!failed_) warnings_.push_back(e.what());
-    failed_ = true;
+    due.push_back(std::move(answer->due));
   }
   if (waits) times_.add("wait_detector", watch.ms());
   return due;

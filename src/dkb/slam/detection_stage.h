@@ -23,7 +23,8 @@ struct DueDetections {
 
 // Detection beside tracking. Every n-th image goes to the detector, and its answer counts a fixed number of frames
 // later. The first answer is waited for and counts at its own frame, so that nobody gets into the map before.
-// A detector that throws is a warning, and is not asked again.
+// A detector that throws is a warning, and is not asked again: from then on its answers are empty, so that what it saw
+// last is not carried for ever.
 class DetectionStage {
  public:
   // The detector must outlive the stage. In a real-time run answers are not waited for, but for the first, and that one
@@ -47,10 +48,11 @@ class DetectionStage {
   };
   struct Answer {
     DueDetections due;
+    bool failed = false;
     std::string warning;
     double ms = 0;
   };
-  Answer detect(const Task& task) const;
+  Answer detect(const Task& task);
   void offer(FrameIndex index, const Frame& frame);
   std::optional<Answer> take(FrameIndex index);
 
@@ -59,7 +61,8 @@ class DetectionStage {
   const DetectionSchedule schedule_;
   const bool realtime_;
   FrameIndex next_ = 0;  // the earliest frame to be offered
-  bool answered_ = false, failed_ = false;
+  bool threw_ = false;   // the stage's thread's
+  bool answered_ = false;
   size_t answers_ = 0, dropped_ = 0;
   int64_t first_stamp_ = 0, last_stamp_ = 0;  // [ns] of answers
   std::vector<std::string> warnings_;

@@ -20,6 +20,7 @@ double calibrated(double readout, ReadoutOptions options = {}, double file = 0) 
     velocity << 0.3 * std::sin(0.3 * n), 0.1, 0.2 * std::cos(0.2 * n), 0.2 * std::sin(0.5 * n), 0.7 * std::cos(0.4 * n),
         0.1;
     TrackedFrame frame;
+    std::vector<std::optional<Eigen::Vector3d>> positions;
     frame.cam_from_world = TestScene::camera_at({0.01 * n, 0, 0}, {0, 0.005 * n, 0});
     const View view = scene.look(frame.cam_from_world, {.pixel_noise = 0.5, .seed = static_cast<uint64_t>(n) + 1});
     RgbdFeatures features = *view.features;
@@ -30,9 +31,10 @@ double calibrated(double readout, ReadoutOptions options = {}, double file = 0) 
       const Eigen::Vector3d then = p + late * (velocity.head<3>() + velocity.tail<3>().cross(p));
       k.pixel += (camera.project(then) - camera.project(p)).cast<float>();
       frame.points.push_back(static_cast<PointId>(view.shows[f]));
+      positions.emplace_back(scene.points[static_cast<size_t>(view.shows[f])]);
     }
     frame.features = std::make_shared<const RgbdFeatures>(std::move(features));
-    calibration.add(frame, velocity, [&](PointId id) { return std::optional(scene.points[id]); });
+    calibration.add(frame, velocity, positions);
   }
   return calibration.readout();
 }

@@ -14,7 +14,7 @@ class DescriptorPoseTest : public ::testing::Test {
     for (size_t i = 0; i < scene.points.size(); ++i)
       known.push_back({make_point_id(3, static_cast<int>(i)), scene.points[i], scene.descriptors[i]});
   }
-  std::optional<DescriptorPose> find(const RgbdFeatures& features, int min_matches = 20) const {
+  std::optional<DescriptorPose> find(const MatchableFeatures& features, int min_matches = 20) const {
     return pose_by_descriptors(known, features, scene.camera, {}, TestScene::kScaleFactor, min_matches, {});
   }
 
@@ -41,13 +41,13 @@ TEST_F(DescriptorPoseTest, NamesThePointThatEachFeatureShows) {
 
 TEST_F(DescriptorPoseTest, FeaturesThatMayLieOnMoversTakeNoPart) {
   const View view = scene.look(truth);
-  RgbdFeatures features = *view.features;
-  for (size_t f = 0; f < features.size(); f += 2) features.keypoints[f].suspect = true;
-  const auto found = find(features);
+  std::vector<FeatureMotion> motion(view.features->size(), FeatureMotion::still);
+  for (size_t f = 0; f < motion.size(); f += 2) motion[f] = FeatureMotion::on_mover;
+  const auto found = find({*view.features, motion});
   ASSERT_TRUE(found);
-  for (size_t f = 0; f < features.size(); f += 2) EXPECT_EQ(found->points[f], kNoPoint);
-  for (Keypoint& k : features.keypoints) k.suspect = true;
-  EXPECT_FALSE(find(features));
+  for (size_t f = 0; f < motion.size(); f += 2) EXPECT_EQ(found->points[f], kNoPoint);
+  motion.assign(motion.size(), FeatureMotion::on_mover);
+  EXPECT_FALSE(find({*view.features, motion}));
 }
 
 TEST_F(DescriptorPoseTest, NothingComesOfTooFewMatchesOrOfAnotherPlace) {

@@ -59,9 +59,8 @@ TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
   TrackedFrame frame = frame_of({{100, 80, 1}, {200, 80, 1}, {300, 80, 1}, {400, 80, 5}, {500, 80, 1}});
   frame.points[0] = make_point_id(0, 0);
   frame.outlier[1] = 1;
-  auto features = std::make_shared<RgbdFeatures>(*frame.features);
-  features->keypoints[2].suspect = true;
-  frame.features = features;
+  frame.motion.assign(5, FeatureMotion::still);
+  frame.motion[2] = FeatureMotion::on_mover;
   points.remember(frame);
   const auto candidates = points.candidates(frame);
   ASSERT_EQ(candidates.size(), 1u);

@@ -15,6 +15,16 @@ bool ignores_none(PointId) {
   return false;
 }
 
+// Says the same of every place.
+class FixedAppearance final : public PointAppearance {
+ public:
+  explicit FixedAppearance(std::optional<bool> answer) : answer_(answer) {}
+  std::optional<bool> same(const Eigen::Vector2d&, double, int, const Descriptor&) override { return answer_; }
+
+ private:
+  std::optional<bool> answer_;
+};
+
 class RelocaliserTest : public ::testing::Test {
  protected:
   Relocaliser relocaliser() const { return {camera, {}, TestScene::kScaleFactor, TestScene::kLevels, 1}; }
@@ -60,7 +70,7 @@ TEST_F(RelocaliserTest, FindsTheCameraWithoutAnyIdeaOfItsPlace) {
     const Rigid3 truth = TestScene::camera_at({0.1 * n - 0.2, 0.05, 0.1}, {0, 0.04 * n, 0.1});
     ViewOptions noisy = kNoisy;
     noisy.seed = static_cast<uint64_t>(n) + 1;
-    const auto found = relocaliser().find(map, *scene.look(truth, noisy).features, ignores_none, {});
+    const auto found = relocaliser().find(map, *scene.look(truth, noisy).features, ignores_none, nullptr);
     ASSERT_TRUE(found) << n;
     EXPECT_TRUE(found->verified);
     EXPECT_LT(distance_between(found->cam_from_world, truth), 0.015);
@@ -71,32 +81,32 @@ TEST_F(RelocaliserTest, FindsTheCameraWithoutAnyIdeaOfItsPlace) {
 
 TEST_F(RelocaliserTest, AnotherPlaceIsNotFound) {
   map_scene(TestScene(700));
-  EXPECT_FALSE(relocaliser().find(map, *TestScene(700, 99).look({}).features, ignores_none, {}));
-  EXPECT_FALSE(relocaliser().find(map, RgbdFeatures(), ignores_none, {})) << "nor darkness";
-  EXPECT_FALSE(relocaliser().find(Map(), *TestScene(700).look({}).features, ignores_none, {}))
+  EXPECT_FALSE(relocaliser().find(map, *TestScene(700, 99).look({}).features, ignores_none, nullptr));
+  EXPECT_FALSE(relocaliser().find(map, RgbdFeatures(), ignores_none, nullptr)) << "nor darkness";
+  EXPECT_FALSE(relocaliser().find(Map(), *TestScene(700).look({}).features, ignores_none, nullptr))
       << "nor anything in no map";
 }
 
 TEST_F(RelocaliserTest, TwoPlacesThatExplainAFrameEquallyWellAreWorthNothing) {
   const TestScene scene(700);
   map_scene(scene);
-  ASSERT_TRUE(relocaliser().find(map, *scene.look({}).features, ignores_none, {}));
+  ASSERT_TRUE(relocaliser().find(map, *scene.look({}).features, ignores_none, nullptr));
   map_scene(scene, TestScene::camera_at({20, 0, 0}));
   const RgbdFeatures features = *scene.look({}).features;
-  const auto proposals = relocaliser().propose(map, features, ignores_none, {});
+  const auto proposals = relocaliser().propose(map, features, ignores_none, nullptr);
   ASSERT_EQ(proposals.size(), 2U);
   EXPECT_TRUE(proposals[0].verified && proposals[1].verified);
-  EXPECT_FALSE(relocaliser().find(map, features, ignores_none, {})) << "a guess is no pose";
+  EXPECT_FALSE(relocaliser().find(map, features, ignores_none, nullptr)) << "a guess is no pose";
 }
 
 TEST_F(RelocaliserTest, FeaturesOnMoversDoNotVote) {
   const TestScene scene(700);
   map_scene(scene);
-  RgbdFeatures features = *scene.look({}).features;
-  for (Keypoint& k : features.keypoints) k.suspect = true;
-  EXPECT_FALSE(relocaliser().find(map, features, ignores_none, {}));
-  for (size_t f = 0; f < features.size(); f += 2) features.keypoints[f].suspect = false;
-  const auto found = relocaliser().find(map, features, ignores_none, {});
+  const RgbdFeatures features = *scene.look({}).features;
+  std::vector<FeatureMotion> motion(features.size(), FeatureMotion::on_mover);
+  EXPECT_FALSE(relocaliser().find(map, {features, motion}, ignores_none, nullptr));
+  for (size_t f = 0; f < features.size(); f += 2) motion[f] = FeatureMotion::still;
+  const auto found = relocaliser().find(map, {features, motion}, ignores_none, nullptr);
   ASSERT_TRUE(found);
   for (size_t f = 1; f < features.size(); f += 2) EXPECT_EQ(found->points[f], kNoPoint);
 }
@@ -105,13 +115,13 @@ TEST_F(RelocaliserTest, IgnoredPointsAreNotMatched) {
   const TestScene scene(700);
   map_scene(scene);
   const auto features = scene.look({}).features;
-  const auto found = relocaliser().find(map, *features, [](PointId id) { return birth_feature(id) % 2 == 0; }, {});
+  const auto found = relocaliser().find(map, *features, [](PointId id) { return birth_feature(id) % 2 == 0; }, nullptr);
   ASSERT_TRUE(found);
   for (PointId p : found->points)
     if (p != kNoPoint) {
       EXPECT_EQ(birth_feature(p) % 2, 1);
     }
-  EXPECT_FALSE(relocaliser().find(map, *features, [](PointId) { return true; }, {}));
+  EXPECT_FALSE(relocaliser().find(map, *features, [](PointId) { return true; }, nullptr));
 }
 
 TEST_F(RelocaliserTest, APlaceThatLooksDifferentWhereNothingMatchedIsNotVerified) {
@@ -119,18 +129,15 @@ TEST_F(RelocaliserTest, APlaceThatLooksDifferentWhereNothingMatchedIsNotVerified
   map_scene(scene);
   RgbdFeatures features = *scene.look({}).features;
   for (size_t f = 0; f < features.size(); f += 2) features.descriptors[f] = {f, ~f, f * f, ~(f * f)};
-  const auto always = [](bool answer) {
-    return [answer](const Eigen::Vector2d&, double, int, const Descriptor&) { return std::optional(answer); };
-  };
-  const auto same = relocaliser().find(map, features, ignores_none, always(true));
+  FixedAppearance looks_alike(true), looks_different(false), unknown(std::nullopt);
+  const auto same = relocaliser().find(map, features, ignores_none, &looks_alike);
   ASSERT_TRUE(same);
   EXPECT_EQ(same->similarity(), 1);
-  EXPECT_FALSE(relocaliser().find(map, features, ignores_none, always(false)));
-  const auto other = relocaliser().propose(map, features, ignores_none, always(false));
+  EXPECT_FALSE(relocaliser().find(map, features, ignores_none, &looks_different));
+  const auto other = relocaliser().propose(map, features, ignores_none, &looks_different);
   ASSERT_FALSE(other.empty());
   EXPECT_NEAR(other[0].similarity(), 0.5, 0.1);
-  const auto unknown = [](const Eigen::Vector2d&, double, int, const Descriptor&) -> std::optional<bool> { return {}; };
-  EXPECT_TRUE(relocaliser().find(map, features, ignores_none, unknown));
+  EXPECT_TRUE(relocaliser().find(map, features, ignores_none, &unknown));
 }
 
 }  // namespace

@@ -14,22 +14,22 @@ namespace {
 TEST_F(TrackerTest, ProvisionalPointsMatchBeforeMappingPublishes) {
   start(on_path(0));
   for (int f = 1; f <= 3; ++f) {
-    const TrackOutcome o = track(on_path(f));
+    const TrackedFrame o = track(on_path(f));
     ASSERT_EQ(o.state, TrackingState::tracking);
-    EXPECT_GT(o.frame.inliers, 150);
-    EXPECT_EQ(o.frame.reference, 0);
+    EXPECT_GT(o.inliers, 150);
+    EXPECT_EQ(o.reference, 0);
   }
 }
 
 TEST_F(TrackerTest, ProvisionalPointsOfALaterKeyframeAddToTheMapBeforeMappingPublishes) {
   publish(start(on_path(0)));
-  TrackOutcome o;
+  TrackedFrame o;
   for (int f = 1; f <= 25; ++f) o = track(on_path(f));
-  const KeyframePacket packet = insert(o.frame);
+  const KeyframePacket packet = insert(o);
   EXPECT_GT(packet.new_points.size(), 30U);
   o = track(on_path(26));
   int of_the_new_one = 0;
-  for (PointId p : o.frame.points) of_the_new_one += p != kNoPoint && birth_keyframe(p) == 1;
+  for (PointId p : o.points) of_the_new_one += p != kNoPoint && birth_keyframe(p) == 1;
   EXPECT_GT(of_the_new_one, static_cast<int>(packet.new_points.size()) / 2);
 }
 
@@ -38,17 +38,17 @@ TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
   publish(start(on_path(0), {.depth_share = 0.5}));
   int shown = 0, guessed = 0;
   for (int f = 1; f <= 4; ++f) {
-    const TrackOutcome o = track(on_path(f));
+    const TrackedFrame o = track(on_path(f));
     ASSERT_EQ(o.state, TrackingState::tracking);
-    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+    EXPECT_LT(distance_between(o.cam_from_world, on_path(f)), 1e-3);
     shown = guessed = 0;
-    for (size_t i = 0; i < o.frame.points.size(); ++i) {
-      if (!o.frame.odometry[i]) continue;
-      EXPECT_EQ(o.frame.points[i], kNoPoint);
+    for (size_t i = 0; i < o.points.size(); ++i) {
+      if (!o.odometry[i]) continue;
+      EXPECT_EQ(o.points[i], kNoPoint);
       ++shown;
-      guessed += o.frame.odometry[i]->guessed;
+      guessed += o.odometry[i]->guessed;
       const Eigen::Vector3d& truth = scene.points[static_cast<size_t>(view.shows[i])];
-      EXPECT_LT((o.frame.odometry[i]->point_in_world - truth).norm(), 0.01);
+      EXPECT_LT((o.odometry[i]->point_in_world - truth).norm(), 0.01);
     }
   }
   EXPECT_GT(shown, 50);
@@ -58,44 +58,44 @@ TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
 TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
   publish(start(on_path(0), {.depth_share = 0.5}));
   track(on_path(1));
-  const TrackOutcome second = track(on_path(2));
-  const KeyframePacket packet = insert(second.frame);
+  const TrackedFrame second = track(on_path(2));
+  const KeyframePacket packet = insert(second);
   EXPECT_GT(packet.new_points.size(), 50u);
-  const TrackOutcome third = track(on_path(3));
-  for (size_t i = 0; i < third.frame.points.size(); ++i)
-    EXPECT_FALSE(third.frame.points[i] != kNoPoint && third.frame.odometry[i]);
-  EXPECT_GT(third.frame.inliers, second.frame.inliers + 50);
+  const TrackedFrame third = track(on_path(3));
+  for (size_t i = 0; i < third.points.size(); ++i)
+    EXPECT_FALSE(third.points[i] != kNoPoint && third.odometry[i]);
+  EXPECT_GT(third.inliers, second.inliers + 50);
 }
 
 // Odometry points are named after the features of the last frame; a map that starts anew has other features.
 TEST_F(TrackerTest, ALossEndsOdometryPointsBeforeAnotherMapStarts) {
   publish(start(on_path(0), {.depth_share = 0.5}));
   track(on_path(1));
-  const TrackOutcome before = track(on_path(2));
+  const TrackedFrame before = track(on_path(2));
   int followed = 0;
-  for (const auto& o : before.frame.odometry) followed += o.has_value();
+  for (const auto& o : before.odometry) followed += o.has_value();
   ASSERT_GT(followed, 50);
   // Elsewhere, with few features: what is left over would name features that are not there.
   scene = TestScene(400, 99);
-  TrackOutcome o;
-  for (int f = 0; f < 40 && !o.wants_first_keyframe; ++f) o = track(on_path(0));
-  ASSERT_TRUE(o.wants_first_keyframe);
-  publish(insert(o.frame));
-  const TrackOutcome next = track(on_path(0));
+  TrackedFrame o;
+  for (int f = 0; f < 40 && !o.starts_map; ++f) o = track(on_path(0));
+  ASSERT_TRUE(o.starts_map);
+  publish(insert(o));
+  const TrackedFrame next = track(on_path(0));
   ASSERT_EQ(next.state, TrackingState::tracking);
-  for (const auto& left : next.frame.odometry) EXPECT_FALSE(left.has_value());
+  for (const auto& left : next.odometry) EXPECT_FALSE(left.has_value());
 }
 
 TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
   publish(start(on_path(0)));
-  TrackOutcome o = track(on_path(1));
+  TrackedFrame o = track(on_path(1));
   std::vector<PointId> moving;
-  for (PointId p : o.frame.points)
+  for (PointId p : o.points)
     if (p != kNoPoint && scene_point(p) % 3 == 0) moving.push_back(p);
   ASSERT_GT(moving.size(), 50U);
   tracker.retract(moving);
   const auto shows_a_retracted_one = [&] {
-    return std::any_of(o.frame.points.begin(), o.frame.points.end(),
+    return std::any_of(o.points.begin(), o.points.end(),
                        [&](PointId p) { return std::find(moving.begin(), moving.end(), p) != moving.end(); });
   };
   for (int f = 2; f <= 5; ++f) {
@@ -118,8 +118,8 @@ TEST_F(TrackerTest, MappingIsToldOnceOfRetractedPoints) {
   const std::vector<PointId> moving = {live[7], live[3]};
   tracker.retract(moving);
   tracker.retract({live[3]});
-  const TrackOutcome o = track(on_path(1));
-  EXPECT_EQ(insert(o.frame).retracted, moving);
+  const TrackedFrame o = track(on_path(1));
+  EXPECT_EQ(insert(o).retracted, moving);
   tracker.retract({live[9]});
   const KeyframePacket report = tracker.make_report();
   EXPECT_EQ(report.id, kNoKeyframe);
@@ -134,23 +134,23 @@ TEST_F(TrackerTest, ARetractedProvisionalPointIsGoneAtOnceAndAfterMappingPublish
   EXPECT_FALSE(tracker.position(moving));
   publish(packet);  // mapping did not know yet
   for (int f = 1; f <= 3; ++f) {
-    const TrackOutcome o = track(on_path(f));
-    EXPECT_EQ(std::count(o.frame.points.begin(), o.frame.points.end(), moving), 0);
+    const TrackedFrame o = track(on_path(f));
+    EXPECT_EQ(std::count(o.points.begin(), o.points.end(), moving), 0);
   }
 }
 
-TEST_F(TrackerTest, VisitsThePointsThatItsPosePutsInView) {
+TEST_F(TrackerTest, TellsThePointsThatItsPosePutsInView) {
   publish(start(on_path(0)));
   track(on_path(1));
-  const TrackOutcome o = track(on_path(2));
+  const TrackedFrame o = track(on_path(2));
   std::vector<PointId> seen;
-  tracker.visit_points_in_view([&](PointId id, const Eigen::Vector2d& pixel, double depth) {
-    const Eigen::Vector3d in_cam = on_path(2) * scene.points[static_cast<size_t>(scene_point(id))];
-    EXPECT_LT((scene.camera.project(in_cam) - pixel).norm(), 0.05);
-    EXPECT_NEAR(in_cam.z(), depth, 1e-3);
-    seen.push_back(id);
-  });
-  for (PointId p : o.frame.points) EXPECT_TRUE(p == kNoPoint || std::find(seen.begin(), seen.end(), p) != seen.end());
+  for (const PointInView& p : tracker.points_in_view()) {
+    const Eigen::Vector3d in_cam = on_path(2) * scene.points[static_cast<size_t>(scene_point(p.id))];
+    EXPECT_LT((scene.camera.project(in_cam) - p.pixel).norm(), 0.05);
+    EXPECT_NEAR(in_cam.z(), p.depth, 1e-3);
+    seen.push_back(p.id);
+  }
+  for (PointId p : o.points) EXPECT_TRUE(p == kNoPoint || std::find(seen.begin(), seen.end(), p) != seen.end());
 }
 
 TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
@@ -164,19 +164,19 @@ TEST_F(TrackerTest, APublishedKeyframeTakesItsProvisionalPointsOver) {
   EXPECT_FALSE(tracker.position(dropped));
   EXPECT_FALSE(tracker.position(fused));
   EXPECT_TRUE(tracker.position(survivor));
-  const TrackOutcome o = track(on_path(2));
+  const TrackedFrame o = track(on_path(2));
   ASSERT_EQ(o.state, TrackingState::tracking);
-  for (PointId p : o.frame.points) EXPECT_TRUE(p != dropped && p != fused);
+  for (PointId p : o.points) EXPECT_TRUE(p != dropped && p != fused);
 }
 
 TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
   publish(start());
   const int hidden = scene_point(map.live_points()[3]);
-  TrackOutcome o;
+  TrackedFrame o;
   for (int f = 0; f < 10; ++f) {
     o = track({}, {.hidden = hidden});
   }
-  const KeyframePacket packet = insert(o.frame);
+  const KeyframePacket packet = insert(o);
   ASSERT_GT(packet.visibility.size(), 100U);
   for (size_t i = 0; i < packet.visibility.size(); ++i) {
     const PointVisibility& s = packet.visibility[i];
@@ -191,7 +191,7 @@ TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
       EXPECT_EQ(s.found, 10);
     }
   }
-  EXPECT_TRUE(insert(track({}).frame).visibility.size() < 2 * packet.visibility.size());
+  EXPECT_TRUE(insert(track({})).visibility.size() < 2 * packet.visibility.size());
 }
 
 TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {
@@ -227,9 +227,9 @@ TEST_F(TrackerTest, CountsTheReferencesPoints) {
 
 TEST_F(TrackerTest, FusedPointsAreShownByOneFeature) {
   publish(start());
-  const TrackOutcome o = track({});
+  const TrackedFrame o = track({});
   std::vector<PointId> shown;
-  for (PointId p : o.frame.points)
+  for (PointId p : o.points)
     if (p != kNoPoint) shown.push_back(p);
   map.fuse(shown[3], shown[7]);
   publish();

@@ -11,39 +11,39 @@ namespace dkb {
 namespace {
 
 TEST_F(TrackerTest, AMapStartsOnceEnoughFeaturesHaveDepth) {
-  const TrackOutcome blind = track({}, {.depth_share = 0});
+  const TrackedFrame blind = track({}, {.depth_share = 0});
   EXPECT_EQ(blind.state, TrackingState::initialising);
-  EXPECT_FALSE(blind.wants_first_keyframe);
-  const TrackOutcome first = track({});
+  EXPECT_FALSE(blind.starts_map);
+  const TrackedFrame first = track({});
   EXPECT_EQ(first.state, TrackingState::tracking);
-  EXPECT_TRUE(first.wants_first_keyframe);
+  EXPECT_TRUE(first.starts_map);
 }
 
 TEST_F(TrackerTest, FollowsASteadyMotionThroughNoiseAndOutliers) {
   publish(start(on_path(0), kNoisy));
   for (int f = 1; f <= 30; ++f) {
-    const TrackOutcome o = track(on_path(f), kNoisy);
+    const TrackedFrame o = track(on_path(f), kNoisy);
     ASSERT_EQ(o.state, TrackingState::tracking) << "frame " << f;
-    EXPECT_GT(o.frame.inliers, 50);
-    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 0.015) << "frame " << f;
-    EXPECT_LT(rotation_between(o.frame.cam_from_world, on_path(f)), 0.3) << "frame " << f;
+    EXPECT_GT(o.inliers, 50);
+    EXPECT_LT(distance_between(o.cam_from_world, on_path(f)), 0.015) << "frame " << f;
+    EXPECT_LT(rotation_between(o.cam_from_world, on_path(f)), 0.3) << "frame " << f;
     int inliers = 0;
-    for (size_t i = 0; i < o.frame.points.size(); ++i) {
-      if (o.frame.points[i] == kNoPoint) continue;
+    for (size_t i = 0; i < o.points.size(); ++i) {
+      if (o.points[i] == kNoPoint) continue;
       ++inliers;
-      EXPECT_FALSE(o.frame.outlier[i]);
-      ASSERT_EQ(scene_point(o.frame.points[i]), view.shows[i]) << "frame " << f << " feature " << i;
+      EXPECT_FALSE(o.outlier[i]);
+      ASSERT_EQ(scene_point(o.points[i]), view.shows[i]) << "frame " << f << " feature " << i;
     }
-    EXPECT_EQ(inliers, o.frame.inliers);
+    EXPECT_EQ(inliers, o.inliers);
   }
 }
 
 TEST_F(TrackerTest, ExactViewsGiveExactPoses) {
   publish(start());
   for (int f = 1; f <= 5; ++f) {
-    const TrackOutcome o = track(on_path(f));
-    EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(f)), 1e-5);
-    EXPECT_LT(rotation_between(o.frame.cam_from_world, on_path(f)), 1e-3);
+    const TrackedFrame o = track(on_path(f));
+    EXPECT_LT(distance_between(o.cam_from_world, on_path(f)), 1e-5);
+    EXPECT_LT(rotation_between(o.cam_from_world, on_path(f)), 1e-3);
   }
 }
 
@@ -51,9 +51,9 @@ TEST_F(TrackerTest, TheFirstKeyframeMayStandAnywhere) {
   const Rigid3 mounted = TestScene::camera_at({0.3, -0.2, 0.4}, {0.1, 0.2, -0.1});
   start(mounted);
   const Rigid3 next = TestScene::camera_at({0.31, -0.2, 0.4}, {0.1, 0.2, -0.1});
-  const TrackOutcome o = track(next);
+  const TrackedFrame o = track(next);
   ASSERT_EQ(o.state, TrackingState::tracking);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, next), 1e-5);
+  EXPECT_LT(distance_between(o.cam_from_world, next), 1e-5);
   const Rigid3 moved = tracker.take_view(std::make_shared<const Map>());
   EXPECT_LT(moved.translation.norm(), 1e-9) << "nothing moved the world";
 }
@@ -63,10 +63,10 @@ TEST_F(TrackerTest, FollowsACameraThatTurnsFastFromTheVeryFirstFrame) {
   start({}, kNoisy);
   for (int f = 1; f <= 5; ++f) {
     const Rigid3 truth = TestScene::camera_at({0, 0, 0}, {0, 0.06 * f, 0});
-    const TrackOutcome o = track(truth, kNoisy);
+    const TrackedFrame o = track(truth, kNoisy);
     ASSERT_EQ(o.state, TrackingState::tracking) << f;
-    EXPECT_LT(distance_between(o.frame.cam_from_world, truth), 0.02) << f;
-    EXPECT_LT(rotation_between(o.frame.cam_from_world, truth), 0.4) << f;
+    EXPECT_LT(distance_between(o.cam_from_world, truth), 0.02) << f;
+    EXPECT_LT(rotation_between(o.cam_from_world, truth), 0.4) << f;
   }
 }
 
@@ -75,19 +75,19 @@ TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
   for (int f = 1; f <= 5; ++f) track(on_path(f), kNoisy);
   black = true;
   for (int f = 0; f < 5; ++f) {
-    const TrackOutcome o = track(on_path(5));
+    const TrackedFrame o = track(on_path(5));
     EXPECT_EQ(o.state, TrackingState::lost);
     EXPECT_TRUE(tracker.velocity().isZero());
   }
   black = false;
   const Rigid3 elsewhere = on_path(12);
   EXPECT_EQ(track(on_path(11), kNoisy).state, TrackingState::lost) << "it has to be confirmed";
-  TrackOutcome o = track(elsewhere, kNoisy);
+  TrackedFrame o = track(elsewhere, kNoisy);
   EXPECT_EQ(o.state, TrackingState::relocalised);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, elsewhere), 0.015);
+  EXPECT_LT(distance_between(o.cam_from_world, elsewhere), 0.015);
   o = track(on_path(13), kNoisy);
   EXPECT_EQ(o.state, TrackingState::tracking);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(13)), 0.015);
+  EXPECT_LT(distance_between(o.cam_from_world, on_path(13)), 0.015);
 }
 
 TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
@@ -96,8 +96,7 @@ TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
   for (int f = 0; f < 3; ++f) {
     ++index;
     const View there = other.look(on_path(f));
-    EXPECT_EQ(tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return there.features; }).state,
-              TrackingState::lost);
+    EXPECT_EQ(track(FakeFeatures(there.features)).state, TrackingState::lost);
   }
 }
 
@@ -114,12 +113,12 @@ TEST_F(TrackerTest, LostBeforeTheFirstMapArrivesItWaitsForIt) {
 
 TEST_F(TrackerTest, ATakenViewMovesPoseVelocityAndPendingKeyframesWithTheWorld) {
   publish(start(on_path(0)));
-  TrackOutcome o;
+  TrackedFrame o;
   for (int f = 1; f <= 6; ++f) o = track(on_path(f));
-  const KeyframePacket pending = insert(o.frame);  // mapping is still at it
+  const KeyframePacket pending = insert(o);  // mapping is still at it
   o = track(on_path(7));
   const Vector6d velocity = tracker.velocity();
-  const Rigid3 pending_before = tracker.keyframe_pose(1);
+  const Rigid3 pending_before = tracker.map().cam_from_world(1);
   const PointId provisional = pending.new_points.front().id;
   const Eigen::Vector3d point_before = *tracker.position(provisional);
 
@@ -129,13 +128,13 @@ TEST_F(TrackerTest, ATakenViewMovesPoseVelocityAndPendingKeyframesWithTheWorld) 
   const Rigid3 moved = publish();
   EXPECT_LT((moved.translation - new_from_old.translation).norm(), 1e-9);
   EXPECT_LT(moved.rotation.angularDistance(new_from_old.rotation), 1e-9);
-  EXPECT_LT(distance_between(tracker.keyframe_pose(1), pending_before * new_from_old.inverse()), 1e-9);
+  EXPECT_LT(distance_between(tracker.map().cam_from_world(1), pending_before * new_from_old.inverse()), 1e-9);
   EXPECT_LT((*tracker.position(provisional) - new_from_old * point_before).norm(), 1e-9);
   EXPECT_TRUE(tracker.velocity().isApprox(velocity)) << "it is measured in camera axes";
 
   o = track(on_path(8));
   ASSERT_EQ(o.state, TrackingState::tracking);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(8) * new_from_old.inverse()), 1e-4);
+  EXPECT_LT(distance_between(o.cam_from_world, on_path(8) * new_from_old.inverse()), 1e-4);
 }
 
 TEST_F(TrackerTest, VelocityIsThatOfTheCameraPerSecond) {
@@ -158,11 +157,9 @@ TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredO
   const Vector6d expected = tracker.velocity();
   ++index;
   const View seen = scene.look(on_path(5));  // twice as fast as before
-  std::vector<Vector6d> asked;
-  tracker.track(index, index * kFrameTime, [&](const Vector6d& velocity) {
-    asked.push_back(velocity);
-    return seen.features;
-  });
+  const FakeFeatures features(seen.features);
+  track(features);
+  const std::vector<Vector6d>& asked = features.asked;
   ASSERT_EQ(asked.size(), 2U);
   EXPECT_TRUE(asked[0].isApprox(expected));
   EXPECT_GT(asked[1].tail<3>().norm(), 0.55);  // at least the 0.6 rad/s of this step, up to rounding
@@ -172,13 +169,13 @@ TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredO
 
 TEST_F(TrackerTest, PosesHangOnTheirReferenceKeyframe) {
   publish(start(on_path(0)));
-  TrackOutcome o;
+  TrackedFrame o;
   for (int f = 1; f <= 6; ++f) o = track(on_path(f));
-  EXPECT_EQ(o.frame.reference, 0);
-  insert(o.frame);
+  EXPECT_EQ(o.reference, 0);
+  insert(o);
   o = track(on_path(7));
   EXPECT_LT(
-      distance_between(o.frame.cam_from_reference * tracker.keyframe_pose(o.frame.reference), o.frame.cam_from_world),
+      distance_between(o.cam_from_reference * tracker.map().cam_from_world(o.reference), o.cam_from_world),
       1e-12);
 }
 
@@ -188,9 +185,9 @@ TEST_F(TrackerTest, AfterAResetOfMotionTheFrameIsFoundAnew) {
   track(on_path(1));
   tracker.reset_motion();
   track(on_path(7));
-  const TrackOutcome o = track(on_path(8));
+  const TrackedFrame o = track(on_path(8));
   EXPECT_EQ(o.state, TrackingState::relocalised);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(8)), 1e-4);
+  EXPECT_LT(distance_between(o.cam_from_world, on_path(8)), 1e-4);
 }
 
 TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
@@ -203,7 +200,7 @@ TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
     publish(start(on_path(0), kNoisy));
     for (int f = 1; f <= 12; ++f) {
       black = f == 6;
-      poses.push_back(track(on_path(f), kNoisy).frame.cam_from_world);
+      poses.push_back(track(on_path(f), kNoisy).cam_from_world);
     }
   }
   for (size_t i = 0; i < runs[0].size(); ++i) {
@@ -217,40 +214,40 @@ TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   options.new_map_after = 5;
   tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options, 1);
   publish(start(on_path(0)));
-  const TrackOutcome last = track(on_path(1));
+  const TrackedFrame last = track(on_path(1));
   const TestScene home = scene;
   scene = TestScene(700, 99);
   black = true;
   for (int f = 0; f < 20; ++f) EXPECT_EQ(track({}).state, TrackingState::lost) << "the dark starts no map";
   black = false;
   for (int f = 0; f < 4; ++f) EXPECT_EQ(track({}).state, TrackingState::lost);
-  TrackOutcome o = track({});
+  TrackedFrame o = track({});
   ASSERT_EQ(o.state, TrackingState::tracking);
-  EXPECT_TRUE(o.wants_first_keyframe);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, last.frame.cam_from_world), 1e-12) << "where it was seen last";
-  const KeyframePacket packet = insert(o.frame);
+  EXPECT_TRUE(o.starts_map);
+  EXPECT_LT(distance_between(o.cam_from_world, last.cam_from_world), 1e-12) << "where it was seen last";
+  const KeyframePacket packet = insert(o);
   EXPECT_EQ(packet.reference, kNoKeyframe);
-  EXPECT_EQ(tracker.root(1), 1);
+  EXPECT_EQ(tracker.map().root(1), 1);
   EXPECT_EQ(track(on_path(1)).state, TrackingState::tracking) << "on provisional points";
   publish(packet);
   EXPECT_EQ(map.roots(), (std::vector<KeyframeId>{0, 1}));
   o = track(on_path(2));
   EXPECT_EQ(o.state, TrackingState::tracking);
-  EXPECT_EQ(tracker.root(o.frame.reference), 1);
+  EXPECT_EQ(tracker.map().root(o.reference), 1);
   scene = home;
   o = track(on_path(2));
   EXPECT_EQ(o.state, TrackingState::relocalised) << "the old map is not forgotten";
-  EXPECT_EQ(tracker.root(o.frame.reference), 0);
-  EXPECT_LT(distance_between(o.frame.cam_from_world, on_path(2)), 1e-4);
+  EXPECT_EQ(tracker.map().root(o.reference), 0);
+  EXPECT_LT(distance_between(o.cam_from_world, on_path(2)), 1e-4);
 }
 
 TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
   view = scene.look({});
-  const auto features_at = [&](const Vector6d&) { return view.features; };
-  const TrackOutcome o = tracker.track(0, 0, features_at, false);
+  const FakeFeatures features(view.features);
+  const TrackedFrame o = tracker.track({.features = features, .may_start_map = false});
   EXPECT_EQ(o.state, TrackingState::initialising);
-  EXPECT_FALSE(o.wants_first_keyframe);
-  EXPECT_TRUE(tracker.track(1, kFrameTime, features_at).wants_first_keyframe);
+  EXPECT_FALSE(o.starts_map);
+  EXPECT_TRUE(tracker.track({.index = 1, .timestamp = kFrameTime, .features = features}).starts_map);
 }
 
 }  // namespace

@@ -16,22 +16,41 @@ inline constexpr double kFrameTime = 1.0 / 30;  // [s]
 inline constexpr ViewOptions kNoisy{
     .pixel_noise = 0.5, .depth_noise = 0.01, .depth_share = 0.8, .flipped_bits = 20, .clutter = 200, .misplaced = 0.1};
 
+// Features that a view gives, whatever the velocity; tells what it was asked for.
+class FakeFeatures final : public FrameFeatures {
+ public:
+  explicit FakeFeatures(std::shared_ptr<const RgbdFeatures> features) : features_(std::move(features)) {}
+  std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
+    asked.push_back(velocity);
+    return features_;
+  }
+
+  mutable std::vector<Vector6d> asked;
+
+ private:
+  std::shared_ptr<const RgbdFeatures> features_;
+};
+
 // A tracker in a TestScene, with a map that the test publishes to it. For tests of the tracker.
 class TrackerTest : public ::testing::Test {
  protected:
-  TrackOutcome track(const Rigid3& cam_from_world, ViewOptions options = {}) {
+  TrackedFrame track(const Rigid3& cam_from_world, ViewOptions options = {}) {
     ++index;
     options.seed = options.seed * 1000 + static_cast<uint64_t>(index);
     view = scene.look(cam_from_world, options);
     if (black) view.features = std::make_shared<RgbdFeatures>();
-    return tracker.track(index, index * kFrameTime, [&](const Vector6d&) { return view.features; });
+    return track(FakeFeatures(view.features));
+  }
+  // The frame `index` with these features.
+  TrackedFrame track(const FrameFeatures& features) {
+    return tracker.track({.index = index, .timestamp = index * kFrameTime, .features = features});
   }
   // The first frame and its keyframe.
   KeyframePacket start(const Rigid3& cam_from_world = {}, const ViewOptions& options = {}) {
-    TrackOutcome first = track(cam_from_world, options);
-    EXPECT_TRUE(first.wants_first_keyframe);
-    first.frame.cam_from_world = cam_from_world;
-    return insert(first.frame);
+    TrackedFrame first = track(cam_from_world, options);
+    EXPECT_TRUE(first.starts_map);
+    first.cam_from_world = cam_from_world;
+    return insert(first);
   }
   KeyframePacket insert(const TrackedFrame& frame) {
     keyframe_shows.push_back(view.shows);

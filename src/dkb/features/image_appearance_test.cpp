@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/features/image_appearance.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/features/orb_extractor.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+// Blocks of random greys on a wall at 2 m.
+RgbdImage wall(uint64_t seed) {
+  Random random(seed);
+  GreyImage cells(40, 30);
+  for (size_t i = 0; i < cells.size(); ++i) cells.data()[i] = static_cast<uint8_t>(random.below(256));
+  RgbdImage image;
+  image.grey = GreyImage(320, 240);
+  for (int y = 0; y < 240; ++y)
+    for (int x = 0; x < 320; ++x) image.grey(x, y) = cells(x / 8, y / 8);
+  image.depth = DepthImage(320, 240, 2.0f);
+  return image;
+}
+
+class ImageAppearanceTest : public ::testing::Test {
+ protected:
+  ImageAppearanceTest() {
+    camera.width = 320, camera.height = 240;
+    features = OrbExtractor().extract(image.grey);
+    for (size_t i = 0; i < features.corners.size() && chosen == nullptr; ++i) {
+      const Corner& c = features.corners[i];
+      if (c.octave == 0 && c.x > 100 && c.x < 220 && c.y > 80 && c.y < 160)
+        chosen = &c, descriptor = features.descriptors[i];
+    }
+  }
+  std::optional<bool> same_in(const RgbdImage& seen, double depth = 2) const {
+    const UndistortionTable undistort(camera);
+    ImageAppearance appearance(seen, undistort, {});
+    return appearance.same({chosen->x, chosen->y}, depth, chosen->octave, descriptor);
+  }
+
+  Camera camera;
+  RgbdImage image = wall(1);
+  OrbFeatures features;
+  const Corner* chosen = nullptr;
+  Descriptor descriptor{};
+};
+
+TEST_F(ImageAppearanceTest, APlaceThatLooksAsItDidIsTheSame) {
+  ASSERT_NE(chosen, nullptr);
+  EXPECT_EQ(same_in(image), true);
+}
+
+TEST_F(ImageAppearanceTest, AnotherPictureAtItsPlaceIsAnother) {
+  ASSERT_NE(chosen, nullptr);
+  int different = 0, told = 0;
+  for (uint64_t seed = 2; seed < 12; ++seed) {
+    const auto same = same_in(wall(seed));
+    told += same.has_value();
+    different += same == false;
+  }
+  EXPECT_GE(told, 5);
+  EXPECT_EQ(different, told);
+}
+
+TEST_F(ImageAppearanceTest, WhatIsHiddenIsNotToldAndWhatIsSeenThroughIsGone) {
+  ASSERT_NE(chosen, nullptr);
+  EXPECT_EQ(same_in(image, 2.2), std::nullopt) << "something stands 9% before it";
+  EXPECT_EQ(same_in(image, 1.8), false) << "what is seen lies 11% behind it";
+  EXPECT_EQ(same_in(image, 2.1), true) << "5% are within the gate";
+  RgbdImage blind = image;
+  blind.depth = DepthImage(320, 240);
+  EXPECT_EQ(same_in(blind), std::nullopt) << "no depth";
+}
+
+TEST_F(ImageAppearanceTest, PlacesOutsideTheImageAreNotTold) {
+  const UndistortionTable undistort(camera);
+  ImageAppearance appearance(image, undistort, {});
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(-5, 100), {400, 100}, {100, -1}, {100, 300}, {1e12, -1e12}})
+    EXPECT_EQ(appearance.same(pixel, 2, 0, {}), std::nullopt);
+}
+
+}  // namespace
+}  // namespace dkb

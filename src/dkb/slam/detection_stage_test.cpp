@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/slam/detection_stage.h"
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <limits>
+#include <stdexcept>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+// Says which images it saw; throws at the frame `bad`; waits for `gate` at the frame `slow`.
+class ScriptedDetector final : public Detector {
+ public:
+  Detections detect(const DetectorInput& image) override {
+    const int64_t frame = image.stamp_ns / 1'000'000'000;
+    ++calls;
+    if (frame == slow) {
+      entered.set_value();
+      gate.get_future().wait();
+    }
+    if (frame == bad) throw std::runtime_error("network fell over");
+    Detections found;
+    found.boxes.push_back({"person", {static_cast<float>(frame), static_cast<float>(calls), 1, 1}, 1});
+    return found;
+  }
+  std::string kind() const override { return "scripted"; }
+
+  int64_t bad = -1, slow = -1;
+  std::promise<void> gate, entered;
+  int calls = 0;  // the stage's thread's, until the stage ends
+};
+
+// Gives the same answer for every image.
+class FixedDetector final : public Detector {
+ public:
+  explicit FixedDetector(Detections answer) : answer_(std::move(answer)) {}
+  Detections detect(const DetectorInput&) override { return answer_; }
+  std::string kind() const override { return "fixed"; }
+
+ private:
+  Detections answer_;
+};
+
+// Frames are a second apart.
+Frame frame_at(FrameIndex index) {
+  auto image = std::make_shared<RgbdImage>();
+  image->grey = GreyImage(4, 4);
+  return Frame(std::move(image), 1'000'000'000 * index, 1'000'000'000 * index);
+}
+
+struct Mode {
+  bool threaded = true, realtime = false;
+};
+
+std::unique_ptr<DetectionStage> stage_of(Detector& detector, DetectionSchedule schedule, Mode mode = {}) {
+  return std::make_unique<DetectionStage>(detector, Camera(), schedule, mode.threaded, mode.realtime);
+}
+
+// Everything that tracking would see of `frames` frames, as text, and how often the detector was asked.
+std::string run(DetectionSchedule schedule, int64_t bad, FrameIndex frames, bool threaded = true) {
+  ScriptedDetector detector;
+  detector.bad = bad;
+  std::string log;
+  {
+    const auto stage = stage_of(detector, schedule, {.threaded = threaded});
+    for (FrameIndex frame = 0; frame < frames; ++frame) {
+      log += std::to_string(frame);
+      for (const DueDetections& due : stage->exchange(frame, frame_at(frame))) {
+        log += " <" + std::to_string(due.frame);
+        for (const Detection& d : due.detections.boxes) log += "#" + std::to_string(static_cast<int>(d.box.y));
+        EXPECT_EQ(due.stamp_ns, 1'000'000'000 * due.frame);
+      }
+      for (const std::string& warning : stage->take_warnings()) log += " !" + warning;
+      log += ";";
+    }
+  }
+  return log;
+}
+
+TEST(DetectionStage, ResultsComeAtTheirDueFrameAndTheFirstAtOnce) {
+  EXPECT_EQ(run({.every = 2, .latency = 3}, -1, 9), "0 <0#1;1;2;3;4;5 <2#2;6;7 <4#3;8;");
+}
+
+TEST(DetectionStage, LatencyZeroServesEveryFrameAtOnce) {
+  EXPECT_EQ(run({.every = 1, .latency = 0}, -1, 3), "0 <0#1;1 <1#2;2 <2#3;");
+}
+
+TEST(DetectionStage, OneThreadGivesTheSameBytes) {
+  for (const int64_t bad : {-1, 0, 4, 6})
+    for (const int every : {1, 2, 3})
+      for (const int latency : {0, 1, 4, 7})
+        EXPECT_EQ(run({.every = every, .latency = latency}, bad, 30),
+                  run({.every = every, .latency = latency}, bad, 30, false));
+}
+
+TEST(DetectionStage, AFailureIsHandedOverOnceAtItsDueFrameAndWhatCarriesOnSeesNothing) {
+  EXPECT_EQ(run({.every = 2, .latency = 3}, 4, 12),
+            "0 <0#1;1;2;3;4;5 <2#2;6;7 <4 !the detector failed: network fell over; it is not asked again;8;9 <6;10;11 "
+            "<8;");
+}
+
+TEST(DetectionStage, ADetectorThatThrewIsNotAskedAgain) {
+  for (const bool threaded : {true, false}) {
+    ScriptedDetector detector;
+    detector.bad = 2;
+    {
+      const auto stage = stage_of(detector, {.every = 1, .latency = 4}, {.threaded = threaded});
+      for (FrameIndex frame = 0; frame < 12; ++frame) stage->exchange(frame, frame_at(frame));
+    }
+    EXPECT_EQ(detector.calls, 3);
+  }
+}
+
+TEST(DetectionStage, FramesThatWereSkippedDoNotStopTheRhythm) {
+  ScriptedDetector detector;
+  const auto stage = stage_of(detector, {.every = 3, .latency = 1}, {.threaded = false});
+  const auto asked_at = [&](FrameIndex frame) {
+    const int before = detector.calls;
+    stage->exchange(frame, frame_at(frame));
+    return detector.calls > before;
+  };
+  EXPECT_TRUE(asked_at(5));
+  EXPECT_FALSE(asked_at(7));
+  EXPECT_TRUE(asked_at(9)) << "8 was skipped";
+  EXPECT_FALSE(asked_at(11));
+  EXPECT_TRUE(asked_at(12));
+}
+
+TEST(DetectionStage, RealtimeNeverWaitsForOneThatHangsAndDropsWhatPilesUp) {
+  ScriptedDetector detector;
+  detector.slow = 1;
+  const auto stage = stage_of(detector, {.every = 1, .latency = 1}, {.realtime = true});
+  EXPECT_EQ(stage->exchange(0, frame_at(0)).size(), 1u) << "the first is waited for";
+  EXPECT_TRUE(stage->exchange(1, frame_at(1)).empty());
+  detector.entered.get_future().wait();
+  for (FrameIndex frame = 2; frame < 6; ++frame) EXPECT_TRUE(stage->exchange(frame, frame_at(frame)).empty());
+  EXPECT_EQ(stage->dropped(), 3u) << "2, 3 and 4 gave way to 5";
+  detector.gate.set_value();
+  std::vector<DueDetections> due;
+  for (FrameIndex frame = 6; due.size() < 2; ++frame)
+    for (DueDetections& d : stage->exchange(frame, frame_at(frame))) due.push_back(std::move(d));
+  EXPECT_EQ(due[0].frame, 1);
+  EXPECT_GE(due[1].frame, 5);
+}
+
+TEST(DetectionStage, EndsWithTheWorkInHandAndDropsTheRest) {
+  ScriptedDetector detector;
+  detector.slow = 1;
+  auto stage = stage_of(detector, {.every = 1, .latency = 5});
+  for (FrameIndex frame = 0; frame < 4; ++frame) stage->exchange(frame, frame_at(frame));
+  detector.entered.get_future().wait();
+  detector.gate.set_value();
+  stage.reset();
+  EXPECT_GE(detector.calls, 2);
+}
+
+TEST(DetectionStage, TellsRateAndCost) {
+  ScriptedDetector detector;
+  const auto stage = stage_of(detector, {.every = 2, .latency = 2});
+  for (FrameIndex frame = 0; frame < 9; ++frame) stage->exchange(frame, frame_at(frame));
+  EXPECT_DOUBLE_EQ(stage->rate_hz(), 0.5) << "stamps a second apart";
+  EXPECT_EQ(stage->take_times().summaries().at("detection").count, 4u) << "of frames 0, 2, 4, 6";
+  EXPECT_TRUE(stage->take_times().summaries().empty()) << "they were taken";
+}
+
+TEST(DetectionStage, WhatDoesNotFitTheImageIsLeftOutWithAWarning) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+  Detections answer;
+  answer.boxes = {{"whole", {10, 20, 30, 40}, 0.5f},  {"beside", {700, 20, 30, 40}, 1}, {"over", {600, 460, 90, 90}, 1},
+                  {"nowhere", {nan, 20, 30, 40}, 1},  {"flat", {10, 20, 0, 40}, 1},     {"endless", {0, 0, infinity, 9}, 1},
+                  {"inside out", {50, 50, -9, 9}, 1}, {"left", {-40, 10, 40, 10}, 1}};
+  answer.mask = GreyImage(320, 240, 255);
+  FixedDetector detector(answer);
+  const auto stage = stage_of(detector, {.every = 1, .latency = 0});
+  const auto due = stage->exchange(0, frame_at(0));
+  ASSERT_EQ(due.size(), 1u);
+  EXPECT_EQ(due[0].detections.boxes,
+            (std::vector<Detection>{{"whole", {10, 20, 30, 40}, 0.5f}, {"over", {600, 460, 40, 20}, 1}}));
+  EXPECT_TRUE(due[0].detections.mask.empty());
+  const auto warnings = stage->take_warnings();
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "the detector: a mask is of 320 x 240 px, the images of 640 x 480; it is left out");
+}
+
+TEST(MakeFit, SaysNothingOfWhatFits) {
+  Detections found;
+  found.boxes = {{"person", {0, 0, 640, 480}, 1}, {"dog", {600, 400, 100, 100}, 1}};
+  found.mask = GreyImage(640, 480);
+  EXPECT_EQ(make_fit(found, 640, 480), "");
+  EXPECT_EQ(found.boxes.size(), 2u);
+  EXPECT_FALSE(found.mask.empty());
+  found.boxes.push_back({"ghost", {0, -10, 5, 10}, 1});
+  EXPECT_EQ(make_fit(found, 640, 480), "a box lies outside the image; it is left out");
+  EXPECT_EQ(found.boxes.size(), 2u);
+}
+
+TEST(DetectionSchedule, IsChecked) {
+  EXPECT_THROW(DetectionSchedule{.every = 0}.check(), InvalidOption);
+  EXPECT_THROW(DetectionSchedule{.latency = -1}.check(), InvalidOption);
+  EXPECT_NO_THROW((DetectionSchedule{.every = 1, .latency = 0}.check()));
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/tracking/tracking_map.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace dkb {
+namespace {
+
+Rigid3 shifted(double x) {
+  return {Eigen::Quaterniond::Identity(), {x, 0, 0}};
+}
+
+// Keyframe 0 at x = 1 m, and keyframe 1 as the root of another map.
+MapView two_roots() {
+  Map map;
+  for (KeyframeId id = 0; id < 2; ++id) {
+    Keyframe k;
+    k.id = id;
+    k.features = std::make_shared<const RgbdFeatures>();
+    k.parent = kNoKeyframe;
+    k.cam_from_world = shifted(1 + id);
+    map.add_keyframe(k);
+  }
+  return map.snapshot();
+}
+
+TEST(TrackingMap, AKeyframeThatWasNeverMadeHasNoPose) {
+  TrackingMap map;
+  EXPECT_FALSE(map.has(0));
+  EXPECT_THROW(map.cam_from_world(0), std::logic_error);
+  EXPECT_THROW(map.root(0), std::logic_error);
+  map.take_view(two_roots());
+  EXPECT_TRUE(map.has(0));
+  EXPECT_THROW(map.cam_from_world(2), std::logic_error);
+  EXPECT_THROW(map.cam_from_world(kNoKeyframe), std::logic_error);
+  EXPECT_THROW(map.root(2), std::logic_error);
+}
+
+TEST(TrackingMap, PendingKeyframesHangOnTheirReferences) {
+  TrackingMap map;
+  map.take_view(two_roots());
+  map.add_pending(2, 0, shifted(10));
+  map.add_pending(3, 2, shifted(100));
+  map.add_pending(4, kNoKeyframe, shifted(7));
+  EXPECT_TRUE(map.has(3));
+  EXPECT_NEAR(map.cam_from_world(2).translation.x(), 11, 1e-12);
+  EXPECT_NEAR(map.cam_from_world(3).translation.x(), 111, 1e-12);
+  EXPECT_NEAR(map.cam_from_world(4).translation.x(), 7, 1e-12);
+  EXPECT_EQ(map.root(3), 0);
+  EXPECT_EQ(map.root(1), 1);
+  EXPECT_EQ(map.root(4), 4);
+}
+
+TEST(TrackingMap, APublishedKeyframeIsPendingNoMore) {
+  TrackingMap map;
+  map.add_pending(0, kNoKeyframe, shifted(5));
+  EXPECT_NEAR(map.cam_from_world(0).translation.x(), 5, 1e-12);
+  map.take_view(two_roots());
+  EXPECT_NEAR(map.cam_from_world(0).translation.x(), 1, 1e-12) << "the map's word counts";
+}
+
+TEST(TrackingMap, ACopyKeepsWhatItKnew) {
+  TrackingMap map;
+  map.add_pending(0, kNoKeyframe, shifted(5));
+  const TrackingMap copy = map;
+  map.take_view(two_roots());
+  EXPECT_NEAR(copy.cam_from_world(0).translation.x(), 5, 1e-12);
+  EXPECT_FALSE(copy.has(1));
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detectors of the user's own, prompt and slow, by the public headers alone.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <future>
+
+#include "library_support.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Gives = DepthDetector::Gives;
+constexpr Gives kGives[] = {Gives::boxes, Gives::masks, Gives::both};
+
+class LibraryDetectors : public ::testing::Test {
+ protected:
+  static constexpr int kEnters = 8;  // the frame from which on somebody is in view
+  static Detectors prompt(Gives gives) {
+    Detectors detectors = Detectors::none();
+    detectors.prompt.push_back(std::make_shared<DepthDetector>(gives));
+    return detectors;
+  }
+  static Detectors slow(std::shared_ptr<Detector> detector, DetectionSchedule schedule = {}) {
+    Detectors detectors = Detectors::none();
+    detectors.slow = std::move(detector);
+    detectors.schedule = schedule;
+    return detectors;
+  }
+  static Detectors slow(Gives gives, DetectionSchedule schedule = {}) {
+    return slow(std::make_shared<DepthDetector>(gives), schedule);
+  }
+  // Every kind of detector, and all together.
+  static std::vector<std::function<Detectors()>> every_kind() {
+    std::vector<std::function<Detectors()>> kinds = {[] { return Detectors::none(); }, [] { return Detectors(); }};
+    for (const Gives gives : kGives) {
+      kinds.push_back([gives] { return prompt(gives); });
+      kinds.push_back([gives] { return slow(gives, {.every = 3, .latency = 2}); });
+    }
+    kinds.push_back([] {
+      Detectors all = slow(Gives::masks, {.every = 4, .latency = 3});
+      all.motion = true;
+      all.prompt.push_back(std::make_shared<DepthDetector>(Gives::boxes));
+      return all;
+    });
+    return kinds;
+  }
+  Slam slam_with(Detectors detectors, Options options = Options()) const {
+    return Slam(world.camera(), options, std::move(detectors), std::make_shared<EveryNth>(3));
+  }
+  static std::vector<Event> warnings_of(Slam& slam) {
+    std::vector<Event> warnings;
+    for (Event& e : slam.take_events())
+      if (e.kind == Event::Kind::warning) warnings.push_back(std::move(e));
+    return warnings;
+  }
+
+  WallWorld world{320, 240};
+  std::vector<Frame> people = world.walk(0, 30, kEnters);
+};
+
+TEST_F(LibraryDetectors, WithoutOneSomebodyGetsIntoTheMap) {
+  Slam slam = slam_with(Detectors::none());
+  run(slam, people);
+  EXPECT_GT(leaked_points(slam), 20);
+}
+
+TEST_F(LibraryDetectors, APromptOneKeepsPeopleOut) {
+  for (const Gives gives : kGives) {
+    Slam slam = slam_with(prompt(gives));
+    int on_mover = 0;
+    for (const Frame& frame : people) {
+      const FrameResult r = slam.process(frame);
+      ASSERT_TRUE(r.tracked());
+      for (const FeatureReport& f : r.features) on_mover += f.reason == FeatureReason::on_mover;
+      if (r.frame == 20) {
+        EXPECT_FALSE(r.mask.empty());
+        EXPECT_EQ(r.detections.empty(), gives == Gives::masks);
+      }
+    }
+    slam.finish();
+    EXPECT_GT(on_mover, 100);
+    EXPECT_EQ(leaked_points(slam), 0);
+    EXPECT_EQ(slam.statistics().detector, "depth");
+    EXPECT_TRUE(warnings_of(slam).empty());
+  }
+}
+
+TEST_F(LibraryDetectors, ASlowOnesMasksCountAsWellAsItsBoxes) {
+  for (const Gives gives : kGives) {
+    Slam slam = slam_with(slow(gives, {.every = 2, .latency = 2}));
+    int masked = 0;
+    for (const Frame& frame : people) masked += !slam.process(frame).mask.empty();
+    slam.finish();
+    EXPECT_GT(masked, 12) << static_cast<int>(gives);
+    EXPECT_EQ(leaked_points(slam), 0) << static_cast<int>(gives);
+    EXPECT_EQ(slam.statistics().detector_latency_frames, 2);
+    EXPECT_NEAR(slam.statistics().detector_rate_hz, 15, 1);
+  }
+}
+
+TEST_F(LibraryDetectors, WhatALateAnswerShowsIsRetracted) {
+  for (const Gives gives : kGives) {
+    // Somebody is in view for up to ten frames, and in keyframes, before the first answer that shows them.
+    Slam slam = slam_with(slow(gives, {.every = 5, .latency = 6}));
+    int leaked_once = 0;
+    for (const Frame& frame : people) {
+      slam.process(frame);
+      leaked_once = std::max(leaked_once, leaked_points(slam));
+    }
+    slam.finish();
+    EXPECT_GT(leaked_once, 0) << static_cast<int>(gives);
+    EXPECT_GT(slam.statistics().points_retracted, 0) << static_cast<int>(gives);
+    EXPECT_EQ(leaked_points(slam), 0) << static_cast<int>(gives);
+  }
+}
+
+TEST_F(LibraryDetectors, AreShownTheImagesOfTheFrame) {
+  int asked = 0;
+  Detectors detectors = Detectors::none();
+  const auto look = std::make_shared<FunctionDetector>([&](const DetectorInput& image) {
+    EXPECT_EQ(image.stamp_ns, people[static_cast<size_t>(asked)].stamp_ns());
+    EXPECT_TRUE(image.colour.empty()) << "a grey camera";
+    EXPECT_EQ(image.grey.format, PixelFormat::grey8);
+    EXPECT_EQ(image.depth.format, PixelFormat::depth_f32);
+    EXPECT_EQ(image.depth.width, 320);
+    ++asked;
+    return Detections();
+  });
+  detectors.prompt.push_back(look);
+  Slam slam = slam_with(detectors);
+  feed(slam, people);
+  EXPECT_EQ(asked, 30);
+}
+
+TEST_F(LibraryDetectors, WhatAPromptOneThrowsIsCountedAndItIsAskedAgain) {
+  for (const bool standard : {true, false}) {
+    Detectors detectors = prompt(Gives::boxes);
+    int calls = 0;
+    detectors.prompt.push_back(std::make_shared<FunctionDetector>([&](const DetectorInput&) -> Detections {
+      if (++calls % 3 == 0) {
+        if (standard) throw std::runtime_error("cable loose");
+        throw 42;
+      }
+      return {};
+    }));
+    Slam slam = slam_with(detectors);
+    for (const Frame& frame : people) EXPECT_TRUE(slam.process(frame).tracked());
+    slam.finish();
+    EXPECT_EQ(calls, 30);
+    const auto warnings = warnings_of(slam);
+    ASSERT_EQ(warnings.size(), 10U);
+    EXPECT_EQ(warnings[0].frame, 2);
+    EXPECT_EQ(warnings[0].text, standard ? "detector function: cable loose"
+                                         : "detector function: it threw something that is no exception");
+    EXPECT_EQ(leaked_points(slam), 0) << "the other one works";
+  }
+}
+
+TEST_F(LibraryDetectors, ASlowOneThatThrowsIsAWarningAndItsBoxesDoNotStay) {
+  DepthDetector eyes(Gives::boxes);
+  int calls = 0;
+  Slam slam = slam_with(slow(std::make_shared<FunctionDetector>([&](const DetectorInput& image) {
+                               if (++calls == 5) throw std::runtime_error("out of memory");
+                               return eyes.detect(image);
+                             }),
+                             {.every = 3, .latency = 2}));
+  for (const Frame& frame : world.walk(0, 40, kEnters)) {
+    const FrameResult r = slam.process(frame);
+    EXPECT_TRUE(r.tracked()) << r.frame;
+    if (r.frame == 12) EXPECT_FALSE(r.detections.empty());
+    if (r.frame > 25) EXPECT_TRUE(r.detections.empty()) << r.frame;
+  }
+  slam.finish();
+  EXPECT_EQ(calls, 5);
+  const auto warnings = warnings_of(slam);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].text, "the detector failed: out of memory; it is not asked again");
+  EXPECT_EQ(warnings[0].frame, 14) << "frame 12's answer, due two frames later";
+  slam.reset();
+  slam.process(people[0]);
+  slam.finish();
+  EXPECT_EQ(calls, 6) << "it is asked again after a reset";
+}
+
+TEST_F(LibraryDetectors, ALiveRunGoesOnBesideOneThatHangs) {
+  std::promise<void> hangs, let_go;
+  int calls = 0;
+  Options live;
+  live.realtime = true;
+  Slam slam = slam_with(slow(std::make_shared<FunctionDetector>([&](const DetectorInput&) {
+                               if (++calls == 2) {
+                                 hangs.set_value();
+                                 let_go.get_future().wait();
+                               }
+                               return Detections();
+                             }),
+                             {.every = 1, .latency = 1}),
+                        live);
+  slam.process(people[0]);
+  slam.process(people[1]);
+  hangs.get_future().wait();
+  for (size_t i = 2; i < people.size(); ++i) EXPECT_TRUE(slam.process(people[i]).tracked());
+  let_go.set_value();
+  slam.finish();
+  EXPECT_EQ(slam.statistics().tracked, 30);
+}
+
+TEST_F(LibraryDetectors, NonsenseIsLeftOutWithAWarning) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Detections nonsense;
+  nonsense.boxes = {{"ghost", {1e9f, 0, 10, 10}, 1}, {"ghost", {nan, nan, nan, nan}, 1}, {"ghost", {9, 9, -3, 4}, 1}};
+  nonsense.mask = GreyImage(7, 5, 255);
+  for (const bool is_slow : {false, true}) {
+    const auto detector = std::make_shared<FunctionDetector>([&](const DetectorInput&) { return nonsense; });
+    Detectors detectors = Detectors::none();
+    if (is_slow)
+      detectors.slow = detector;
+    else
+      detectors.prompt.push_back(detector);
+    Slam slam = slam_with(detectors), without = slam_with(Detectors::none());
+    run(slam, people);
+    run(without, people);
+    EXPECT_GE(warnings_of(slam).size(), 8U);
+    EXPECT_EQ(bytes_of(slam), bytes_of(without)) << "it changed nothing";
+  }
+}
+
+TEST_F(LibraryDetectors, AResetThatFailsIsAnErrorAndTheNextOneMayWork) {
+  bool broken = true;
+  const auto detector = std::make_shared<FunctionDetector>([](const DetectorInput&) { return Detections(); });
+  detector->on_reset = [&] {
+    if (broken) throw std::runtime_error("no such device");
+  };
+  EXPECT_NE(error_of([&] { slam_with(slow(detector)); }).find("no such device"), std::string::npos);
+  broken = false;
+  Slam slam = slam_with(slow(detector));
+  feed(slam, {people[0], people[1]});
+  broken = true;
+  EXPECT_NE(error_of([&] { slam.reset(); }).find("no such device"), std::string::npos);
+  EXPECT_NE(error_of([&] { slam.process(people[2]); }).find("no such device"), std::string::npos);
+  EXPECT_NE(error_of([&] { slam.finish(); }).find("no such device"), std::string::npos);
+  slam.localize_only(false);
+  slam.explain_keyframes(false);
+  EXPECT_EQ(slam.map().point_count(), 0U);
+  EXPECT_TRUE(slam.take_events().size() < 10);
+  broken = false;
+  slam.reset();
+  EXPECT_TRUE(slam.process(people[0]).tracked());
+}
+
+// The faults that a network once had: silent for as many frames as were seen before, and boxes of the old world.
+TEST_F(LibraryDetectors, AfterAResetAllIsAsInAFreshSystem) {
+  int kind = 0;
+  for (const auto& made : every_kind()) {
+    Slam used = slam_with(made()), fresh = slam_with(made());
+    feed(used, world.walk(3, 25, 5));
+    used.reset();
+    EXPECT_EQ(run(used, people), run(fresh, people)) << "kind " << kind;
+    ++kind;
+  }
+}
+
+TEST_F(LibraryDetectors, AfterALoadAllIsAsInAFreshSystem) {
+  const fs::path file = fs::path(::testing::TempDir()) / ("dkb_detectors_" + std::to_string(::getpid()) + ".dkb");
+  Slam mapper = slam_with(Detectors::none());
+  run(mapper, world.walk(0, 8));
+  mapper.save_map(file);
+  int kind = 0;
+  for (const auto& made : every_kind()) {
+    Slam used = slam_with(made()), fresh = slam_with(made());
+    feed(used, world.walk(3, 25, 5));
+    used.load_map(file);
+    fresh.load_map(file);
+    EXPECT_EQ(run(used, people), run(fresh, people)) << "kind " << kind;
+    EXPECT_GT(used.statistics().tracked, 20);
+    ++kind;
+  }
+  fs::remove(file);
+}
+
+TEST_F(LibraryDetectors, AreAskedAndResetAnewInEveryWorld) {
+  const auto detector = std::make_shared<DepthDetector>(Gives::boxes);
+  Slam slam = slam_with(slow(detector, {.every = 5, .latency = 2}));
+  EXPECT_EQ(detector->resets, 1);
+  feed(slam, {people.begin(), people.begin() + 13});
+  slam.reset();
+  EXPECT_EQ(detector->resets, 2);
+  detector->seen.clear();
+  run(slam, {people.begin(), people.begin() + 7});
+  EXPECT_EQ(detector->seen, (std::vector<int64_t>{people[0].stamp_ns(), people[5].stamp_ns()}));
+}
+
+TEST_F(LibraryDetectors, ThreadsDoNotChangeABit) {
+  Options one_thread;
+  one_thread.threaded = false;
+  int kind = 0;
+  for (const auto& made : every_kind()) {
+    Slam with = slam_with(made()), without = slam_with(made(), one_thread);
+    EXPECT_EQ(run(with, people), run(without, people)) << "kind " << kind;
+    ++kind;
+  }
+}
+
+TEST_F(LibraryDetectors, TwoSystemsInOneProcessDoNotKnowOfEachOther) {
+  for (const auto& made : every_kind()) {
+    Slam alone = slam_with(made()), first = slam_with(made()), second = slam_with(made());
+    const std::string expected = feed(alone, people);
+    std::string interleaved;
+    for (size_t i = 0; i < people.size(); ++i) {
+      interleaved += feed(first, {people[i]});
+      if (i % 2 == 0) feed(second, {people[people.size() / 2 + i / 2]});
+    }
+    EXPECT_EQ(interleaved, expected);
+    alone.finish();
+    first.finish();
+    EXPECT_EQ(bytes_of(alone), bytes_of(first));
+  }
+}
+
+}  // namespace
+}  // namespace dkb::test
