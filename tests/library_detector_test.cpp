@@ -170,8 +170,12 @@ TEST_F(LibraryDetectors, ASlowOneThatThrowsIsAWarningAndItsBoxesDoNotStay) {
   for (const Frame& frame : world.walk(0, 40, kEnters)) {
     const FrameResult r = slam.process(frame);
     EXPECT_TRUE(r.tracked()) << r.frame;
-    if (r.frame == 12) EXPECT_FALSE(r.detections.empty());
-    if (r.frame > 25) EXPECT_TRUE(r.detections.empty()) << r.frame;
+    if (r.frame == 12) {
+      EXPECT_FALSE(r.detections.empty());
+    }
+    if (r.frame > 25) {
+      EXPECT_TRUE(r.detections.empty()) << r.frame;
+    }
   }
   slam.finish();
   EXPECT_EQ(calls, 5);

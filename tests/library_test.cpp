@@ -16,9 +16,9 @@ using Kind = Event::Kind;
 
 class Library : public ::testing::Test {
  protected:
-  Library() : folder(fs::path(::testing::TempDir()) /
-                     ("dkb_library_" + std::to_string(::getpid()) +
-                      ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+  Library()
+      : folder(fs::path(::testing::TempDir()) / ("dkb_library_" + std::to_string(::getpid()) +
+                                                 ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
     fs::remove_all(folder);
     fs::create_directories(folder);
   }
@@ -126,7 +126,9 @@ TEST_F(Library, EventsTellWhatHappened) {
     for (const Event& e : slam.take_events()) {
       EXPECT_EQ(e.frame, r.frame);
       EXPECT_EQ(e.stamp_ns, r.stamp_ns);
-      if (e.kind == Kind::keyframe) EXPECT_EQ(e.keyframe, r.reference_keyframe);
+      if (e.kind == Kind::keyframe) {
+        EXPECT_EQ(e.keyframe, r.reference_keyframe);
+      }
       events.push_back(e);
     }
   }
@@ -152,7 +154,8 @@ TEST_F(Library, EventsComeByCallbackByExecutorOrByPolling) {
     polled.process(frame);
     const size_t before = by_callback.size();
     const FrameResult r = called.process(frame);
-    for (size_t i = before; i < by_callback.size(); ++i) EXPECT_EQ(by_callback[i].frame, r.frame) << "before it returns";
+    for (size_t i = before; i < by_callback.size(); ++i)
+      EXPECT_EQ(by_callback[i].frame, r.frame) << "before it returns";
     deferred.process(frame);
   }
   by_polling = polled.take_events();
@@ -303,8 +306,12 @@ TEST_F(Library, AKeyframeRuleOfOnesOwnDecides) {
   for (const Frame& frame : world.walk(0, 13)) {
     const FrameResult r = slam.process(frame);
     EXPECT_EQ(r.keyframe, r.frame % 4 == 0) << r.frame;
-    if (r.frame == 6) EXPECT_EQ(r.keyframe_explanation, "no keyframe: 2 frames");
-    if (r.frame == 8) EXPECT_EQ(r.keyframe_explanation, "keyframe (own): 4 frames");
+    if (r.frame == 6) {
+      EXPECT_EQ(r.keyframe_explanation, "no keyframe: 2 frames");
+    }
+    if (r.frame == 8) {
+      EXPECT_EQ(r.keyframe_explanation, "keyframe (own): 4 frames");
+    }
   }
   EXPECT_EQ(slam.statistics().keyframe_rules.at("own"), 3);
   slam.reset();

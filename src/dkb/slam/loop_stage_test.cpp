@@ -10,19 +10,21 @@
 namespace dkb {
 namespace {
 
+const FrameRate kRate(30);
+
 LoopStageOptions prompt() {
   LoopStageOptions options;
-  options.loop_latency = {3, 0.1};
-  options.global_ba_latency = {5, 0.1};
+  options.loop_latency = {3 / 30.0, 0.1 / 30};
+  options.global_ba_latency = {5 / 30.0, 0.1 / 30};
   return options;
 }
 
 TEST(BackgroundLatency, GrowsWithTheMapInWholeFrames) {
-  const BackgroundLatency latency{10, 0.02};
-  EXPECT_EQ(latency(0), 10);
-  EXPECT_EQ(latency(1), 11);
-  EXPECT_EQ(latency(50), 11);
-  EXPECT_EQ(latency(2000), 50);
+  const BackgroundLatency latency{10 / 30.0, 0.02 / 30};
+  EXPECT_EQ(kRate.frames(latency(0)), 10);
+  EXPECT_EQ(kRate.frames(latency(1)), 11);
+  EXPECT_EQ(kRate.frames(latency(50)), 11);
+  EXPECT_EQ(kRate.frames(latency(2000)), 50);
 }
 
 // A round trip whose loop closes, seen by a stage keyframe by keyframe: what it hands out, frame by frame.
@@ -35,11 +37,11 @@ std::vector<std::pair<FrameIndex, std::shared_ptr<const MapCorrection>>> correct
   for (FrameIndex frame = 0; frame < 80; ++frame) {
     if (frame % 5 == 0 && frame < 40) {
       world.go(1);
-      stage.offer(world.map.snapshot(), frame, false);
+      stage.offer(world.map.snapshot(), frame, kRate, false);
     }
     for (auto& correction : stage.take_due(frame, true)) {
       move_map(world.map, *correction);
-      stage.offer(world.map.snapshot(), frame, false);
+      stage.offer(world.map.snapshot(), frame, kRate, false);
       handed_out.emplace_back(frame, std::move(correction));
     }
   }
@@ -74,7 +76,7 @@ TEST(LoopStage, EndsWithWorkOutstanding) {
   world.go(10);
   LoopStage stage(world.optics(), prompt(), {}, 1, true);
   stage.want_adjustment();
-  stage.offer(world.map.snapshot(), 0, false);
+  stage.offer(world.map.snapshot(), 0, kRate, false);
   EXPECT_FALSE(stage.idle());
 }
 
