@@ -40,7 +40,7 @@ inline ImageView view_of(const cv::Mat& mat) {
 inline cv::Mat mat_of(const ImageView& view) {
   static constexpr int types[] = {CV_8UC3, CV_8UC3, CV_8UC4, CV_8UC4, CV_8UC1, CV_16UC1, CV_32FC1};
   return cv::Mat(view.height, view.width, types[static_cast<int>(view.format)], const_cast<void*>(view.data),
-                 view.stride == 0 ? cv::Mat::AUTO_STEP : view.stride);
+                 view.stride == 0 ? view.row_bytes() : view.stride);
 }
 
 }  // namespace dkb

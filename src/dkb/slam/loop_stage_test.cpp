@@ -10,21 +10,35 @@
 namespace dkb {
 namespace {
 
-const FrameRate kRate(30);
-
 LoopStageOptions prompt() {
   LoopStageOptions options;
-  options.loop_latency = {3 / 30.0, 0.1 / 30};
-  options.global_ba_latency = {5 / 30.0, 0.1 / 30};
+  options.loop_latency = {3.0 / 30, 0.1 / 30};
+  options.global_ba_latency = {5.0 / 30, 0.1 / 30};
   return options;
 }
 
-TEST(BackgroundLatency, GrowsWithTheMapInWholeFrames) {
-  const BackgroundLatency latency{10 / 30.0, 0.02 / 30};
-  EXPECT_EQ(kRate.frames(latency(0)), 10);
-  EXPECT_EQ(kRate.frames(latency(1)), 11);
-  EXPECT_EQ(kRate.frames(latency(50)), 11);
-  EXPECT_EQ(kRate.frames(latency(2000)), 50);
+TEST(BackgroundLatency, GrowsWithTheMapInWholeFramesOfTheCamera) {
+  const BackgroundLatency latency{1.0 / 3, 0.02 / 30};  // [s] ten frames of 30 Hz, and one for 50 keyframes
+  const FrameRate fast(30), slow(10);
+  EXPECT_EQ(fast.frames(latency(0)), 10);
+  EXPECT_EQ(fast.frames(latency(1)), 11);
+  EXPECT_EQ(fast.frames(latency(50)), 11);
+  EXPECT_EQ(fast.frames(latency(2000)), 50);
+  EXPECT_EQ(slow.frames(latency(0)), 4);
+  EXPECT_EQ(slow.frames(latency(2000)), 17);
+}
+
+TEST(FrameRate, IsTheCamerasOrWhatTheFirstFiveStampsSay) {
+  FrameRate known(60), unknown(0);
+  const int64_t stamps[] = {0, 100'000'000, 205'000'000, 300'000'000, 700'000'000, 710'000'000};
+  for (int64_t stamp : stamps) {
+    EXPECT_EQ(unknown.hz(), stamp <= 700'000'000 ? 30 : 10);
+    known.add(stamp);
+    unknown.add(stamp);
+  }
+  EXPECT_EQ(known.hz(), 60);
+  EXPECT_EQ(unknown.hz(), 10) << "a gap and a short interval do not count";
+  EXPECT_EQ(unknown.frames(0.06), 1);
 }
 
 // A round trip whose loop closes, seen by a stage keyframe by keyframe: what it hands out, frame by frame.
@@ -37,11 +51,11 @@ std::vector<std::pair<FrameIndex, std::shared_ptr<const MapCorrection>>> correct
   for (FrameIndex frame = 0; frame < 80; ++frame) {
     if (frame % 5 == 0 && frame < 40) {
       world.go(1);
-      stage.offer(world.map.snapshot(), frame, kRate, false);
+      stage.offer(world.map.snapshot(), frame, FrameRate(30), false);
     }
     for (auto& correction : stage.take_due(frame, true)) {
       move_map(world.map, *correction);
-      stage.offer(world.map.snapshot(), frame, kRate, false);
+      stage.offer(world.map.snapshot(), frame, FrameRate(30), false);
       handed_out.emplace_back(frame, std::move(correction));
     }
   }
@@ -76,7 +90,7 @@ TEST(LoopStage, EndsWithWorkOutstanding) {
   world.go(10);
   LoopStage stage(world.optics(), prompt(), {}, 1, true);
   stage.want_adjustment();
-  stage.offer(world.map.snapshot(), 0, kRate, false);
+  stage.offer(world.map.snapshot(), 0, FrameRate(30), false);
   EXPECT_FALSE(stage.idle());
 }
 
