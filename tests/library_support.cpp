@@ -98,8 +98,8 @@ std::string bytes_of(const Slam& slam) {
     append(out, p.colour);
   }
   const Statistics s = slam.statistics();
-  for (const int n : {s.frames, s.tracked, s.lost, s.relocalisations, s.keyframes, s.keyframes_inserted, s.maps, s.loops,
-                      s.merges, s.points_created, s.points_culled, s.points_fused, s.points_retracted,
+  for (const int n : {s.frames, s.tracked, s.lost, s.relocalisations, s.keyframes, s.keyframes_inserted, s.maps,
+                      s.loops, s.merges, s.points_created, s.points_culled, s.points_fused, s.points_retracted,
                       s.keyframes_culled, static_cast<int>(s.features_removed)})
     out += " " + std::to_string(n);
   return out + "\n";
