@@ -30,7 +30,7 @@ class LibraryThreads : public ::testing::Test {
     return Slam(world.camera(), options, detectors, std::make_shared<EveryNth>(2));
   }
 
-  WallWorld world{160, 120};
+  WallWorld world{136, 100};
   std::vector<Frame> frames = world.walk(0, 24, 6);
   fs::path file;
 };
