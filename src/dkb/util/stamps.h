@@ -12,9 +12,12 @@ namespace dkb {
 
 inline constexpr int64_t kNsPerSecond = 1'000'000'000;
 
-// The double nearest to the stamp, which is what reading its decimals gives: the fraction is exact to 6e-17 s, and no
-// decimal of nine digits lies nearer than that to the middle between two doubles without being one.
+// The double nearest to the stamp, which is what reading its decimals gives. Small stamps take one rounding, that of
+// the division. For larger ones the fraction is exact to 6e-17 s, and from 2^20 s on no decimal of nine digits lies
+// nearer than that to the middle between two doubles without being one.
 inline double seconds_from_ns(int64_t ns) {
+  constexpr int64_t kExact = int64_t{1} << 53;  // whole numbers up to here are doubles
+  if (-kExact <= ns && ns <= kExact) return static_cast<double>(ns) / static_cast<double>(kNsPerSecond);
   const int64_t fraction = ((ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
   return static_cast<double>((ns - fraction) / kNsPerSecond) +
          static_cast<double>(fraction) / static_cast<double>(kNsPerSecond);
