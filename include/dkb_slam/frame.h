@@ -51,7 +51,8 @@ class DKB_SLAM_API Frame {
   int64_t stamp_ns() const { return stamp_ns_; }              ///< of the colour image
   int64_t depth_stamp_ns() const { return depth_stamp_ns_; }  ///< of the depth image
   const std::optional<MotionPrior>& prior() const { return prior_; }
-  void set_prior(const std::optional<MotionPrior>& prior) { prior_ = prior; }
+  /// Throws InputError when one of its numbers is not finite, and leaves the prior as it was.
+  void set_prior(const std::optional<MotionPrior>& prior);
   ImageView colour() const;  ///< rgb8; empty for grey cameras. Valid as long as a copy of the frame lives
   ImageView grey() const;    ///< grey8, likewise
   ImageView depth() const;   ///< depth_f32, likewise

@@ -117,6 +117,11 @@ Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.st
 Frame::Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns)
     : image_(std::move(image)), stamp_ns_(stamp_ns), depth_stamp_ns_(depth_stamp_ns) {}
 
+void Frame::set_prior(const std::optional<MotionPrior>& prior) {
+  if (prior) check_prior(*prior);
+  prior_ = prior;
+}
+
 ImageView Frame::colour() const {
   return image_ == nullptr ? ImageView{} : view_of(image_->colour, PixelFormat::rgb8);
 }

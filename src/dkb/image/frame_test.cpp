@@ -175,7 +175,8 @@ TEST_F(FrameTest, ViewsThatDoNotFitAreRefusedAndNamed) {
   refused([](auto& in) { in.colour.width = kWidth - 1; }, "colour image: it is of 23 x 18 px, the camera of 24 x 18");
   refused([](auto& in) { in.depth.height = 2 * kHeight; }, "depth image: it is of 24 x 36 px");
   refused([](auto& in) { in.colour.width = -kWidth; }, "colour image: it is of -24 x 18 px");
-  refused([](auto& in) { in.colour.stride = 3 * kWidth - 1; }, "colour image: its stride of 71 bytes is less than the 72");
+  refused([](auto& in) { in.colour.stride = 3 * kWidth - 1; },
+          "colour image: its stride of 71 bytes is less than the 72");
   refused([](auto& in) { in.depth.stride = 1; }, "depth image: its stride of 1 bytes");
   refused([](auto& in) { in.colour.format = PixelFormat::depth_u16; }, "colour image: its format is depth_u16");
   refused([](auto& in) { in.depth.format = PixelFormat::grey8; }, "depth image: its format is grey8");
