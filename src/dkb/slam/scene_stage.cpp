@@ -63,6 +63,8 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
       wrong = make_fit(found, camera_.width, camera_.height);
     } catch (const std::exception& e) {
       wrong = e.what();
+    } catch (...) {
+      wrong = "it threw something that is no exception";
     }
     if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
     boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());

@@ -85,6 +85,26 @@ class Slam::Impl {
     start({});
   }
 
+  void throw_failure() const {
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  // What `work` throws ends this world: every call throws it until a new one is begun.
+  template <class Work>
+  auto guarded(const Work& work) {
+    throw_failure();
+    try {
+      return work();
+    } catch (const InputError&) {
+      failure = std::current_exception();
+    } catch (const std::exception& e) {
+      failure = std::make_exception_ptr(InputError(std::string("tracking failed: ") + e.what()));
+    } catch (...) {
+      failure = std::make_exception_ptr(InputError("tracking failed: something was thrown that is no exception"));
+    }
+    std::rethrow_exception(failure);
+  }
+
   void start(Map map) {
     failure = nullptr;
     pipeline.reset();
@@ -93,23 +113,10 @@ class Slam::Impl {
       const std::lock_guard lock(record_mutex);
       record = fresh;
     }
-    pipeline = std::make_unique<Pipeline>(context, *fresh, std::move(map));
+    // What a detector or a rule throws when it begins anew: there is no world until the next attempt.
+    guarded([&] { pipeline = std::make_unique<Pipeline>(context, *fresh, std::move(map)); });
     pipeline->localize_only(localize_only);
     pipeline->explain_keyframes(explain_keyframes);
-  }
-
-  // What `work` throws ends this world: every call throws it until a new one is begun.
-  template <class Work>
-  auto guarded(const Work& work) {
-    if (failure) std::rethrow_exception(failure);
-    try {
-      return work();
-    } catch (const InputError&) {
-      failure = std::current_exception();
-    } catch (const std::exception& e) {
-      failure = std::make_exception_ptr(InputError(std::string("tracking failed: ") + e.what()));
-    }
-    std::rethrow_exception(failure);
   }
 
   MapFileContext map_context() const {
@@ -149,6 +156,7 @@ FrameResult Slam::process(const Frame& frame) {
     result.state = TrackingState::paused;
     return result;
   }
+  impl_->throw_failure();
   impl_->pipeline->check(frame);
   FrameResult result = impl_->guarded([&] { return impl_->pipeline->process(frame); });
   impl_->events.deliver(impl_->pipeline->take_events());
@@ -168,11 +176,11 @@ void Slam::pause(bool on) {
 }
 void Slam::localize_only(bool on) {
   impl_->localize_only = on;
-  impl_->pipeline->localize_only(on);
+  if (impl_->pipeline) impl_->pipeline->localize_only(on);
 }
 void Slam::explain_keyframes(bool on) {
   impl_->explain_keyframes = on;
-  impl_->pipeline->explain_keyframes(on);
+  if (impl_->pipeline) impl_->pipeline->explain_keyframes(on);
 }
 
 void Slam::save_map(const std::filesystem::path& path) const {
@@ -202,6 +210,7 @@ Statistics Slam::statistics() const {
   return impl_->shared_record()->statistics();
 }
 DenseMap Slam::dense_map() const {
+  impl_->throw_failure();
   return impl_->pipeline->dense_map();
 }
 
