@@ -54,7 +54,7 @@ Box WallWorld::card_at(int x) const {
 }
 
 Frame WallWorld::frame(int index, const Look& look) const {
-  constexpr int kBlock = 6;  // [px]
+  constexpr int kBlock = 6, kCardBlock = 12;  // [px]
   const int w = camera_.width, h = camera_.height;
   std::vector<uint8_t> grey(static_cast<size_t>(w * h));
   std::vector<float> depth(grey.size());
@@ -65,7 +65,7 @@ Frame WallWorld::frame(int index, const Look& look) const {
       const bool on_card = card.contains(static_cast<float>(x), static_cast<float>(y));
       int column = x + look.shift;
       if (period_ > 0) column = (column % period_ + period_) % period_;
-      grey[i] = on_card ? block(77, (x - look.card) / kBlock, y / kBlock)
+      grey[i] = on_card ? block(77, (x - look.card) / kCardBlock, y / kCardBlock)
                         : block(look.picture, (column + 100 * kBlock) / kBlock, y / kBlock);
       depth[i] = static_cast<float>(on_card ? kCard : kWall);
     }
@@ -80,7 +80,7 @@ std::vector<Frame> WallWorld::walk(int from, int to, int enters) const {
   std::vector<Frame> frames;
   for (int i = from; i < to; ++i) {
     Look look{.shift = i};
-    if (i >= enters) look.card = -camera_.width / 5 + (i - enters + 1) * camera_.width / 40;
+    if (i >= enters) look.card = -camera_.width / 5 + (i - enters + 1) * camera_.width / 80;
     frames.push_back(frame(i, look));
   }
   return frames;
@@ -98,8 +98,8 @@ std::string bytes_of(const Slam& slam) {
     append(out, p.colour);
   }
   const Statistics s = slam.statistics();
-  for (const int n : {s.frames, s.tracked, s.lost, s.relocalisations, s.keyframes, s.keyframes_inserted, s.maps, s.loops,
-                      s.merges, s.points_created, s.points_culled, s.points_fused, s.points_retracted,
+  for (const int n : {s.frames, s.tracked, s.lost, s.relocalisations, s.keyframes, s.keyframes_inserted, s.maps,
+                      s.loops, s.merges, s.points_created, s.points_culled, s.points_fused, s.points_retracted,
                       s.keyframes_culled, static_cast<int>(s.features_removed)})
     out += " " + std::to_string(n);
   return out + "\n";

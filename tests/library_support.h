@@ -16,9 +16,9 @@ namespace dkb::test {
 class WallWorld {
  public:
   struct Look {
-    int shift = 0;        // [px of the wall] the camera's place
-    int card = -1000;     // [px] left edge of the card in the image; out of sight unless told
-    bool dark = false;    // no picture and no depth
+    int shift = 0;         // [px of the wall] the camera's place
+    int card = -1000;      // [px] left edge of the card in the image; out of sight unless told
+    bool dark = false;     // no picture and no depth
     uint64_t picture = 1;  // on the wall: another number is another place
   };
 
@@ -31,7 +31,8 @@ class WallWorld {
   Frame frame(int index, const Look& look) const;
   // The truth, from the camera of shift 0.
   double camera_x(int shift) const { return shift * kWall / camera_.fx; }
-  // Frames `from` ... `to` - 1: the camera moves by one pixel a frame, and somebody walks through from frame `enters` on.
+  // Frames `from` ... `to` - 1: the camera moves by one pixel a frame, and somebody walks through from frame `enters`
+  // on.
   std::vector<Frame> walk(int from, int to, int enters = 1000000) const;
   Box card_at(int x) const;
 

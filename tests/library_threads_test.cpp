@@ -16,22 +16,21 @@ namespace fs = std::filesystem;
 
 class LibraryThreads : public ::testing::Test {
  protected:
-  LibraryThreads()
-      : file(fs::path(::testing::TempDir()) / ("dkb_threads_" + std::to_string(::getpid()) + ".dkb")) {}
+  LibraryThreads() : file(fs::path(::testing::TempDir()) / ("dkb_threads_" + std::to_string(::getpid()) + ".dkb")) {}
   ~LibraryThreads() override { fs::remove(file); }
   // Every stage has a thread.
   Slam make(int number) const {
     Detectors detectors;
     detectors.motion = number % 2 == 0;
-    detectors.slow = std::make_shared<DepthDetector>(number % 3 == 0 ? DepthDetector::Gives::masks
-                                                                     : DepthDetector::Gives::boxes);
+    detectors.slow =
+        std::make_shared<DepthDetector>(number % 3 == 0 ? DepthDetector::Gives::masks : DepthDetector::Gives::boxes);
     detectors.schedule = {.every = 1 + number % 3, .latency = number % 4};
     Options options;
     options.realtime = number % 5 == 0;
     return Slam(world.camera(), options, detectors, std::make_shared<EveryNth>(2));
   }
 
-  WallWorld world{160, 120};
+  WallWorld world{136, 100};
   std::vector<Frame> frames = world.walk(0, 24, 6);
   fs::path file;
 };
@@ -52,6 +51,7 @@ TEST_F(LibraryThreads, AThousandStartsStopsResetsAndLoads) {
         Slam slam = make(n / 4);
         for (size_t i = first; i < first + static_cast<size_t>(n / 4 % 4); ++i) slam.process(frames[i]);
         if (n % 3 == 0) slam.finish();
+        lasting.reset();
         break;
       }
       case 1:

@@ -94,7 +94,7 @@ TEST_F(SlamTest, AfterAResetTheWorldBeginsAnew) {
 TEST_F(SlamTest, ImagesOfAnotherSizeAreRefusedAndHarmNothing) {
   Slam slam(camera), undisturbed(camera);
   feed(slam, 0, 5);
-  FrameInput input{frames[5].stamp_ns(), frames[5].colour(), frames[5].depth(), -1, {}};
+  FrameInput input{frames[5].stamp_ns(), frames[5].colour(), frames[5].depth(), {}, {}};
   input.colour.height /= 2;
   EXPECT_THROW(slam.process(input), InputError);
   input.colour = frames[5].colour();

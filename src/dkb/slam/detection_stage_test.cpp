@@ -49,7 +49,8 @@ class FixedDetector final : public Detector {
 Frame frame_at(FrameIndex index) {
   auto image = std::make_shared<RgbdImage>();
   image->grey = GreyImage(4, 4);
-  return Frame(std::move(image), 1'000'000'000 * index, 1'000'000'000 * index);
+  const int64_t stamp = int64_t{1'000'000'000} * index;
+  return Frame(std::move(image), stamp, stamp);
 }
 
 struct Mode {
@@ -72,7 +73,7 @@ std::string run(DetectionSchedule schedule, int64_t bad, FrameIndex frames, bool
       for (const DueDetections& due : stage->exchange(frame, frame_at(frame))) {
         log += " <" + std::to_string(due.frame);
         for (const Detection& d : due.detections.boxes) log += "#" + std::to_string(static_cast<int>(d.box.y));
-        EXPECT_EQ(due.stamp_ns, 1'000'000'000 * due.frame);
+        EXPECT_EQ(due.stamp_ns, int64_t{1'000'000'000} * due.frame);
       }
       for (const std::string& warning : stage->take_warnings()) log += " !" + warning;
       log += ";";
@@ -170,8 +171,9 @@ TEST(DetectionStage, TellsRateAndCost) {
 TEST(DetectionStage, WhatDoesNotFitTheImageIsLeftOutWithAWarning) {
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
   Detections answer;
-  answer.boxes = {{"whole", {10, 20, 30, 40}, 0.5f},  {"beside", {700, 20, 30, 40}, 1}, {"over", {600, 460, 90, 90}, 1},
-                  {"nowhere", {nan, 20, 30, 40}, 1},  {"flat", {10, 20, 0, 40}, 1},     {"endless", {0, 0, infinity, 9}, 1},
+  answer.boxes = {{"whole", {10, 20, 30, 40}, 0.5f},  {"beside", {700, 20, 30, 40}, 1},
+                  {"over", {600, 460, 90, 90}, 1},    {"nowhere", {nan, 20, 30, 40}, 1},
+                  {"flat", {10, 20, 0, 40}, 1},       {"endless", {0, 0, infinity, 9}, 1},
                   {"inside out", {50, 50, -9, 9}, 1}, {"left", {-40, 10, 40, 10}, 1}};
   answer.mask = GreyImage(320, 240, 255);
   FixedDetector detector(answer);

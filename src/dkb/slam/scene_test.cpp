@@ -72,11 +72,11 @@ TEST(ReportFeatures, EveryFeatureHasOneStateAndARejectedOneOneReason) {
   const Scene scene = scene_with({kNone, kMoved, kOnMover, kNone, kNone, kNone, kOnMover, kOnMover});
   const UsableFeatures usable = usable_features(scene, 0.2, 500);  // corners 0 2 3 4 5 6 7
   TrackedFrame tracked = tracked_with({0, 1, 2, 3, 4, 5, 6});
-  tracked.points[0] = make_point_id(0, 7);              // corner 0 shows a map point
-  tracked.outlier[2] = 1;                               // corner 3 was matched, and does not fit
+  tracked.points[0] = make_point_id(0, 7);                // corner 0 shows a map point
+  tracked.outlier[2] = 1;                                 // corner 3 was matched, and does not fit
   tracked.odometry[3] = OdometryMatch{{0, 0, 2}, false};  // corner 4 shows a visual-odometry point
-  tracked.points[5] = make_point_id(0, 8);              // corner 6: established, found where a mover is suspected
-  tracked.outlier[6] = 1;                               // corner 7: likewise, but does not fit
+  tracked.points[5] = make_point_id(0, 8);                // corner 6: established, found where a mover is suspected
+  tracked.outlier[6] = 1;                                 // corner 7: likewise, but does not fit
   const auto reports = report_features(scene, usable, tracked);
   ASSERT_EQ(reports.size(), 8U);
   expect_report(reports[0], FeatureState::used, FeatureReason::none);

@@ -115,13 +115,15 @@ TEST_F(RelocaliserTest, IgnoredPointsAreNotMatched) {
   const TestScene scene(700);
   map_scene(scene);
   const auto features = scene.look({}).features;
-  const auto found = relocaliser().find(map, *features, [](PointId id) { return birth_feature(id) % 2 == 0; }, nullptr);
+  const auto found = relocaliser().find(
+      map, *features, [](PointId id) { return birth_feature(id) % 2 == 0; }, nullptr);
   ASSERT_TRUE(found);
   for (PointId p : found->points)
     if (p != kNoPoint) {
       EXPECT_EQ(birth_feature(p) % 2, 1);
     }
-  EXPECT_FALSE(relocaliser().find(map, *features, [](PointId) { return true; }, nullptr));
+  EXPECT_FALSE(relocaliser().find(
+      map, *features, [](PointId) { return true; }, nullptr));
 }
 
 TEST_F(RelocaliserTest, APlaceThatLooksDifferentWhereNothingMatchedIsNotVerified) {

@@ -62,8 +62,7 @@ TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
   const KeyframePacket packet = insert(second);
   EXPECT_GT(packet.new_points.size(), 50u);
   const TrackedFrame third = track(on_path(3));
-  for (size_t i = 0; i < third.points.size(); ++i)
-    EXPECT_FALSE(third.points[i] != kNoPoint && third.odometry[i]);
+  for (size_t i = 0; i < third.points.size(); ++i) EXPECT_FALSE(third.points[i] != kNoPoint && third.odometry[i]);
   EXPECT_GT(third.inliers, second.inliers + 50);
 }
 

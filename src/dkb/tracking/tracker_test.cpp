@@ -174,9 +174,8 @@ TEST_F(TrackerTest, PosesHangOnTheirReferenceKeyframe) {
   EXPECT_EQ(o.reference, 0);
   insert(o);
   o = track(on_path(7));
-  EXPECT_LT(
-      distance_between(o.cam_from_reference * tracker.map().cam_from_world(o.reference), o.cam_from_world),
-      1e-12);
+  EXPECT_LT(distance_between(o.cam_from_reference * tracker.map().cam_from_world(o.reference), o.cam_from_world),
+            1e-12);
 }
 
 TEST_F(TrackerTest, AfterAResetOfMotionTheFrameIsFoundAnew) {
