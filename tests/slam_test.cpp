@@ -128,7 +128,8 @@ TEST_F(SlamTest, ACameraThatCannotBeIsRefused) {
   wrong.k1 = 0.1;
   EXPECT_THROW(Slam slam(wrong), InvalidOption) << "distorted";
   Options options;
-  options.set("features.count", "-5");
+  EXPECT_THROW(options.set("features.count", "-5"), InvalidOption);
+  options.features.count = -5;
   EXPECT_THROW(Slam slam(camera, options), InvalidOption);
 }
 

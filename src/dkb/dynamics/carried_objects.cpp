@@ -70,6 +70,7 @@ std::vector<Detection> CarriedObjects::boxes() const {
 
 // carry() may drop boxes that left the image, so each goes alone and keeps its count of misses.
 void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid) {
+  if (carried_.empty()) mask_ = {};  // what it showed has left the image
   if (past.empty() || carried_.empty()) return;
   const auto moved_points = motions(past.back(), pyramid, boxes());
   const auto carried = [&](const Detections& d) {

@@ -210,7 +210,7 @@ TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
 
 TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   TrackingOptions options;
-  options.new_map_after = 5;
+  options.new_map_after = 3.5 * kFrameTime;  // [s] the fifth lost frame is four later than the first
   tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options, 1);
   publish(start(on_path(0)));
   const TrackedFrame last = track(on_path(1));

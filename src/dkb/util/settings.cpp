@@ -84,7 +84,7 @@ bool parse_number(std::string_view text, int64_t* value) {
 }
 
 bool parse_number(std::string_view text, double* value) {
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   double parsed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
   if (error != std::errc() || end != text.data() + text.size() || text.empty()) return false;
