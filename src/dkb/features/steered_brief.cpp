@@ -88,7 +88,8 @@ std::array<BriefTest, kTests> make_brief_tests() {
 }
 
 SteeredBrief::SteeredBrief(Simd simd) : simd_(simd), offsets_(static_cast<size_t>(kRotations) * 2 * kTests) {
-  const std::array<BriefTest, kTests> tests = make_brief_tests();
+  // Drawn once: it takes longer than a frame, and a describer is made for every frame of a lost camera.
+  static const std::array<BriefTest, kTests> tests = make_brief_tests();
   for (int r = 0; r < kRotations; ++r) {
     const double angle = 2.0 * std::numbers::pi * r / kRotations;
     const double c = std::cos(angle), s = std::sin(angle);
