@@ -31,6 +31,24 @@ std::string empty_depth() {
   return encode_png(Image<uint16_t>(640, 480));
 }
 
+// Limits are per second and due frames follow the camera's rate: a slower camera works as a fast one does, up to the
+// faster motion between its frames.
+TEST(RunCommand, EverySecondOrThirdFrameIsEnough) {
+  for (const size_t step : {1, 2, 3}) {
+    const TempFolder folder;
+    copy_sequence(folder.path(), kSequenceFrames, false);
+    const auto rows = rows_of(folder / "associations.txt");
+    std::string kept;
+    for (size_t i = 0; i < rows.size(); i += step)
+      kept += rows[i][0] + " " + rows[i][1] + " " + rows[i][2] + " " + rows[i][3] + "\n";
+    write_text(folder / "associations.txt", kept);
+    const SlamRun run(folder.path(), folder / "out");
+    ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+    EXPECT_EQ(run.stats["tracked"], (rows.size() + step - 1) / step) << step;
+    EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.005 * static_cast<double>(step)) << step;
+  }
+}
+
 TEST(RunCommand, WritesEveryFileOfTheContract) {
   const TempFolder temp;
   const SlamRun run(sequence(), temp / "out", {"--dump-features"});
