@@ -77,9 +77,10 @@ class BlockFuser {
   BlockFuser(std::span<const PlacedView> views, std::span<const Image<float>> facings, const ViewCamera& camera,
              const SensorNoise& noise, const DenseOptions& options)
       : views_(views), facings_(facings), camera_(camera), options_(options) {
-    const double nearest = sigma(noise, 0.4);
+    // What edges and registration add to a flat wall's noise is left out of the views, or averages out.
+    const double nearest = noise.flat_depth_sigma(0.4);
     for (size_t i = 0; i < weight_of_depth_.size(); ++i) {
-      const double s = nearest / sigma(noise, static_cast<double>(i) * kWeightStep);
+      const double s = nearest / noise.flat_depth_sigma(static_cast<double>(i) * kWeightStep);
       weight_of_depth_[i] = static_cast<float>(s * s);
     }
     for (const PlacedView& v : views) rotations_.push_back(v.cam_from_world.matrix3());
@@ -105,11 +106,6 @@ class BlockFuser {
   };
   static constexpr double kWeightStep = 0.05;  // [m]
   static constexpr float kMinFacing = 0.15F;   // depths of surfaces seen at a flatter angle are not worth much
-
-  // Of one depth on a flat wall: what edges and registration add is left out here or averages out.
-  static double sigma(const SensorNoise& noise, double z) {
-    return noise.depth_sigma_base + noise.depth_sigma_quadratic * (z - 0.4) * (z - 0.4);
-  }
 
   bool visible(const Eigen::Vector3d& centre) const {
     const double radius = 0.87 * options_.voxel * kSide;

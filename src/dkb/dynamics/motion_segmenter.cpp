@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -46,11 +45,13 @@ void clear(Image<float>& image) {
 
 }  // namespace
 
-MotionSegmenter::MotionSegmenter(const CameraModel& camera, const MotionOptions& options)
+MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options)
     : camera_(camera),
+      noise_(noise),
       options_(options),
       rays_(camera, options.cell),
       smoothing_(camera, options.cell, options.smoothing) {
+  noise_.check();
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
     *i = Image<float>(width, height);
@@ -92,13 +93,6 @@ Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
   return rigid3_from_tangent(offset / interval * part);
 }
 
-float MotionSegmenter::tolerance_at(float depth) const {
-  const SensorNoise noise;
-  const auto base = static_cast<float>(options_.tolerance + options_.tolerance_sigmas * noise.depth_sigma_base);
-  const float x = depth - 0.4f;
-  return base + static_cast<float>(options_.tolerance_sigmas * noise.depth_sigma_quadratic) * x * x;
-}
-
 void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
   if (image.depth.width() != camera_.width || image.depth.height() != camera_.height)
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
@@ -110,7 +104,8 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->time = image.depth_timestamp;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
-  for (size_t i = 0; i < tolerance_.size(); ++i) tolerance_.data()[i] = tolerance_at(current_->depth.data()[i]);
+  for (size_t i = 0; i < tolerance_.size(); ++i)
+    tolerance_.data()[i] = static_cast<float>(noise_.surface_tolerance(current_->depth.data()[i]));
   carry_scores();
   for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
   const size_t count = views_.size(), chosen = std::min(count, kViewsPerFrame);
@@ -193,7 +188,8 @@ void MotionSegmenter::compare(MotionDepthGrid& view) {
                 tolerance = tolerance_.data()[i];
     if (!(farthest > 0)) continue;
     if (depth_there + tolerance < nearest) {
-      const float margin = std::max(tolerance, tolerance_at(nearest)) + slope * (farthest - nearest);
+      const float margin =
+          std::max(tolerance, static_cast<float>(noise_.surface_tolerance(nearest))) + slope * (farthest - nearest);
       if (view.depth.data()[at] > 0 && depth_there + margin < nearest) intrusions_.data()[i] += 1.0f;
     } else if (depth_there < farthest + tolerance) {
       float& score_then = view.score.data()[at];

@@ -11,16 +11,15 @@
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/rgbd_image.h"
 
 namespace dkb {
 
 struct MotionOptions {
-  int cell = 4;                 // [px] side of the cells that are judged, 2 ... 32
-  double tolerance = 0.02;      // [m] what poses and calibration may be off in depth, >= 0
-  double tolerance_sigmas = 6;  // standard deviations of the sensor's depth noise on flat walls (SensorNoise), >= 0
-  double memory = 6;            // [s] time constant in which a mover that stands still is forgotten, > 0
-  double threshold = 0.5;       // score from which a cell moves; one frame adds at most 1, (0, 2]
+  int cell = 4;            // [px] side of the cells that are judged, 2 ... 32
+  double memory = 6;       // [s] time constant in which a mover that stands still is forgotten, > 0
+  double threshold = 0.5;  // score from which a cell moves; one frame adds at most 1, (0, 2]
   MotionSmoothingOptions smoothing;
 };
 
@@ -33,7 +32,7 @@ struct MotionOptions {
 // Calls alternate: segment() or observe() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
-  explicit MotionSegmenter(const CameraModel& camera, const MotionOptions& options = {});
+  MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {});
 
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
@@ -56,7 +55,6 @@ class MotionSegmenter {
   };
 
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
-  float tolerance_at(float depth) const;
   void carry_scores();
   void compare(MotionDepthGrid& view);
   void find_openings();
@@ -69,6 +67,7 @@ class MotionSegmenter {
   std::unique_ptr<MotionDepthGrid> take_spare();
 
   CameraModel camera_;
+  SensorNoise noise_;
   MotionOptions options_;
   MotionRays rays_;
   MotionSmoothing smoothing_;

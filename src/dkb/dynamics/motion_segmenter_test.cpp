@@ -106,7 +106,7 @@ Figures judge(const MoverMask& mask, const GreyImage& truth) {
 // Runs frames 0 ... frames - 1 with poses off by 2 mm and 0.1 degrees, and hands each frame's figures to `look`.
 void run(const World& world, int frames, const std::function<std::vector<Panel>(int)>& movers,
          const std::function<void(int, const MoverMask&, const Figures&)>& look, MotionOptions options = {}) {
-  MotionSegmenter segmenter(world.camera, options);
+  MotionSegmenter segmenter(world.camera, {}, options);
   Random random(3);
   for (int f = 0; f < frames; ++f) {
     const Picture p = world.render(f, movers(f));
@@ -203,7 +203,7 @@ TEST(MotionSegmenter, IsNotConfusedByMissingDepth) {
 TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
   // A box comes up to 0.5 m; then its depth is missing but for a rim.
   const World world;
-  MotionSegmenter segmenter(world.camera);
+  MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 45; ++f) {
     const double z = std::max(0.5, 2.0 - 0.05 * f);
     Picture p = world.render(f, {box_at(0, z)});
@@ -223,7 +223,7 @@ TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
 // Missing depth beside a mover, as at the edges of screens: a strip that touches it, and a patch that does not.
 TEST(MotionSegmenter, MissingDepthAloneIsNoMover) {
   const World world;
-  MotionSegmenter segmenter(world.camera);
+  MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 40; ++f) {
     Picture p = world.render(f, {box_at(-1.2 + 0.03 * f)});
     if (f > 25) {
@@ -254,7 +254,7 @@ TEST(MotionSegmenter, GivesNothingOnImagesWithoutDepth) {
 
 TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
   const World world;
-  MotionSegmenter segmenter(world.camera);
+  MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 25; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.05 * f)});
     const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
@@ -270,7 +270,7 @@ TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
 
 TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
   const World world;
-  MotionSegmenter segmenter(world.camera);
+  MotionSegmenter segmenter(world.camera, {});
   const Rigid3 new_from_old(rotation_from_vector({0.1, -0.3, 0.2}), {1, 2, 3});
   for (int f = 0; f < 40; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.04 * f)});
@@ -295,7 +295,7 @@ TEST(MotionSegmenter, GivesTheSameMasksAgain) {
 }
 
 TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
-  MotionSegmenter segmenter(World().camera);
+  MotionSegmenter segmenter(World().camera, {});
   RgbdImage image;
   image.depth = DepthImage(64, 48);
   EXPECT_THROW(segmenter.segment(image, Rigid3()), InputError);

@@ -36,7 +36,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       tracker_(context.camera, options_.noise, options_.features.scale, options_.features.levels, options_.tracking,
                options_.seed),
       decider_(make_decider(context)),
-      scenes_(context.camera, options_.dynamics, context.detectors, options_.pipeline.threaded,
+      scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
       readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
       movers_(context.camera),

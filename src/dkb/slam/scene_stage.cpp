@@ -14,8 +14,8 @@ constexpr int kSupportCell = 4;  // [px] cells of the motion segmentation when i
 
 }  // namespace
 
-SceneStage::SceneStage(const Camera& camera, const DynamicsOptions& options, const Detectors& detectors, bool threaded,
-                       bool realtime)
+SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options,
+                       const Detectors& detectors, bool threaded, bool realtime)
     : camera_(camera),
       options_(options),
       schedule_(detectors.schedule),
@@ -30,7 +30,7 @@ SceneStage::SceneStage(const Camera& camera, const DynamicsOptions& options, con
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
   if (!segments_motion_) options_.motion.cell = kSupportCell;
-  if (segments_motion_ || supports) motion_.emplace(camera, options_.motion);
+  if (segments_motion_ || supports) motion_.emplace(camera, noise, options_.motion);
   for (const auto& detector : prompt_) detector->reset();
   if (slow_ == nullptr) return;
   slow_->reset();

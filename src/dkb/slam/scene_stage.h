@@ -41,8 +41,8 @@ struct FrameOutcome {
 class SceneStage {
  public:
   // `threaded`, `realtime`: of the slow detector.
-  SceneStage(const Camera& camera, const DynamicsOptions& options, const Detectors& detectors, bool threaded,
-             bool realtime);
+  SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options, const Detectors& detectors,
+             bool threaded, bool realtime);
 
   // What the slow detector has due at this frame. It may wait.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
