@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/camera_file.h"
-#include "dkb/dataset/rgbd_reader.h"
-#include "dkb/slam/slam_system.h"
+#include "dkb/slam/frame_rate.h"
+#include "dkb/slam/options.h"
+#include "dkb_slam/source.h"
 #include "frame_times.h"
 
 namespace {
@@ -35,28 +35,28 @@ struct Tracked {
 };
 
 Tracked track(const fs::path& folder, bool loops) {
-  const CameraModel camera = choose_camera("", folder).camera;
-  SlamOptions options;
-  options.loop_closing.loop.enabled = loops;
-  RgbdReader reader(open_tum_dataset(folder).pairs, camera, {}, nullptr);
-  SlamSystem slam(camera, options);
+  const auto source = open_folder(folder);
+  Options options;
+  if (!loops) options.disable("loop");
+  const SlamOptions inner = expand(options);
+  const FrameRate rate(source->camera().fps);
+  Slam slam(source->camera(), options, Detectors::none());
   Tracked out;
   struct Window {
     FrameIndex first, last;
   };
   std::vector<Window> windows;
-  while (const auto frame = reader.next()) {
-    if (!frame->image) continue;
+  for (SourceFrame next = source->next(); next.state != SourceState::ended; next = source->next()) {
+    if (next.state != SourceState::frame) continue;
     FrameResult result;
-    out.times.push_back(timed_frame(slam, frame->image, &result));
-    const SlamStatistics s = slam.statistics();
+    out.times.push_back(timed_frame(slam, next.frame, &result));
+    const Statistics s = slam.statistics();
     if (s.loops + s.merges == out.loops) continue;
     out.loops = s.loops + s.merges;
-    const LoopStageOptions& stage = options.loop_closing;
-    const FrameIndex visible = result.frame + options.pipeline.mapper_latency;
-    windows.push_back(
-        {result.frame - stage.loop_latency(s.keyframes),
-         visible + stage.global_ba_latency(s.keyframes) + options.pipeline.mapper_latency + kFramesAfter});
+    const LoopStageOptions& stage = inner.loop_closing;
+    const FrameIndex mapping = rate.frames(inner.pipeline.mapper_latency);
+    windows.push_back({result.frame - rate.frames(stage.loop_latency(s.keyframes)),
+                       result.frame + 2 * mapping + rate.frames(stage.global_ba_latency(s.keyframes)) + kFramesAfter});
   }
   slam.finish();
   out.corrected.assign(out.times.size(), false);

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dkb/slam/slam_system.h"
+#include "dkb_slam/slam.h"
 #include "figures.h"
 
 namespace dkb {
@@ -23,9 +23,9 @@ struct FrameTime {
   double tracking_ms = 0, cpu_ms = 0;
 };
 
-inline FrameTime timed_frame(SlamSystem& slam, const std::shared_ptr<const RgbdImage>& image, FrameResult* result) {
+inline FrameTime timed_frame(Slam& slam, const Frame& frame, FrameResult* result) {
   const double before = thread_cpu_ms();
-  *result = slam.process(image);
+  *result = slam.process(frame);
   return {result->tracking_ms, thread_cpu_ms() - before};
 }
 

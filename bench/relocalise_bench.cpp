@@ -8,6 +8,7 @@
 // `--elsewhere`, which shows another place with the same camera: there every pose is wrong). Poses are compared with
 // those of the run that made the map; where there is none, with the ground truth, aligned to that run.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -22,8 +23,10 @@
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/evaluation/trajectory_error.h"
-#include "dkb/slam/slam_system.h"
+#include "dkb/image/rgbd_image.h"
 #include "dkb/util/random.h"
+#include "dkb/util/stamps.h"
+#include "dkb_slam/slam.h"
 #include "figures.h"
 
 namespace {
@@ -48,8 +51,9 @@ class Reference {
   Reference(const fs::path& folder, const std::vector<TrajectoryFrame>& frames) {
     Trajectory run;
     for (const TrajectoryFrame& f : frames) {
-      run_[f.timestamp] = f.world_from_cam;
-      run.push_back({f.timestamp, "", f.world_from_cam});
+      const double stamp = seconds_from_ns(f.stamp_ns);
+      run_[stamp] = f.world_from_cam;
+      run.push_back({stamp, "", f.world_from_cam});
     }
     if (!fs::exists(folder / "groundtruth.txt")) return;
     truth_ = read_trajectory(folder / "groundtruth.txt");
@@ -84,19 +88,19 @@ struct Score {
   std::vector<double> search_ms;
 };
 
-std::shared_ptr<const RgbdImage> at_time(const RgbdImage& image, double seconds) {
+Frame at_time(const RgbdImage& image, double seconds) {
   auto copy = std::make_shared<RgbdImage>(image);
   copy->depth_timestamp += seconds - copy->timestamp;
   copy->timestamp = seconds;
-  return copy;
+  return frame_of(std::move(copy));
 }
 
-std::shared_ptr<const RgbdImage> darkness(const CameraModel& camera, double seconds) {
+Frame darkness(const CameraModel& camera, double seconds) {
   auto image = std::make_shared<RgbdImage>();
   image->timestamp = image->depth_timestamp = seconds;
   image->grey = GreyImage(camera.width, camera.height);
   image->depth = DepthImage(camera.width, camera.height);
-  return image;
+  return frame_of(std::move(image));
 }
 
 void measure(const fs::path& folder, const Arguments& arguments) {
@@ -106,19 +110,22 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   const auto share = [&](double percent) {
     return pairs.begin() + static_cast<long>(percent / 100 * static_cast<double>(pairs.size()));
   };
-  SlamSystem mapper(camera);
-  RgbdReader reader({share(arguments.map_from), share(arguments.map_to)}, camera, {}, nullptr);
+  Slam mapper(camera, Options(), Detectors::none());
+  RgbdReader reader({share(arguments.map_from), share(arguments.map_to)}, camera, {});
   while (const auto frame = reader.next())
-    if (frame->image) mapper.process(frame->image);
+    if (frame->image) mapper.process(frame_of(frame->image));
   mapper.finish();
   std::vector<TrajectoryFrame> first_map;
   for (const TrajectoryFrame& f : mapper.trajectory())
     if (f.map == 0) first_map.push_back(f);
   const Reference reference(folder, first_map);
 
-  SlamSystem slam(camera);
-  slam.load(*mapper.map());
-  slam.set_localise_only(true);
+  Slam slam(camera, Options(), Detectors::none());
+  const fs::path file = fs::temp_directory_path() / ("dkb-relocalise-bench-" + std::to_string(getpid()) + ".dkb");
+  mapper.save_map(file);
+  slam.load_map(file);
+  fs::remove(file);
+  slam.localize_only(true);
   const std::vector<DatasetPair> shown =
       arguments.elsewhere.empty() ? pairs : open_tum_dataset(arguments.elsewhere).pairs;
   Random random(1);
@@ -127,7 +134,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   for (int n = 0; n < arguments.kidnaps; ++n) {
     const size_t start = random.below(static_cast<uint32_t>(shown.size() - kFramesShown + 1));
     const auto first = shown.begin() + static_cast<long>(start);
-    RgbdReader frames({first, first + kFramesShown}, camera, {.threaded = false, .probed = 1}, nullptr);
+    RgbdReader frames({first, first + kFramesShown}, camera, {.threaded = false, .probed = 1});
     slam.process(darkness(camera, clock += 1));
     const bool mapped = arguments.elsewhere.empty() && reference.mapped(first->timestamp);
     Score& score = mapped ? inside : outside;
@@ -145,7 +152,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
         wrong = wrong || !arguments.elsewhere.empty();
         continue;
       }
-      const Rigid3 off = truth->inverse() * result.world_from_cam;
+      const Rigid3 off = truth->inverse() * *result.world_from_cam;
       const double cm = 100 * off.translation.norm(), deg = vector_from_rotation(off.rotation).norm() * 180 / M_PI;
       score.centimetres.push_back(cm);
       score.degrees.push_back(deg);

@@ -18,7 +18,6 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
-#include "dkb/slam/slam_system.h"
 #include "dkb/util/files.h"
 #include "frame_times.h"
 
@@ -74,8 +73,8 @@ struct Span {
 void run(const Arguments& arguments) {
   const std::vector<DatasetPair> once = open_tum_dataset(arguments.folder).pairs;
   const CameraModel camera = choose_camera("", arguments.folder).camera;
-  RgbdReader reader(laps_of(once, arguments), camera, {}, nullptr);
-  SlamSystem slam(camera);
+  RgbdReader reader(laps_of(once, arguments), camera, {});
+  Slam slam(camera, Options(), Detectors::none());
   const double start = once.front().timestamp;
   std::string csv = "seconds,keyframes,keyframes_inserted,points,loops,rss_mb,in_use_mb,tracking_p95_ms,cpu_p95_ms\n";
   fmt::print(
@@ -87,13 +86,13 @@ void run(const Arguments& arguments) {
   for (int rows = 1, laps = 1; const auto frame = reader.next();) {
     if (!frame->image) throw std::runtime_error(frame->stamp + ": " + frame->skipped);
     FrameResult result;
-    const FrameTime time = timed_frame(slam, frame->image, &result);
+    const FrameTime time = timed_frame(slam, frame_of(frame->image), &result);
     row.add(time, result);
     lap.add(time, result);
     const bool last = frame->index + 1 == reader.size();
     const double next = (last ? frame->timestamp : reader.pairs()[frame->index + 1].timestamp) - start;
     if (next < rows * kRowSeconds && !last) continue;
-    const SlamStatistics s = slam.statistics();
+    const Statistics s = slam.statistics();
     const double mb = resident_mb(), in_use = in_use_mb();
     csv += fmt::format("{:.0f},{},{},{},{},{:.1f},{:.1f},{:.2f},{:.2f}\n", rows * kRowSeconds, s.keyframes,
                        s.keyframes_inserted, s.map_points, s.loops, mb, in_use, p95(row.times, &FrameTime::tracking_ms),

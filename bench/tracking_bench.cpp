@@ -23,13 +23,15 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/simulator/sequence_writer.h"
-#include "dkb/slam/slam_system.h"
+#include "dkb/slam/options.h"
+#include "dkb/util/stamps.h"
+#include "dkb_slam/slam.h"
 
 namespace {
 
@@ -59,7 +61,7 @@ double peak_mb() {
 double cv_orb_ms(const std::vector<DatasetPair>& pairs, const CameraModel& camera) {
   cv::setNumThreads(1);
   const auto orb = cv::ORB::create(1000);
-  RgbdReader reader(pairs, camera, {}, nullptr);
+  RgbdReader reader(pairs, camera, {});
   double sum = 0;
   int frames = 0;
   while (const auto frame = reader.next()) {
@@ -78,32 +80,31 @@ double cv_orb_ms(const std::vector<DatasetPair>& pairs, const CameraModel& camer
 
 double ape(const Trajectory& truth, const std::vector<TrajectoryFrame>& frames) {
   Trajectory estimate;
-  for (const TrajectoryFrame& f : frames) estimate.push_back({f.timestamp, "", f.world_from_cam});
+  for (const TrajectoryFrame& f : frames) estimate.push_back({seconds_from_ns(f.stamp_ns), "", f.world_from_cam});
   return estimate.size() < 2 ? std::nan("") : evaluate(truth, estimate).ape.translation.rmse;
 }
 
 Measured measure(const fs::path& folder, int seed, const Arguments& arguments) {
-  TumDataset dataset = open_tum_dataset(folder);
-  dataset.pairs.erase(dataset.pairs.begin(),
-                      dataset.pairs.begin() + std::min<long>(seed - 1, static_cast<long>(dataset.pairs.size()) - 1));
-  if (arguments.frames > 0 && dataset.pairs.size() > static_cast<size_t>(arguments.frames))
-    dataset.pairs.resize(static_cast<size_t>(arguments.frames));
-  const CameraModel camera = choose_camera("", folder).camera;
-  SlamOptions options;
+  FolderOptions chosen;
+  chosen.skip_pairs = seed - 1;
+  if (arguments.frames > 0) chosen.max_frames = arguments.frames;
+  FolderSource recorded(folder, chosen);
+  const Camera camera = recorded.camera();
+  Options options;
   options.seed = static_cast<uint64_t>(seed);
-  options.pipeline.realtime = arguments.realtime;
-  RgbdReader reader(dataset.pairs, camera, {}, nullptr);
+  options.realtime = arguments.realtime;
   std::optional<PacedSource> paced;
-  if (arguments.realtime) paced.emplace(reader);
-  SlamSystem slam(camera, options);
-  while (const auto frame = paced ? paced->next() : reader.next())
-    if (frame->image) slam.process(frame->image);
+  if (arguments.realtime) paced.emplace(recorded);
+  Source& source = paced ? static_cast<Source&>(*paced) : recorded;
+  Slam slam(camera, options, Detectors::none());
+  for (SourceFrame next = source.next(); next.state != SourceState::ended; next = source.next())
+    if (next.state == SourceState::frame) slam.process(next.frame);
   slam.finish();
 
   Measured m;
-  const SlamStatistics s = slam.statistics();
+  const Statistics s = slam.statistics();
   m.peak_mb = peak_mb();
-  m.pairs = static_cast<int>(dataset.pairs.size());
+  m.pairs = static_cast<int>(recorded.pairs().size());
   m.tracked = s.tracked;
   m.keyframes = s.keyframes;
   const auto stage = [&](const char* name) { return s.stages.contains(name) ? s.stages.at(name) : StageSummary(); };
@@ -111,13 +112,13 @@ Measured measure(const fs::path& folder, int seed, const Arguments& arguments) {
   m.tracking_p95_ms = stage("tracking").p95_ms;
   m.local_ba_ms = stage("local_ba").mean_ms;
   m.mapping_p95_ms = stage("mapping").p95_ms;
-  m.latency_ms = options.pipeline.mapper_latency * 1000.0 / camera.fps;
+  m.latency_ms = expand(options).pipeline.mapper_latency * 1000.0;
   if (fs::exists(folder / "groundtruth.txt")) {
     const Trajectory truth = read_trajectory(folder / "groundtruth.txt");
     m.ape_final = ape(truth, slam.trajectory());
     m.ape_online = ape(truth, slam.online_trajectory());
   }
-  m.cv_orb_ms = cv_orb_ms(dataset.pairs, camera);
+  m.cv_orb_ms = cv_orb_ms(recorded.pairs(), camera);
   return m;
 }
 
