@@ -32,7 +32,7 @@ struct RunArguments {
   std::string dataset, camera, preset = "default", out;
   std::vector<std::string> set;
   std::string config;
-  FolderOptions folder;
+  SourceOptions folder;
   uint64_t seed = 1;
   bool has_seed = false;
   int threads = 0;
@@ -112,8 +112,8 @@ Options options_of(const RunArguments& args) {
   return options;
 }
 
-FolderOptions folder_options(const RunArguments& args) {
-  FolderOptions folder = args.folder;
+SourceOptions folder_options(const RunArguments& args) {
+  SourceOptions folder = args.folder;
   folder.camera = args.camera;
   folder.threaded = args.threads != 1 || args.realtime;
   // A folder that does not tell its camera takes the map's.

@@ -85,7 +85,7 @@ double ape(const Trajectory& truth, const std::vector<TrajectoryFrame>& frames) 
 }
 
 Measured measure(const fs::path& folder, int seed, const Arguments& arguments) {
-  FolderOptions chosen;
+  SourceOptions chosen;
   chosen.skip_pairs = seed - 1;
   if (arguments.frames > 0) chosen.max_frames = arguments.frames;
   FolderSource recorded(folder, chosen);

@@ -8,13 +8,13 @@
 namespace dkb {
 namespace {
 
-TumDataset selected_pairs(const std::filesystem::path& folder, const FolderOptions& options) {
+TumDataset selected_pairs(const std::filesystem::path& folder, const SourceOptions& options) {
   TumDataset dataset = open_tum_dataset(folder);
   select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &dataset);
   return dataset;
 }
 
-CameraChoice camera_of(const std::filesystem::path& folder, const FolderOptions& options) {
+CameraChoice camera_of(const std::filesystem::path& folder, const SourceOptions& options) {
   const bool told = !options.camera.empty() || std::filesystem::exists(folder / "camera.yaml");
   try {
     return choose_camera(options.camera, folder);
@@ -36,7 +36,7 @@ std::string described(const TumDataset& dataset, const CameraChoice& camera) {
 
 }  // namespace
 
-FolderSource::FolderSource(const std::filesystem::path& folder, const FolderOptions& options)
+FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOptions& options)
     : dataset_(selected_pairs(folder, options)),
       reader_(dataset_.pairs,
               [&] {
@@ -61,7 +61,7 @@ SourceFrame FolderSource::next() {
   return next;
 }
 
-std::unique_ptr<Source> open_folder(const std::filesystem::path& folder, const FolderOptions& options) {
+std::unique_ptr<Source> open_folder(const std::filesystem::path& folder, const SourceOptions& options) {
   return std::make_unique<FolderSource>(folder, options);
 }
 

@@ -10,7 +10,7 @@ namespace dkb {
 // A folder in TUM layout as a source.
 class FolderSource final : public Source {
  public:
-  FolderSource(const std::filesystem::path& folder, const FolderOptions& options);
+  FolderSource(const std::filesystem::path& folder, const SourceOptions& options);
 
   const Camera& camera() const override { return camera_; }
   SourceFrame next() override;
