@@ -8,14 +8,15 @@
 namespace dkb {
 namespace {
 
-TumDataset selected_pairs(const std::filesystem::path& folder, const SourceOptions& options) {
-  TumDataset dataset = open_tum_dataset(folder);
-  select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &dataset);
-  return dataset;
+FolderLayout selected_pairs(const std::filesystem::path& folder, const SourceOptions& options) {
+  FolderLayout layout = open_folder_layout(folder);
+  select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &layout.dataset);
+  return layout;
 }
 
-CameraChoice camera_of(const std::filesystem::path& folder, const SourceOptions& options) {
+CameraChoice camera_of(const std::filesystem::path& folder, const FolderLayout& layout, const SourceOptions& options) {
   const bool told = !options.camera.empty() || std::filesystem::exists(folder / "camera.yaml");
+  if (!told && layout.camera) return *layout.camera;
   try {
     return choose_camera(options.camera, folder);
   } catch (const InputError&) {
@@ -37,16 +38,16 @@ std::string described(const TumDataset& dataset, const CameraChoice& camera) {
 }  // namespace
 
 FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOptions& options)
-    : dataset_(selected_pairs(folder, options)),
-      reader_(dataset_.pairs,
+    : layout_(selected_pairs(folder, options)),
+      reader_(layout_.dataset.pairs,
               [&] {
-                const CameraChoice choice = camera_of(folder, options);
-                description_ = described(dataset_, choice);
+                const CameraChoice choice = camera_of(folder, layout_, options);
+                description_ = described(layout_.dataset, choice);
                 camera_ = choice.camera;
-                if (camera_.fps == 0) camera_.fps = rate_of(dataset_.pairs);
+                if (camera_.fps == 0) camera_.fps = rate_of(layout_.dataset.pairs);
                 return camera_;
               }(),
-              {.threaded = options.threaded}) {}
+              {.threaded = options.threaded, .fit_colour = layout_.fit_colour}) {}
 
 SourceFrame FolderSource::next() {
   SourceFrame next;
@@ -56,7 +57,7 @@ SourceFrame FolderSource::next() {
   next.stamp = std::move(read->stamp);
   next.note = std::move(read->skipped);
   next.state = read->image == nullptr ? SourceState::skipped : SourceState::frame;
-  const DatasetPair& pair = dataset_.pairs[read->index];
+  const DatasetPair& pair = layout_.dataset.pairs[read->index];
   if (read->image != nullptr) next.frame = Frame(std::move(read->image), pair.stamp_ns, pair.depth_stamp_ns);
   return next;
 }

@@ -30,14 +30,14 @@ OpenedImage open_image(const std::filesystem::path& path) {
 }
 
 // What is wrong with the type or the size of an image that may be sound in itself; empty when nothing is.
-std::string mismatch(const OpenedImage& image, bool is_depth, const CameraModel& camera) {
+std::string mismatch(const OpenedImage& image, bool is_depth, const CameraModel& camera, bool any_size) {
   const ImageHeader& h = image.header;
   const std::string other = is_depth ? why_not_depth(h) : why_not_picture(h);
   if (!other.empty())
     return image.name + ": is " + other +
            (is_depth ? "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY"
                      : "; colour images must be PNG or JPEG");
-  if (h.width != camera.width || h.height != camera.height)
+  if (!any_size && (h.width != camera.width || h.height != camera.height))
     return image.name + ": is of " + size_text(h.width, h.height) + " px, the camera of " +
            size_text(camera.width, camera.height) + "; give the camera of this dataset, and depth registered to colour";
   return "";
@@ -95,7 +95,7 @@ void RgbdReader::probe() {
       std::string wrong;
       try {
         const OpenedImage image = open_image(is_depth ? pairs_[i].depth_path : pairs_[i].colour_path);
-        wrong = mismatch(image, is_depth, camera_);
+        wrong = mismatch(image, is_depth, camera_, options_.fit_colour && !is_depth);
         if (!wrong.empty()) decode_any(image, camera_);
       } catch (const InputError& e) {
         wrong.clear();
@@ -123,12 +123,13 @@ RgbdReader::Decoded RgbdReader::decode(size_t index) const {
     image->timestamp = pair.timestamp, image->depth_timestamp = pair.depth_timestamp;
     const auto open = [&](const std::filesystem::path& path, bool is_depth) {
       OpenedImage opened = open_image(path);
-      const std::string wrong = mismatch(opened, is_depth, camera_);
+      const std::string wrong = mismatch(opened, is_depth, camera_, options_.fit_colour && !is_depth);
       if (!wrong.empty()) throw InputError(wrong);
       return opened;
     };
     const OpenedImage colour = open(pair.colour_path, false), depth = open(pair.depth_path, true);
     Picture picture = decode_picture(colour.bytes, colour.name);
+    if (options_.fit_colour) picture = resampled(picture, camera_.width, camera_.height);
     image->grey = std::move(picture.grey), image->colour = std::move(picture.colour);
     image->depth = decode_depth(depth.bytes, depth.name, camera_);
     decoded.image = std::move(image);

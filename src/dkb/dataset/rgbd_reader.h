@@ -19,10 +19,11 @@
 namespace dkb {
 
 struct RgbdReaderOptions {
-  int queue = 4;         // [pairs] decoded ahead of the consumer, 1 ... 1000
-  bool threaded = true;  // false: next() decodes on the caller's thread; the frames are the same
-  int probed = 5;        // [pairs] looked at before the first is handed out, >= 1
-  void check() const;    // throws InvalidOption
+  int queue = 4;            // [pairs] decoded ahead of the consumer, 1 ... 1000
+  bool threaded = true;     // false: next() decodes on the caller's thread; the frames are the same
+  int probed = 5;           // [pairs] looked at before the first is handed out, >= 1
+  bool fit_colour = false;  // colour images of another size are resampled to the camera's, to which depth belongs
+  void check() const;       // throws InvalidOption
 };
 
 // One pair of the dataset, in order, decoded or skipped.

@@ -12,12 +12,12 @@ namespace dkb {
 
 // One colour image and the depth image that goes with it.
 struct DatasetPair {
-  double timestamp = 0;               // [s] of the colour image
-  double depth_timestamp = 0;         // [s] of the depth image
+  double timestamp = 0;                      // [s] of the colour image
+  double depth_timestamp = 0;                // [s] of the depth image
   int64_t stamp_ns = 0, depth_stamp_ns = 0;  // the same, exactly
-  std::string stamp;                  // the colour image's, as written in the list
-  std::string depth_stamp;            // the depth image's
-  std::filesystem::path colour_path;  // list's folder / name in the list
+  std::string stamp;                         // the colour image's, as written in the list
+  std::string depth_stamp;                   // the depth image's
+  std::filesystem::path colour_path;         // list's folder / name in the list
   std::filesystem::path depth_path;
 };
 
@@ -33,11 +33,15 @@ struct TumDataset {
 };
 
 // Reads the lists of a folder in TUM layout (no image is opened): the rows of associations.txt as they are
-// (`rgb_stamp rgb_path depth_stamp depth_path`) when it is there, else rgb.txt and depth.txt (`stamp path`), paired one
-// to one, nearest stamps first. Comments, blank lines and CRLF are fine. Throws InputError with file:line: folder or
-// lists missing or empty; a row malformed, with too few columns, with a stamp that is not finite, repeated or out of
-// order; nothing pairs. In associations.txt depth stamps may repeat.
+// (`rgb_stamp rgb_path depth_stamp depth_path`, or depth first: told by the folders' names) when it is there, else
+// rgb.txt and depth.txt (`stamp path`), paired one to one, nearest stamps first. Comments, blank lines and CRLF are
+// fine. Throws InputError with file:line: folder or lists missing or empty; a row malformed, with too few columns, with
+// a stamp that is not finite, repeated or out of order; nothing pairs. In associations.txt depth stamps may repeat.
 TumDataset open_tum_dataset(const std::filesystem::path& folder, const AssociationOptions& options = {});
+
+// Likewise by two lists of these names alone.
+TumDataset pair_image_lists(const std::filesystem::path& folder, const std::string& colour_list,
+                            const std::string& depth_list, const AssociationOptions& options = {});
 
 // The rows of one list, parsed from text; `name` opens the messages.
 struct ListRow {
