@@ -168,8 +168,8 @@ TEST_F(OniFiles, ARecordingOfOpenNisOwnReadsBack) {
       streams[ready]->readFrame(&frame);
       sent += ready == 0;
     }
-    depth.stop(), colour.stop();
     recorder.stop(), recorder.destroy();
+    depth.stop(), colour.stop();
     int ready = 0;  // the driver's threads go on for an image or two
     OpenNI::waitForAnyStream(streams, 2, &ready, 100);
     depth.destroy(), colour.destroy(), device.close();
