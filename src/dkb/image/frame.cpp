@@ -96,6 +96,23 @@ int bytes_per_pixel(PixelFormat format) {
   return i < std::size(bytes) ? bytes[i] : 0;
 }
 
+MotionPrior joined(const MotionPrior& first, const MotionPrior& second) {
+  MotionPrior sum;
+  sum.previous_from_current = first.previous_from_current * second.previous_from_current;
+  sum.rotation_only = first.rotation_only || second.rotation_only;
+  // A exp(a) B exp(b) = A B exp(Ad a) exp(b) with the adjoint of B's inverse.
+  const Rigid3 inverse = second.previous_from_current.inverse();
+  const Eigen::Matrix3d r = inverse.matrix3();
+  const Eigen::Vector3d& t = inverse.translation;
+  Eigen::Matrix3d cross;
+  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  Matrix6d adjoint = Matrix6d::Zero();
+  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = r;
+  adjoint.topRightCorner<3, 3>() = cross * r;
+  sum.covariance = adjoint * first.covariance * adjoint.transpose() + second.covariance;
+  return sum;
+}
+
 Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.stamp_ns), prior_(input.prior) {
   depth_stamp_ns_ = input.depth_stamp_ns.value_or(stamp_ns_);
   check_view(input.colour, false, camera);
