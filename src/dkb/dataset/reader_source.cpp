@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/reader_source.h"
 
+#include <utility>
+
 #include "dkb/util/stamps.h"
 
 namespace dkb {
@@ -19,9 +21,14 @@ SourceFrame ReaderSource::next() {
   next.stamp = std::move(read->stamp);
   next.note = std::move(read->skipped);
   next.state = read->image == nullptr ? SourceState::skipped : SourceState::frame;
-  if (read->image == nullptr) return next;
-  next.frame = Frame(std::move(read->image), read->stamp_ns, read->depth_stamp_ns);
+  if (read->image != nullptr) next.frame = Frame(std::move(read->image), read->stamp_ns, read->depth_stamp_ns);
   next.frame.set_prior(read->prior);
+  if (next.state == SourceState::skipped) {
+    skipped_.skip(next.frame);
+    next.frame = {};
+  } else {
+    next.frame = std::exchange(skipped_, {}).with_motion(std::move(next.frame));
+  }
   return next;
 }
 

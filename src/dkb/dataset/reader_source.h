@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dkb/dataset/rgbd_reader.h"
+#include "dkb/image/skipped_motion.h"
 #include "dkb_slam/source.h"
 
 namespace dkb {
@@ -29,6 +30,7 @@ class ReaderSource : public Source {
  private:
   Camera camera_;
   std::unique_ptr<RgbdReader> reader_;
+  SkippedMotion skipped_;  // of pairs that could not be read since the last frame
 };
 
 }  // namespace dkb

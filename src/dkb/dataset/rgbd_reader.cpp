@@ -96,14 +96,9 @@ std::optional<DatasetFrame> RgbdReader::read() {
     const std::lock_guard lock(mutex_);
     times_.add("decoding", decoded.ms);
   }
-  // The consumer does not know of skipped pairs: their motion is part of the next frame's.
-  std::optional<MotionPrior> prior = pair.prior;
-  if (skipped_before_)
-    prior = prior && skipped_motion_ ? std::optional(joined(*skipped_motion_, *prior)) : std::nullopt;
-  skipped_before_ = decoded.image == nullptr;
-  skipped_motion_ = skipped_before_ ? prior : std::nullopt;
-  return DatasetFrame{next_index_++,         pair.timestamp,           pair.stamp_ns, pair.depth_stamp_ns,
-                      std::move(pair.stamp), std::move(decoded.image), prior,         std::move(decoded.skipped)};
+  return DatasetFrame{
+      next_index_++,         pair.timestamp,           pair.stamp_ns,         pair.depth_stamp_ns,
+      std::move(pair.stamp), std::move(decoded.image), std::move(pair.prior), std::move(decoded.skipped)};
 }
 
 void RgbdReader::run() {

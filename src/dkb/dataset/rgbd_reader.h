@@ -32,7 +32,7 @@ struct DatasetFrame {
   int64_t stamp_ns = 0, depth_stamp_ns = 0;  // exactly
   std::string stamp;                         // colour, as read
   std::shared_ptr<const RgbdImage> image;    // null when skipped
-  std::optional<MotionPrior> prior;          // of the motion since the last frame that was not skipped
+  std::optional<MotionPrior> prior;          // of the motion since the pair before
   std::string skipped;                       // why, when skipped
 };
 
@@ -74,8 +74,6 @@ class RgbdReader {
   BoundedQueue<DatasetFrame> queue_;
   std::atomic<bool> stopped_{false};
   size_t next_index_ = 0;
-  bool skipped_before_ = false;
-  std::optional<MotionPrior> skipped_motion_;  // through the pairs skipped since the last frame
   mutable std::mutex mutex_;
   StageTimes times_;
   std::exception_ptr failure_;  // of the thread

@@ -10,7 +10,10 @@ namespace dkb {
 namespace {
 
 constexpr size_t kMaxSamples = 20'000;
-constexpr double kFloor[] = {5e-4, 3e-4};  // [m, rad] standard deviation of any motion
+constexpr double kFloor = 1e-3;  // [m, rad] standard deviation of any motion
+// Drift is systematic: over a way of this length its standard deviation is `kDrift` of the way, and over a shorter one
+// more. A sum of independent steps can only grow with the root of the way.
+constexpr double kDrift = 0.01, kDriftLength = 10;  // [m/m, rad/m and rad/rad], [m, rad]
 
 double square(double x) {
   return x * x;
@@ -116,13 +119,13 @@ std::optional<MotionPrior> RecordedMotion::by_poses(int64_t from_ns, int64_t to_
   Matrix6d covariance = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i) {
     const bool rotation = i >= 3;
-    double variance = square(rotation ? 0.01 * (distance + angle) : 0.01 * distance);
+    double variance = square(kDrift) * kDriftLength * (rotation ? distance + angle : distance);
     if (tells(growth[i]))
       variance = growth[i];
     else if (tells(to->twist_variance[i]))
       variance = to->twist_variance[i] * square(duration);
     // Directions that a driver does not know carry huge numbers; a metre and a radian a frame are as good as unknown.
-    covariance(i, i) = std::min(variance, 1.0) + square(kFloor[rotation]);
+    covariance(i, i) = std::min(variance, 1.0) + square(kFloor);
   }
   return in_camera_axes(motion, covariance);
 }
@@ -147,8 +150,7 @@ std::optional<MotionPrior> RecordedMotion::by_rates(int64_t from_ns, int64_t to_
   }
   Matrix6d covariance = Matrix6d::Identity();
   for (int axis = 0; axis < 3; ++axis)
-    covariance(3 + axis, 3 + axis) =
-        std::min(variance[axis] * square(seconds(from_ns, to_ns)), 1.0) + square(kFloor[1]);
+    covariance(3 + axis, 3 + axis) = std::min(variance[axis] * square(seconds(from_ns, to_ns)), 1.0) + square(kFloor);
   MotionPrior prior = in_camera_axes({rotation.normalized(), Eigen::Vector3d::Zero()}, covariance);
   prior.rotation_only = true;
   prior.previous_from_current.translation.setZero();

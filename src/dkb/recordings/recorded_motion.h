@@ -24,10 +24,10 @@ class RecordedMotion {
   void forget_before(int64_t stamp_ns);
 
   // Odometry: the poses at both times, between those of the messages around them. Its covariance is, in each direction,
-  // the growth of the pose's; else, where that tells nothing, the twist's; else 1% of the distance, and 0.01 rad for
-  // each metre and radian; a floor of 0.5 mm and 0.3 mrad is added. Inertial unit: the rotation by the angular rates;
-  // their covariance, or 0.01 rad/s where there is none, times the duration, and the same floor. Nothing when messages
-  // are missing: farther apart than 0.5 s (odometry) or 0.1 s (inertial unit).
+  // the growth of the pose's; else, where that tells nothing, the twist's; else that of a drift of 1% of the way, and
+  // 0.01 rad for each metre and radian, over ten of them; a floor of 1 mm and 1 mrad is added. Inertial unit: the
+  // rotation by the angular rates; their covariance, or 0.01 rad/s where there is none, times the duration, and the
+  // same floor. Nothing when messages are missing: farther apart than 0.5 s (odometry) or 0.1 s (inertial unit).
   std::optional<MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
 
  private:
