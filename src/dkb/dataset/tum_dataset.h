@@ -72,6 +72,7 @@ class PairFilter {
   bool wants(double timestamp);
   // No later pair is wanted.
   bool done() const { return ended_ || (selection_.max_frames && taken_ >= *selection_.max_frames); }
+  int64_t seen() const { return seen_; }
   // Throws InputError, which begins with `name`, when all pairs have been shown and none was wanted.
   void require_any(const std::string& name) const;
 
