@@ -105,9 +105,13 @@ void BagStream::read_index(uint64_t at) {
     const Found found = record_at(at, &record);
     const bool small = found == Found::record && record.data_size <= kMaxConnection;
     const std::string_view data = small ? file_->peek(record.data_at, record.data_size) : std::string_view();
-    if (!small || data.size() < record.data_size) {
-      warnings_.add(file_->name() + ": its index is broken at byte " + std::to_string(at) +
+    const bool cut = found == Found::cut || (small && data.size() < record.data_size);
+    if (!small || cut) {
+      told_cut_ = cut;
+      warnings_.add(file_->name() +
+                    (cut ? ": is cut off in its index" : ": its index is broken at byte " + std::to_string(at)) +
                     "; it is read from front to back");
+      topics_.forget_counts();
       chunks_.clear();  // the rest is not known, so none is passed over
       return;
     }

@@ -206,8 +206,13 @@ std::string compressed(Compression compression, std::string_view bytes) {
 #endif
 #if DKB_HAS_LZ4
   if (compression == Compression::lz4) {
-    packed.resize(LZ4F_compressFrameBound(bytes.size(), nullptr));
-    size = LZ4F_compressFrame(packed.data(), packed.size(), bytes.data(), bytes.size(), nullptr);
+    // Frames as ROS 1 reads them: independent blocks, and a checksum of the content.
+    LZ4F_preferences_t options{};
+    options.frameInfo.blockSizeID = LZ4F_max4MB;
+    options.frameInfo.blockMode = LZ4F_blockIndependent;
+    options.frameInfo.contentChecksumFlag = LZ4F_contentChecksumEnabled;
+    packed.resize(LZ4F_compressFrameBound(bytes.size(), &options));
+    size = LZ4F_compressFrame(packed.data(), packed.size(), bytes.data(), bytes.size(), &options);
     good = !LZ4F_isError(size);
   }
 #endif

@@ -22,6 +22,10 @@ void RecordedTopics::add_count(size_t topic, int64_t count) {
   sum = sum.value_or(0) + count;
 }
 
+void RecordedTopics::forget_counts() {
+  for (RecordedTopic& topic : topics_) topic.count.reset();
+}
+
 void RecordedTopics::select(const std::vector<std::string>& names) {
   selected_.emplace(names.begin(), names.end());
   for (size_t i = 0; i < topics_.size(); ++i) wanted_[i] = selected_->count(topics_[i].name) > 0;
