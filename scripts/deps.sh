@@ -15,6 +15,7 @@ set -euo pipefail
 needed=(
   g++ cmake make ninja-build
   libeigen3-dev libpng-dev libjpeg-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libnanoflann-dev
+  libbz2-dev liblz4-dev libzstd-dev libsqlite3-dev  # recordings
 )
 packages=(
   "${needed[@]}" ccache pkg-config

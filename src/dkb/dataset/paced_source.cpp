@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "dkb/image/skipped_motion.h"
+
 namespace dkb {
 namespace {
 
@@ -14,6 +16,13 @@ PacedSource::Due by_stamps() {
     due = std::chrono::nanoseconds(frame.frame.stamp_ns() - *first);
     return due;
   };
+}
+
+void leave_motion(const SourceFrame& dropped, SourceFrame& next) {
+  if (dropped.state != SourceState::frame || next.state != SourceState::frame) return;
+  SkippedMotion skipped;
+  skipped.skip(dropped.frame);
+  next.frame = skipped.with_motion(std::move(next.frame));
 }
 
 }  // namespace
@@ -75,7 +84,7 @@ void PacedSource::run() {
         }
         last_stamp = stamp;
       }
-      dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame)));
+      dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
     }
   } catch (...) {
     const std::lock_guard lock(mutex_);

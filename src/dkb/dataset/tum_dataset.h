@@ -21,6 +21,9 @@ struct DatasetPair {
   std::filesystem::path depth_path;
 };
 
+// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
+inline constexpr double kStampRounding = 5e-7;
+
 struct AssociationOptions {
   double max_difference = 0.02;  // [s] between the stamps of a pair, > 0
   void check() const;            // throws InvalidOption
@@ -64,6 +67,24 @@ struct DatasetSelection {
   double end = std::numeric_limits<double>::infinity();  // [s] likewise, inclusive, >= start
   std::optional<int64_t> max_frames;                     // pairs counted from start, >= 1
   void check() const;                                    // throws InvalidOption
+};
+
+// The same for pairs that come one by one, colour stamps rising.
+class PairFilter {
+ public:
+  explicit PairFilter(const DatasetSelection& selection) : selection_(selection) { selection_.check(); }
+  bool wants(double timestamp);
+  // No later pair is wanted.
+  bool done() const { return ended_ || (selection_.max_frames && taken_ >= *selection_.max_frames); }
+  int64_t seen() const { return seen_; }
+  // Throws InputError, which begins with `name`, when all pairs have been shown and none was wanted.
+  void require_any(const std::string& name) const;
+
+ private:
+  DatasetSelection selection_;
+  int64_t seen_ = 0, taken_ = 0;
+  double origin_ = 0, last_ = 0;
+  bool ended_ = false;
 };
 // Throws InputError when nothing is left.
 void select_pairs(const DatasetSelection& selection, TumDataset* dataset);

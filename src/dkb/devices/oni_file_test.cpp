@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
-
-#ifdef DKB_TEST_OPENNI2
-#include <OpenNI.h>
-#endif
 
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/dataset/mutation_test_tools.h"
@@ -142,38 +140,14 @@ TEST(OniCodecs, DifferencesRunsAndWholeValuesAreRead) {
   EXPECT_THROW(decode_16z(bytes, 8, false, "x"), InputError);
 }
 
-#ifdef DKB_TEST_OPENNI2
-// Recorded with OpenNI's own library from its dummy driver, and read without it.
+#ifdef DKB_TEST_ONI_RECORDER
+// Recorded with OpenNI's own library from its dummy driver, and read without it. Its recorder hangs now and then, so it
+// runs in a process of its own.
 TEST_F(OniFiles, ARecordingOfOpenNisOwnReadsBack) {
-  using namespace openni;
-  ASSERT_EQ(OpenNI::initialize(), STATUS_OK);
-  int sent = 0;
-  {
-    Device device;
-    VideoStream colour, depth;
-    if (device.open("Dummy") != STATUS_OK) GTEST_SKIP() << "skipped: OpenNI 2 has no dummy driver here";
-    ASSERT_EQ(colour.create(device, SENSOR_COLOR), STATUS_OK);
-    ASSERT_EQ(depth.create(device, SENSOR_DEPTH), STATUS_OK);
-    Recorder recorder;
-    ASSERT_EQ(recorder.create(path.c_str()), STATUS_OK);
-    ASSERT_EQ(recorder.attach(colour), STATUS_OK);
-    ASSERT_EQ(recorder.attach(depth), STATUS_OK);
-    ASSERT_EQ(recorder.start(), STATUS_OK);
-    colour.start(), depth.start();
-    VideoStream* streams[] = {&colour, &depth};
-    for (int i = 0; i < 20; ++i) {
-      int ready = 0;
-      VideoFrameRef frame;
-      ASSERT_EQ(OpenNI::waitForAnyStream(streams, 2, &ready, 2000), STATUS_OK);
-      streams[ready]->readFrame(&frame);
-      sent += ready == 0;
-    }
-    recorder.stop(), recorder.destroy();
-    depth.stop(), colour.stop();
-    int ready = 0;  // the driver's threads go on for an image or two
-    OpenNI::waitForAnyStream(streams, 2, &ready, 100);
-    depth.destroy(), colour.destroy(), device.close();
-  }
+  const std::string command = "timeout 5 " DKB_TEST_ONI_RECORDER " " + path.string();
+  int result = -1;
+  for (int attempt = 0; attempt < 4 && result != 0; ++attempt) result = std::system(command.c_str());
+  if (result != 0) GTEST_SKIP() << "skipped: OpenNI 2 cannot record its dummy here";
   SourceOptions options;
   options.fallback_camera.emplace();
   options.fallback_camera->width = 320, options.fallback_camera->height = 240;
@@ -185,8 +159,7 @@ TEST_F(OniFiles, ARecordingOfOpenNisOwnReadsBack) {
     EXPECT_EQ(f.frame.colour().row(0)[2], 255) << "and its first pixel is blue";
     ++frames;
   }
-  EXPECT_GE(frames, sent - 2);
-  EXPECT_GE(frames, 5);
+  EXPECT_GE(frames, 8);
 }
 #endif
 
