@@ -115,7 +115,8 @@ class RecordingPairWriter final : public PairWriter {
       if (ns < 0 || ns >= int64_t{UINT32_MAX} * kNsPerSecond)
         throw OutputError(name_ + ": the stamp " + stamp_text(ns) + " cannot be written; ROS counts from 1970 to 2106");
     if (!began_)
-      writer_->write(topic(kCameraTopic, "std_msgs/String", true), pair.stamp_ns, encode_string(camera_text_));
+      writer_->write(topic(kCameraTopic, "std_msgs/String", true), std::min(pair.stamp_ns, pair.depth_stamp_ns),
+                     encode_string(camera_text_));
     began_ = true;
     const bool depth_first = pair.depth_stamp_ns < pair.stamp_ns;
     if (depth_first) add_depth(pair);
