@@ -27,13 +27,17 @@ struct MotionPrior {
   Matrix6d covariance = Matrix6d::Identity();  ///< right perturbation, [translation m, rotation rad], camera axes
 };
 
+/// The motion of two priors, one after the other: what a consumer needs that leaves out the frame between them. The
+/// covariances add up, that of the first in the axes of the second.
+DKB_SLAM_API MotionPrior joined(const MotionPrior& first, const MotionPrior& second);
+
 /// A pair of images as the caller has them. The views are read during the call and may be gone after it.
 struct FrameInput {
-  int64_t stamp_ns = 0;  ///< of the colour image, middle of the exposure; rises from frame to frame
-  ImageView colour;      ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
-  ImageView depth;       ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
+  int64_t stamp_ns = 0;   ///< of the colour image, middle of the exposure; rises from frame to frame
+  ImageView colour = {};  ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
+  ImageView depth = {};   ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
   std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image; nothing = the colour image's
-  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion
+  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion since the last frame given
 };
 
 /// A pair of images, checked, copied and never changed again. Copies of it share the images. A frame may be made on
@@ -71,6 +75,7 @@ enum class TrackingState {
   lost,          ///< there is no pose
   relocalised,   ///< found again; the pose is good
   paused,        ///< Slam::pause(true): the frame was not looked at
+  predicted,     ///< the images do not tell; the pose goes on by the motion prior, and the covariance grows
 };
 DKB_SLAM_API const char* name_of(TrackingState state);
 
@@ -141,7 +146,9 @@ struct FrameResult {
   double waiting_ms = 0;                ///< for mapping and the detector; 0 in a real-time run, but for the first frame
 
   /// There is a pose.
-  bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
+  bool tracked() const {
+    return state == TrackingState::tracking || state == TrackingState::relocalised || state == TrackingState::predicted;
+  }
 };
 
 }  // namespace dkb

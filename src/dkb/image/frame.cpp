@@ -2,10 +2,10 @@
 #include "dkb_slam/frame.h"
 
 #include <cmath>
-#include <cstring>
 #include <iterator>
 
 #include "dkb/image/image.h"
+#include "dkb/image/pixel_views.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
@@ -40,42 +40,6 @@ void check_prior(const MotionPrior& prior) {
     throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
 }
 
-ColourImage copy_colour(const ImageView& view) {
-  const bool blue_first = view.format == PixelFormat::bgr8 || view.format == PixelFormat::bgra8;
-  const int step = bytes_per_pixel(view.format);
-  ColourImage image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) {
-    const uint8_t* in = view.row(y);
-    Rgb* out = image.row(y);
-    for (int x = 0; x < view.width; ++x, in += step)
-      out[x] = blue_first ? Rgb{in[2], in[1], in[0]} : Rgb{in[0], in[1], in[2]};
-  }
-  return image;
-}
-
-GreyImage copy_grey(const ImageView& view) {
-  GreyImage image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) std::memcpy(image.row(y), view.row(y), view.row_bytes());
-  return image;
-}
-
-DepthImage copy_depth(const ImageView& view, const Camera& camera) {
-  DepthImage image(view.width, view.height);
-  std::vector<uint16_t> units(view.format == PixelFormat::depth_u16 ? static_cast<size_t>(view.width) : 0);
-  const auto width = static_cast<size_t>(view.width);
-  for (int y = 0; y < view.height; ++y) {  // rows need not be aligned
-    float* out = image.row(y);
-    if (view.format == PixelFormat::depth_u16) {
-      std::memcpy(units.data(), view.row(y), view.row_bytes());
-      depth_from_units(units.data(), width, camera, out);
-    } else {
-      std::memcpy(out, view.row(y), view.row_bytes());
-      depth_from_metres(out, width, camera, out);
-    }
-  }
-  return image;
-}
-
 template <class T>
 ImageView view_of(const Image<T>& image, PixelFormat format) {
   if (image.empty()) return {};
@@ -94,6 +58,23 @@ int bytes_per_pixel(PixelFormat format) {
   static constexpr int bytes[] = {3, 3, 4, 4, 1, 2, 4};
   const auto i = static_cast<size_t>(format);
   return i < std::size(bytes) ? bytes[i] : 0;
+}
+
+MotionPrior joined(const MotionPrior& first, const MotionPrior& second) {
+  MotionPrior sum;
+  sum.previous_from_current = first.previous_from_current * second.previous_from_current;
+  sum.rotation_only = first.rotation_only || second.rotation_only;
+  // A exp(a) B exp(b) = A B exp(Ad a) exp(b) with the adjoint of B's inverse.
+  const Rigid3 inverse = second.previous_from_current.inverse();
+  const Eigen::Matrix3d r = inverse.matrix3();
+  const Eigen::Vector3d& t = inverse.translation;
+  Eigen::Matrix3d cross;
+  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  Matrix6d adjoint = Matrix6d::Zero();
+  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = r;
+  adjoint.topRightCorner<3, 3>() = cross * r;
+  sum.covariance = adjoint * first.covariance * adjoint.transpose() + second.covariance;
+  return sum;
 }
 
 Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.stamp_ns), prior_(input.prior) {
@@ -134,11 +115,6 @@ ImageView Frame::depth() const {
 
 DetectorInput detector_input(const Frame& frame) {
   return {frame.stamp_ns(), frame.colour(), frame.grey(), frame.depth()};
-}
-
-Frame frame_of(std::shared_ptr<const RgbdImage> image) {
-  const int64_t stamp = ns_from_seconds(image->timestamp), depth_stamp = ns_from_seconds(image->depth_timestamp);
-  return Frame(std::move(image), stamp, depth_stamp);
 }
 
 }  // namespace dkb

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -232,6 +233,41 @@ TEST_F(FrameTest, CopiesShareTheImagesAndOutliveTheCallersBuffers) {
   }
   rgb.put(1, 1, Rgb{1, 2, 3});
   EXPECT_EQ(copy.image()->colour(1, 1), before);
+}
+
+TEST(MotionPrior, JoinedOnesAreOneMotionAndItsCovarianceIsThatOfSamples) {
+  const auto small = [](const Vector6d& v) {
+    const Eigen::Vector3d w = v.tail<3>();
+    const double angle = w.norm();
+    return Rigid3(angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, w / angle)) : Eigen::Quaterniond::Identity(),
+                  v.head<3>());
+  };
+  MotionPrior first, second;
+  first.previous_from_current = small((Vector6d() << 0.4, -0.1, 0.7, 0.3, -0.5, 0.2).finished());
+  second.previous_from_current = small((Vector6d() << 1.5, 0.3, -0.6, -0.4, 0.1, 0.6).finished());
+  first.covariance = (Vector6d() << 1, 2, 3, 4, 5, 6).finished().asDiagonal();
+  first.covariance *= 1e-8;
+  second.covariance = Matrix6d::Identity() * 2e-8;
+  const MotionPrior sum = joined(first, second);
+  const Rigid3 expected = first.previous_from_current * second.previous_from_current;
+  EXPECT_LT((sum.previous_from_current.translation - expected.translation).norm(), 1e-12);
+
+  Matrix6d sampled = Matrix6d::Zero();
+  for (int axis = 0; axis < 12; ++axis) {  // the covariance is a sum of what each axis does by itself
+    Vector6d a = Vector6d::Zero(), b = Vector6d::Zero();
+    (axis < 6 ? a[axis] : b[axis - 6]) =
+        std::sqrt(axis < 6 ? first.covariance(axis, axis) : second.covariance(axis - 6, axis - 6));
+    const Rigid3 moved = first.previous_from_current * small(a) * second.previous_from_current * small(b);
+    const Rigid3 error = expected.inverse() * moved;
+    const Eigen::AngleAxisd turn(error.rotation);
+    Vector6d delta;
+    delta << error.translation, turn.angle() * turn.axis();
+    sampled += delta * delta.transpose();
+  }
+  EXPECT_LT((sum.covariance - sampled).norm(), 1e-3 * sampled.norm());
+  EXPECT_FALSE(sum.rotation_only);
+  second.rotation_only = true;
+  EXPECT_TRUE(joined(first, second).rotation_only);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ const char* name_of(FeatureReason reason) {
 }
 
 const char* name_of(TrackingState state) {
-  static constexpr const char* names[] = {"initialising", "tracking", "lost", "relocalised", "paused"};
+  static constexpr const char* names[] = {"initialising", "tracking", "lost", "relocalised", "paused", "predicted"};
   return names[static_cast<size_t>(state)];
 }
 
