@@ -18,6 +18,7 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
+#include "dkb/image/test_frame.h"
 #include "dkb/util/files.h"
 #include "frame_times.h"
 

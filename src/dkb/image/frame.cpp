@@ -117,9 +117,4 @@ DetectorInput detector_input(const Frame& frame) {
   return {frame.stamp_ns(), frame.colour(), frame.grey(), frame.depth()};
 }
 
-Frame frame_of(std::shared_ptr<const RgbdImage> image) {
-  const int64_t stamp = ns_from_seconds(image->timestamp), depth_stamp = ns_from_seconds(image->depth_timestamp);
-  return Frame(std::move(image), stamp, depth_stamp);
-}
-
 }  // namespace dkb
