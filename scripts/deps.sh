@@ -23,6 +23,7 @@ packages=(
   libgtest-dev libbenchmark-dev libceres-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
   libopencv-dnn-dev
+  libopenni2-dev  # optional for users: cameras of that kind
 )
 case "${1:-}" in
   "") ;;

@@ -144,9 +144,9 @@ TEST(OniCodecs, DifferencesRunsAndWholeValuesAreRead) {
 // Recorded with OpenNI's own library from its dummy driver, and read without it. Its recorder hangs now and then, so it
 // runs in a process of its own.
 TEST_F(OniFiles, ARecordingOfOpenNisOwnReadsBack) {
-  const std::string command = "timeout 5 " DKB_TEST_ONI_RECORDER " " + path.string();
+  const std::string command = "timeout 4 " DKB_TEST_ONI_RECORDER " " + path.string();
   int result = -1;
-  for (int attempt = 0; attempt < 4 && result != 0; ++attempt) result = std::system(command.c_str());
+  for (int attempt = 0; attempt < 3 && result != 0; ++attempt) result = std::system(command.c_str());
   if (result != 0) GTEST_SKIP() << "skipped: OpenNI 2 cannot record its dummy here";
   SourceOptions options;
   options.fallback_camera.emplace();

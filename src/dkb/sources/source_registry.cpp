@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/sources/source_registry.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "dkb/devices/fake_device.h"
@@ -102,6 +103,12 @@ std::vector<SourceKind> source_kinds() {
           rosbag2_kind(),
           oni_kind(),
           folder_kind()};
+}
+
+bool is_live(const std::string& where) {
+  const std::vector<SourceKind> kinds = source_kinds();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SourceKind& k) { return k.fits(where); });
+  return kind != kinds.end() && kind->live;
 }
 
 std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options) {
