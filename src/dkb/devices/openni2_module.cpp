@@ -43,26 +43,12 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
     require(depth_.create(device_, openni::SENSOR_DEPTH), "gives no depth");
     choose_modes();
     colour_.setMirroringEnabled(false), depth_.setMirroringEnabled(false);
-    require(colour_.start(), "does not start colour");
-    require(depth_.start(), "does not start depth");
     OpenNI::addDeviceDisconnectedListener(this);
   }
   ~Device() override {
     OpenNI::removeDeviceDisconnectedListener(this);
     colour_frame_.release(), depth_frame_.release();
-    depth_.stop(), colour_.stop();
-    // Threads of some drivers go on for an image or two and must find their stream still there.
-    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
-    for (;;) {
-      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-      openni::VideoStream* streams[] = {&colour_, &depth_};
-      int ready = -1;
-      if (left.count() <= 0 ||
-          OpenNI::waitForAnyStream(streams, 2, &ready, static_cast<int>(left.count())) != openni::STATUS_OK)
-        break;
-      openni::VideoFrameRef frame;
-      streams[ready]->readFrame(&frame);
-    }
+    if (started_) stop();
     depth_.destroy(), colour_.destroy();
     device_.close();
   }
@@ -86,6 +72,12 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
   }
 
   int next(int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth) {
+    // Not before images are wanted: some drivers do not survive being stopped as soon as they are started.
+    if (!started_) {
+      require(colour_.start(), "does not start colour");
+      require(depth_.start(), "does not start depth");
+      started_ = true;
+    }
     openni::VideoStream* streams[] = {&colour_, &depth_};
     int ready = -1;
     const openni::Status status = OpenNI::waitForAnyStream(streams, 2, &ready, timeout_ms);
@@ -103,6 +95,22 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
   }
 
  private:
+  void stop() {
+    depth_.stop(), colour_.stop();
+    // Threads of some drivers go on for an image or two and must find their stream still there.
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
+    for (;;) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+      openni::VideoStream* streams[] = {&colour_, &depth_};
+      int ready = -1;
+      if (left.count() <= 0 ||
+          OpenNI::waitForAnyStream(streams, 2, &ready, static_cast<int>(left.count())) != openni::STATUS_OK)
+        break;
+      openni::VideoFrameRef frame;
+      streams[ready]->readFrame(&frame);
+    }
+  }
+
   // 640 x 480 or what is next to it, at 30 Hz, both of one size.
   void choose_modes() {
     const auto choose = [&](openni::VideoStream& stream, auto fits) {
@@ -151,6 +159,7 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
   openni::VideoStream colour_, depth_;
   openni::VideoFrameRef colour_frame_, depth_frame_;
   std::atomic<bool> gone_{false};
+  bool started_ = false;
 };
 
 int list_devices(char* lines, size_t lines_size, char* error, size_t error_size) {
