@@ -70,12 +70,14 @@ void PacedSource::run() {
   std::optional<Clock::time_point> start;
   std::optional<int64_t> last_stamp;
   try {
-    for (SourceFrame frame = source_.next(); frame.state != SourceState::ended; frame = source_.next()) {
+    for (;;) {
+      SourceFrame frame = source_.next();
       if (const auto due = due_(frame)) {
         if (!start) start = Clock::now() - *due;
         std::unique_lock lock(mutex_);
         if (wake_.wait_until(lock, *start + *due, [&] { return stopped_; })) break;
       }
+      if (frame.state == SourceState::ended) break;
       if (frame.state == SourceState::frame) {
         const int64_t stamp = frame.frame.stamp_ns();
         if (last_stamp && stamp <= *last_stamp) {

@@ -22,7 +22,7 @@ namespace dkb {
 // stamps.
 class PacedSource final : public Source {
  public:
-  // When a frame is to be handed over, counted from the start; nothing = at once.
+  // When a frame, or the end, is to be handed over, counted from the start; nothing = at once.
   using Due = std::function<std::optional<std::chrono::nanoseconds>(const SourceFrame&)>;
 
   // At the pace of the stamps. A pair that cannot be read has none and is told at once.

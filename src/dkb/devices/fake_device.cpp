@@ -90,7 +90,11 @@ class FaultySource final : public Source {
       if (frame.state == SourceState::ended) {
         for (Held& held : held_) ready_.push_back({std::move(held.frame), due_s_});
         held_.clear();
-        if (ready_.empty()) return frame;
+        if (ready_.empty()) {
+          // A camera that is gone has no end before it is back.
+          if (gone_) handed_out_due_s_ = faults_.unplug_at + faults_.unplug_for;
+          return frame;
+        }
         break;
       }
       if (frame.state == SourceState::frame)
@@ -124,7 +128,8 @@ class FaultySource final : public Source {
                swap = random_.uniform() < faults_.swap, late = random_.uniform() < faults_.late,
                stall = random_.uniform() < faults_.stall;
     const int lateness = 3 + static_cast<int>(random_.below(8));
-    if (faults_.unplug_at >= 0 && t >= faults_.unplug_at && t < faults_.unplug_at + faults_.unplug_for) {
+    gone_ = faults_.unplug_at >= 0 && t >= faults_.unplug_at && t < faults_.unplug_at + faults_.unplug_for;
+    if (gone_) {
       if (!unplugged_) {
         SourceFrame gone;
         gone.state = SourceState::unplugged;
@@ -162,7 +167,7 @@ class FaultySource final : public Source {
   std::vector<Held> held_;
   std::optional<int64_t> first_;
   double due_s_ = 0, handed_out_due_s_ = 0, stalled_until_ = 0;
-  bool unplugged_ = false;
+  bool unplugged_ = false, gone_ = false;  // told; now
 };
 
 }  // namespace
