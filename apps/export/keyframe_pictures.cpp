@@ -4,6 +4,8 @@
 #include <map>
 
 #include "dkb/dataset/image_codecs.h"
+#include "dkb/dynamics/mover_mask.h"
+#include "dkb/dynamics/silhouette.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -13,11 +15,15 @@
 namespace dkb {
 namespace {
 
-GreyImage still_world(const FrameResult& result, int width, int height) {
-  GreyImage mask(width, height, 255);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (result.mask.at(static_cast<float>(x), static_cast<float>(y))) mask(x, y) = 0;
+// People who stand still are fit to track by, but no part of the still world: as for the dense map, whoever a detector
+// names is left out.
+GreyImage still_world(const FrameResult& result, const DepthImage& depth) {
+  MoverMask movers = result.mask;
+  unite(movers, silhouettes(depth, result.detections, {}), depth.width(), depth.height());
+  GreyImage mask(depth.width(), depth.height(), 255);
+  for (int y = 0; y < mask.height(); ++y)
+    for (int x = 0; x < mask.width(); ++x)
+      if (movers.at(static_cast<float>(x), static_cast<float>(y))) mask(x, y) = 0;
   return mask;
 }
 
@@ -42,7 +48,7 @@ int write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, Mas
     write_image_file(folder / "images" / picture->second,
                      image.colour.empty() ? encode_png(image.grey) : encode_png(image.colour));
     const std::string mask = picture->second + (names == MaskNames::with_ending ? ".png" : "");
-    write_image_file(folder / "masks" / mask, encode_png(still_world(result, image.grey.width(), image.grey.height())));
+    write_image_file(folder / "masks" / mask, encode_png(still_world(result, image.depth)));
     ++written;
   }
   if (written == 0)
