@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bench/bench_command.h"
+#include "convert_command.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "dkb_slam/version.h"
@@ -66,6 +67,7 @@ int main(int argc, char** argv) {
     dkb::register_eval(app, exit_code);
     dkb::register_simulate(app, exit_code);
     dkb::register_map(app, exit_code);
+    dkb::register_convert(app, exit_code);
     dkb::register_bench(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

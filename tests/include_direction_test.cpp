@@ -115,7 +115,7 @@ TEST(Architecture, TheLibraryNeitherSleepsNorExitsNorTunesForOneMachine) {
 }
 
 TEST(Architecture, EverySourceFileNamesItsLicence) {
-  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake"}) {
+  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "fuzz"}) {
     for (const std::string& file : files_below(folder, {".cpp", ".h", ".txt", ".cmake"})) {
       const std::vector<std::string> lines = read_lines(source_dir() / file);
       EXPECT_TRUE(!lines.empty() && lines[0].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cassert>
 #include <functional>
 #include <map>
 #include <set>
@@ -50,6 +49,11 @@ const std::map<std::string, Definition>& definitions() {
        {"c9a58c1b0b154e0e6da7578cb991d214",
         "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] D\nfloat64[9] K\n"
         "float64[9] R\nfloat64[12] P\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n"}},
+      {"sensor_msgs/Imu",
+       {"6a62c6daae103f4ff57a132d6f95cec2",
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+        "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+        "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"}},
       {"sensor_msgs/PointField",
        {"",
         "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\n"
@@ -64,9 +68,13 @@ const std::map<std::string, Definition>& definitions() {
 
 }  // namespace
 
+bool has_definition(const std::string& type) {
+  const auto found = definitions().find(type);
+  return found != definitions().end() && *found->second.md5sum != '\0';
+}
+
 MessageDefinition message_definition(const std::string& type) {
   const auto& all = definitions();
-  assert(all.count(type) && *all.at(type).md5sum);
   MessageDefinition definition{all.at(type).md5sum, all.at(type).fields};
   std::set<std::string> told = {type};
   const std::function<void(const std::string&)> add_types_in = [&](const std::string& fields) {

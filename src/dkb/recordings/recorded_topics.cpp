@@ -7,6 +7,7 @@ namespace dkb {
 
 std::optional<size_t> RecordedTopics::add(std::string name, std::string type, MessageEncoding encoding) {
   if (const size_t layer = type.find("/msg/"); layer != std::string::npos) type.erase(layer, 4);
+  if (type == "tf/tfMessage") type = "tf2_msgs/TFMessage";  // its older name
   std::vector<size_t>& same = by_name_[{name, type}];
   for (const size_t i : same)
     if (topics_[i].encoding == encoding) return i;

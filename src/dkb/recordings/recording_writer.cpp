@@ -7,6 +7,10 @@
 
 namespace dkb {
 
+bool is_recording_name(const std::filesystem::path& path) {
+  return path.extension() == ".bag" || path.extension() == ".mcap";
+}
+
 std::unique_ptr<RecordingWriter> write_recording(const std::filesystem::path& path, Compression compression) {
   if (path.extension() == ".bag") {
     if (compression == Compression::zstd) throw InvalidOption("compression", "zstd", "none, bz2 or lz4 in a bag");

@@ -28,6 +28,9 @@ class RecordingWriter {
   virtual void close() = 0;
 };
 
+// Whether its ending is .bag or .mcap.
+bool is_recording_name(const std::filesystem::path& path);
+
 // By the ending of `path`: .bag or .mcap. Bags take none, bz2 and lz4; mcap files none, lz4 and zstd.
 std::unique_ptr<RecordingWriter> write_recording(const std::filesystem::path& path,
                                                  Compression compression = Compression::none);

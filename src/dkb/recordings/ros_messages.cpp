@@ -54,9 +54,13 @@ void write_vector(ByteWriter& out, const Eigen::Vector3d& v) {
   for (int i = 0; i < 3; ++i) out.f64(v[i]);
 }
 
+void write_quaternion(ByteWriter& out, const Eigen::Quaterniond& q) {
+  for (int i = 0; i < 4; ++i) out.f64(q.coeffs()[i]);
+}
+
 void write_pose(ByteWriter& out, const PoseMessage& pose) {
   write_vector(out, pose.position);
-  for (int i = 0; i < 4; ++i) out.f64(pose.orientation.coeffs()[i]);
+  write_quaternion(out, pose.orientation);
 }
 
 void write_pose_stamped(ByteWriter& out, const PoseStampedMessage& pose) {
@@ -185,6 +189,18 @@ std::string encode(const OdometryMessage& message) {
   write_f64s(out, message.pose_covariance);
   write_vector(out, message.linear), write_vector(out, message.angular);
   write_f64s(out, message.twist_covariance);
+  return out.take();
+}
+
+std::string encode(const ImuMessage& message) {
+  ByteWriter out;
+  write_header(out, message.header);
+  write_quaternion(out, message.orientation);
+  write_f64s(out, message.orientation_covariance);
+  write_vector(out, message.angular_velocity);
+  write_f64s(out, message.angular_velocity_covariance);
+  write_vector(out, message.linear_acceleration);
+  write_f64s(out, message.linear_acceleration_covariance);
   return out.take();
 }
 

@@ -117,6 +117,7 @@ std::string encode(const ImageMessage& message);
 std::string encode(const CompressedImageMessage& message);
 std::string encode(const CameraInfoMessage& message);
 std::string encode(const OdometryMessage& message);
+std::string encode(const ImuMessage& message);
 std::string encode(const TransformsMessage& message);
 std::string encode(const PoseStampedMessage& message);
 std::string encode(const PathMessage& message);
@@ -128,6 +129,7 @@ struct MessageDefinition {
   std::string md5sum;
   std::string text;  // the fields, and those of the types in them
 };
-MessageDefinition message_definition(const std::string& type);  // "sensor_msgs/Image"; asserts that it is one of ours
+bool has_definition(const std::string& type);                   // "sensor_msgs/Image"
+MessageDefinition message_definition(const std::string& type);  // of one that has_definition()
 
 }  // namespace dkb
