@@ -7,13 +7,13 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "bench/bench_cv_orb.h"
+#include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/map/map_file.h"
@@ -121,17 +121,10 @@ SourceOptions folder_options(const RunArguments& args) {
   return folder;
 }
 
-// Without a filter nothing is to be detected.
 DetectorChoice detector_choice(const RunArguments& args, const Options& options, const FolderSource& source) {
   DetectorChoice choice = args.detection;
   for (const DatasetPair& pair : source.pairs()) choice.stamps_ns.push_back(pair.stamp_ns);
-  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
-  if (options.dynamics.filter != FilterKind::none) return choice;
-  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
-  if (asked_for) choice.masks.clear();
-  choice.kinds = "none";
-  choice.boxes.clear();
-  return choice;
+  return choice_beside(options, args.disable, std::move(choice));
 }
 
 int run(const RunArguments& args) {
