@@ -55,6 +55,10 @@ void register_convert(CLI::App& app, int& exit_code) {
   command->add_option("--camera", source.camera, "camera file or name, where the input does not tell it");
   command->add_option("--compression", arguments->compression,
                       "of a recording: none, lz4, bz2 (bag) or zstd (mcap); default: zstd in mcap files, else lz4");
+  command->add_option("--colour-topic", source.colour_topic,
+                      "recording to folder: colour images, where there are several");
+  command->add_option("--depth-topic", source.depth_topic, "recording to folder: depth images");
+  command->add_option("--info-topic", source.info_topic, "recording to folder: camera info");
   command->add_flag("--raw", arguments->options.raw,
                     "folder to recording: colour as pixels instead of the image files as they are");
   command->callback([arguments, &exit_code] {

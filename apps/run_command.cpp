@@ -6,13 +6,13 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "bench/bench_cv_orb.h"
+#include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
@@ -157,17 +157,10 @@ std::optional<double> cv_orb_of(const RunArguments& args, const Source& source, 
   return measure_cv_orb(*again, static_cast<size_t>(pairs));
 }
 
-// Without a filter nothing is to be detected.
 DetectorChoice detector_choice(const RunArguments& args, const Options& options, const ReaderSource* source) {
   DetectorChoice choice = args.detection;
   if (source != nullptr) choice.stamps_ns = source->stamps_ns();
-  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
-  if (options.dynamics.filter != FilterKind::none) return choice;
-  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
-  if (asked_for) choice.masks.clear();
-  choice.kinds = "none";
-  choice.boxes.clear();
-  return choice;
+  return choice_beside(options, args.disable, std::move(choice));
 }
 
 int run(const RunArguments& args) {

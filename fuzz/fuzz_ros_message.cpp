@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages of every type that is read. The first byte tells the encoding.
+// Messages of every type that is read, and the pixels of images. The first byte tells the encoding.
 #include <cstdint>
 #include <string_view>
 
+#include "dkb/recordings/recorded_image.h"
 #include "dkb/recordings/ros_messages.h"
 #include "dkb/util/errors.h"
 
@@ -19,5 +20,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   attempt(dkb::decode_image), attempt(dkb::decode_compressed_image), attempt(dkb::decode_camera_info);
   attempt(dkb::decode_odometry), attempt(dkb::decode_imu), attempt(dkb::decode_transforms);
   attempt(dkb::decode_string);
+  for (const char* type : {"sensor_msgs/Image", "sensor_msgs/CompressedImage"})
+    attempt([&](std::string_view message, dkb::MessageEncoding laid_out) {
+      const dkb::RecordedImage image = dkb::read_recorded_image(message, type, laid_out, "/image");
+      if (image.content == dkb::ImageContent::colour) dkb::picture_of(image);
+      if (image.content == dkb::ImageContent::depth) dkb::depth_of(image, dkb::Camera());
+    });
   return 0;
 }

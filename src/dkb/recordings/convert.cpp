@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/recordings/convert.h"
 
-#include <set>
+#include <algorithm>
+#include <array>
+#include <optional>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/recordings/depth_registration.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
+#include "dkb/recordings/recorded_image.h"
+#include "dkb/recordings/recording_contents.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
+#include "dkb/recordings/stamp_pairing.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 
@@ -82,15 +88,16 @@ std::optional<std::string> as_ros1(const std::string& type, MessageEncoding enco
 }
 
 // The camera file that goes along: the user's, else the recording's own; empty when there is none.
-std::string camera_text_of(MessageStream& stream, const ConvertOptions& options) {
+std::string camera_text_of(const fs::path& in, const ConvertOptions& options) {
   if (!options.source.camera.empty())
     return camera_text(choose_camera(options.source.camera, {}).camera, options.source.camera, {});
-  const auto texts = stream.metadata();
+  const auto stream = open_messages(in);
+  const auto texts = stream->metadata();
   if (const auto found = texts.find(kCameraText); found != texts.end()) return found->second;
-  stream.select({kCameraTopic});
+  stream->select({kCameraTopic});
   std::string text;
-  if (const auto message = stream.next()) {
-    const RecordedTopic& topic = stream.topics()[message->topic];
+  if (const auto message = stream->next()) {
+    const RecordedTopic& topic = stream->topics()[message->topic];
     if (topic.type == "std_msgs/String") text = decode_string(message->bytes, topic.encoding);
   }
   return text;
@@ -98,7 +105,7 @@ std::string camera_text_of(MessageStream& stream, const ConvertOptions& options)
 
 Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::path& out,
                            const ConvertOptions& options) {
-  const std::string camera = camera_text_of(stream, options);
+  const std::string camera = camera_text_of(in, options);
   const auto writer = write_recording(out, options.compression);
   std::vector<std::optional<size_t>> topics;  // by the stream's
   const auto add_topics = [&] {
@@ -120,7 +127,6 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
   std::optional<size_t> camera_topic;
   if (!camera.empty()) camera_topic = writer->add_topic(kCameraTopic, "std_msgs/String", true);
 
-  stream.rewind();
   Converted converted{0, "messages"};
   while (const auto message = stream.next()) {
     if (camera_topic) writer->write(*camera_topic, message->recorded_ns, encode_string(camera));
@@ -145,6 +151,97 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
   return converted;
 }
 
+// The pairs of a recording, on their way into a folder.
+class PairsToFolder {
+ public:
+  PairsToFolder(const MessageStream& stream, const RecordingContents& contents, PairWriter& writer,
+                const ConvertOptions& options)
+      : contents_(contents), writer_(writer), options_(options) {
+    for (const RecordedTopic& topic : stream.topics()) {
+      if (topic.name == contents.colour.name) encoding_[StampPairing::colour] = topic.encoding;
+      if (topic.name == contents.depth.name) encoding_[StampPairing::depth] = topic.encoding;
+    }
+    if (contents.depth_camera)
+      registration_.emplace(contents.depth_camera->camera, contents.camera, contents.depth_camera->colour_from_depth);
+  }
+
+  void add(StampPairing::Kind kind, const RecordedMessage& message) {
+    try {
+      const int64_t stamp = contents_.stamped ? read(kind, message.bytes).header.stamp_ns : message.recorded_ns;
+      if (!pairing_.add(kind, {stamp, std::string(message.bytes)}))
+        leave_out(topic(kind).name + ": a stamp is not after the one before it");
+    } catch (const InputError& e) {
+      leave_out(e.what());
+    }
+    write();
+  }
+  size_t close() {
+    pairing_.close();
+    write();
+    if (pairing_.unpaired() > 0)
+      options_.warn(std::to_string(pairing_.unpaired()) + " images without a partner of their time are left out");
+    return written_;
+  }
+
+ private:
+  const RecordedImageTopic& topic(StampPairing::Kind kind) const {
+    return kind == StampPairing::colour ? contents_.colour : contents_.depth;
+  }
+  RecordedImage read(StampPairing::Kind kind, std::string_view bytes) const {
+    return read_recorded_image(bytes, topic(kind).type, encoding_[kind], topic(kind).name);
+  }
+  void leave_out(const std::string& why) const { options_.warn(why + "; it is left out"); }
+
+  void write() {
+    while (const auto pair = pairing_.take()) {
+      try {
+        const RecordedImage colour = read(StampPairing::colour, pair->colour.bytes);
+        const Picture picture = picture_of(colour);
+        DepthImage depth = depth_of(read(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
+        if (registration_) depth = registration_->registered(depth);
+        const std::string_view file = colour.compressed ? colour.stored : std::string_view();
+        writer_.add({pair->colour.stamp_ns, pair->depth.stamp_ns, file, &picture, &depth});
+        ++written_;
+      } catch (const OutputError&) {
+        throw;
+      } catch (const InputError& e) {
+        leave_out(e.what());
+      }
+    }
+  }
+
+  const RecordingContents& contents_;
+  PairWriter& writer_;
+  const ConvertOptions& options_;
+  std::array<MessageEncoding, 2> encoding_{};
+  std::optional<DepthRegistration> registration_;
+  StampPairing pairing_;
+  size_t written_ = 0;
+};
+
+Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs::path& out,
+                            const ConvertOptions& options) {
+  std::string text = camera_text_of(in, options);
+  RecordingContents contents = look_into(stream, options.source, in.string());
+  for (const std::string& line : contents.warnings) options.warn(line);
+  if (text.empty()) {
+    if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = 1000;  // as the integers are stored
+    text = contents.camera.to_yaml();
+  }
+  const auto writer = write_pairs(out, contents.camera, text);
+  PairsToFolder pairs(stream, contents, *writer, options);
+  while (const auto message = stream.next()) {
+    const std::string& topic = stream.topics()[message->topic].name;
+    if (topic == contents.colour.name) pairs.add(StampPairing::colour, *message);
+    if (topic == contents.depth.name) pairs.add(StampPairing::depth, *message);
+  }
+  for (const std::string& line : stream.take_warnings()) options.warn(line);
+  const Converted converted{pairs.close(), "pairs"};
+  if (converted.count == 0) throw InputError(in.string() + ": none of its images can be paired and read");
+  writer->close();
+  return converted;
+}
+
 }  // namespace
 
 Converted convert(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
@@ -154,7 +251,8 @@ Converted convert(const fs::path& in, const fs::path& out, const ConvertOptions&
       fs::is_directory(in, error) && (fs::exists(in / "associations.txt", error) || fs::exists(in / "rgb.txt", error));
   if (folder) return convert_folder(in, out, options);
   const auto stream = open_messages(in);
-  return convert_messages(*stream, in, out, options);
+  return is_recording_name(out) ? convert_messages(*stream, in, out, options)
+                                : convert_to_folder(*stream, in, out, options);
 }
 
 }  // namespace dkb
