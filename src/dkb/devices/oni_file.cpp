@@ -60,7 +60,8 @@ class Fields {
     return value;
   }
   std::string text() {
-    const size_t size = std::min<size_t>(take<uint32_t>(), bytes_.size() - at_);
+    const auto claimed = take<uint32_t>();
+    const size_t size = std::min<size_t>(claimed, bytes_.size() - at_);
     std::string text = bytes_.substr(at_, size);
     at_ += size;
     return text.substr(0, text.find('\0'));
