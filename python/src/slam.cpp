@@ -99,7 +99,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
 // Slam with what Python adds: at rest before the interpreter goes, never two feeding threads, events kept for polling.
 class PySlam final : public Closable {
  public:
-  PySlam(const Camera& camera, const py::kwargs& a) {
+  PySlam(const Camera& camera, const py::kwargs& a) : camera_(camera) {
     const Options options = options_of(a);
     Detectors detectors = detectors_of(a, options, camera, interruption_);
     const py::gil_scoped_release released;
@@ -113,6 +113,7 @@ class PySlam final : public Closable {
     const py::gil_scoped_release released;  // its threads may wait for the GIL, and it waits for them
     ended.reset();
   }
+  const Camera& camera() const { return camera_; }
   bool closed() const { return slam_ == nullptr; }
 
   // Work of the feeding thread, without the GIL.
@@ -146,11 +147,11 @@ class PySlam final : public Closable {
       given = frame_or_stamp.cast<const PyFrame&>();
       if (!prior.is_none()) given.frame.set_prior(prior_of(prior));
     } else {
-      given = frame_from_arguments(slam_->camera(), frame_or_stamp, rgb, depth, prior, depth_stamp_ns, bgr);
+      given = frame_from_arguments(camera_, frame_or_stamp, rgb, depth, prior, depth_stamp_ns, bgr);
     }
     PyResult result;
     feed([&](Slam& slam) {
-      result = {slam.process(given.frame), slam.camera().width, slam.camera().height};
+      result = {slam.process(given.frame), camera_.width, camera_.height};
       if (result.r.state == TrackingState::paused) return;
       stamps_.resize(static_cast<size_t>(result.r.frame));
       stamps_.push_back(std::move(given.stamp));
@@ -191,6 +192,7 @@ class PySlam final : public Closable {
     if (events_.size() > 10000) events_.pop_front();
   }
 
+  const Camera camera_;
   std::shared_ptr<Slam> slam_;  // null when closed
   std::mutex feeding_;
   std::shared_ptr<Interruption> interruption_ = std::make_shared<Interruption>();
@@ -286,10 +288,8 @@ py::dict statistics(const PySlam& slam) {
 std::string repr_of(const PySlam& slam) {
   if (slam.closed()) return "Slam(closed)";
   const Statistics s = statistics_of(slam);
-  Camera camera;
-  slam.run([&](Slam& inner) { camera = inner.camera(); });
-  return fmt::format("Slam({} x {} px, {} of {} frames tracked, {} keyframes, {} map points)", camera.width,
-                     camera.height, s.tracked, s.frames, s.keyframes, s.map_points);
+  return fmt::format("Slam({} x {} px, {} of {} frames tracked, {} keyframes, {} map points)", slam.camera().width,
+                     slam.camera().height, s.tracked, s.frames, s.keyframes, s.map_points);
 }
 
 DenseMap dense_map(PySlam& slam) {
@@ -380,13 +380,7 @@ have worlds of their own. online: as each frame was published.)")
            "events() -> list[Event]\n\nWhat happened since the last call, oldest first; at most the newest 10,000.")
       .def("statistics", &statistics, "statistics() -> dict\n\nWhat has happened since the world began; times in [ms].")
       .def_property_readonly(
-          "camera",
-          [](const PySlam& slam) {
-            Camera camera;
-            slam.run([&](Slam& s) { camera = s.camera(); });
-            return camera;
-          },
-          "Camera: as given.")
+          "camera", [](const PySlam& slam) { return Camera(slam.camera()); }, "Camera: as given.")
       .def(
           "config_yaml",
           [](const PySlam& slam) {

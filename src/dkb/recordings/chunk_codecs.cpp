@@ -191,7 +191,7 @@ ChunkState load_chunk(const RecordingFile& file, Compression compression, uint64
           "it holds " + std::to_string(out->size) + " bytes where " + std::to_string(size) + " are announced"};
 }
 
-std::string compressed(Compression compression, std::string_view bytes) {
+std::string compressed([[maybe_unused]] Compression compression, [[maybe_unused]] std::string_view bytes) {
   std::string packed;
   size_t size = 0;
   bool good = false;

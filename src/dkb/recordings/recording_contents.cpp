@@ -201,12 +201,18 @@ class Chooser {
     }
     if (motion.name.empty()) return;
     const std::string body = frame_name((motion.inertial ? survey_.inertial : survey_.odometries).at(motion.name));
-    if (const auto body_from_cam = survey_.transforms.find(body, made_.colour.frame_id))
+    const std::string unlinked = name_ + ": /tf_static does not link the frame of " + motion.name + " (" + body +
+                                 ") with the camera's (" + made_.colour.frame_id + "); ";
+    if (const auto body_from_cam = survey_.transforms.find(body, made_.colour.frame_id)) {
       motion.body_from_cam = *body_from_cam;
-    else
-      made_.warnings.push_back(name_ + ": /tf_static does not link the frame of " + motion.name + " (" + body +
-                               ") with the camera's (" + made_.colour.frame_id +
-                               "); the motion is taken for the camera's own; leave it out with --prior none");
+    } else if (prior == PriorKind::automatic && options_.odom_topic.empty() && options_.imu_topic.empty()) {
+      // A body's axes seldom are the camera's: such a prior would mislead.
+      made_.warnings.push_back(unlinked + "the motion is left out; --prior " + (motion.inertial ? "imu" : "odom") +
+                               " takes it for the camera's own");
+      return;
+    } else {
+      made_.warnings.push_back(unlinked + "the motion is taken for the camera's own");
+    }
     made_.motion = motion;
   }
 

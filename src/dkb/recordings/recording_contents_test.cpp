@@ -219,14 +219,17 @@ TEST_F(MotionOfARecording, IsTakenWithThePlaceOfTheCamera) {
   EXPECT_FALSE(contents_of(list, with(PriorKind::none)).motion);
 }
 
-TEST_F(MotionOfARecording, WithoutThePlaceOfTheCameraIsTakenForItsOwnAndTold) {
-  const RecordingContents contents = contents_of(list);
-  ASSERT_TRUE(contents.motion);
-  EXPECT_EQ(contents.motion->body_from_cam.translation.norm(), 0);
-  EXPECT_EQ(contents.warnings,
-            std::vector<std::string>{"r.bag: /tf_static does not link the frame of /odom (base) with the camera's "
-                                     "(camera); the motion is taken for the camera's own; leave it out with --prior "
-                                     "none"});
+TEST_F(MotionOfARecording, WithoutThePlaceOfTheCameraIsTakenForItsOwnOnlyWhenAskedFor) {
+  const std::string unlinked =
+      "r.bag: /tf_static does not link the frame of /odom (base) with the camera's (camera); the motion is ";
+  const RecordingContents by_itself = contents_of(list);
+  EXPECT_FALSE(by_itself.motion);
+  EXPECT_EQ(by_itself.warnings,
+            std::vector<std::string>{unlinked + "left out; --prior odom takes it for the camera's own"});
+  const RecordingContents asked = contents_of(list, with(PriorKind::odometry));
+  ASSERT_TRUE(asked.motion);
+  EXPECT_EQ(asked.motion->body_from_cam.translation.norm(), 0);
+  EXPECT_EQ(asked.warnings, std::vector<std::string>{unlinked + "taken for the camera's own"});
 }
 
 TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
