@@ -328,7 +328,8 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 }
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
-  if (tracked.starts_map) note(Event::Kind::new_map);
+  // Where a prior tells how the camera came there, the old map goes on.
+  if (tracked.starts_map && !tracked.predicted_cam_from_world) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
