@@ -186,6 +186,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = kMatchRatio;

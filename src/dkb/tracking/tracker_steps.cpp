@@ -37,6 +37,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = 0.9f;
