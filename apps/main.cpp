@@ -54,7 +54,15 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     return "unknown command \"" + rest.front() + "\"" + dkb::did_you_mean(rest.front(), known) + help;
   }
   if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
-  return error.what() + help;
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !below.empty()) {
+    std::string commands;
+    for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
+    return "a command is missing: " + commands + help;
+  }
+  const std::string text = error.what();
+  if (const std::string begin = "Could not convert: "; text.starts_with(begin))  // all of the others are text
+    return text.substr(begin.size()) + " is not a number in range" + help;
+  return text + help;
 }
 
 }  // namespace

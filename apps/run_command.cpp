@@ -242,6 +242,8 @@ int run(const RunArguments& args) {
   }
   if (failure && slam.statistics().tracked == 0) std::rethrow_exception(failure);
   progress.finish();
+  const std::string interrupted_at =
+      Interrupt::happened() ? fmt::format("interrupted after {} frames; ", facts.offered) : "";
   if (Interrupt::happened()) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
   source.stop();
   if (paced || live) facts.skipped += static_cast<int>(source.counts().dropped);
@@ -264,8 +266,8 @@ int run(const RunArguments& args) {
 
   const Statistics s = slam.statistics();
   if (!args.quiet)
-    fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked,
-               facts.offered, s.keyframes, s.map_points,
+    fmt::print("{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_at,
+               s.tracked, facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (const std::string line = report.text(source.counts()); (live || args.live) && !args.quiet && !line.empty())
     fmt::print("{}\n", line);
@@ -276,8 +278,10 @@ int run(const RunArguments& args) {
   if (args.localize)
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
   else
-    fmt::print(stderr, "error: tracking never initialised: no frame has {} features with depth\n",
-               options.tracking.initial_points);
+    fmt::print(stderr,
+               "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
+               "units of the camera's depth_factor ({} per metre)?\n",
+               options.tracking.initial_points, opened.camera().depth_factor);
   return 1;
 }
 

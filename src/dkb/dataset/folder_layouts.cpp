@@ -158,9 +158,13 @@ FolderLayout open_replica(const fs::path& folder) {
   return layout;
 }
 
+NumberedImages numbered_colour(const fs::path& folder) {
+  return numbered_images(folder, "", {".jpg", ".jpeg", ".png"});
+}
+
 FolderLayout open_redwood(const fs::path& folder, const std::string& colour) {
   FolderLayout layout;
-  layout.dataset = paired_by_number(folder, "Redwood", numbered_images(folder / colour, "", {".jpg", ".jpeg", ".png"}),
+  layout.dataset = paired_by_number(folder, "Redwood", numbered_colour(folder / colour),
                                     numbered_images(folder / "depth", "", {".png"}));
   if (const auto file = first_of({folder}, {"camera_intrinsic.json", "intrinsic.json"}))
     layout.camera = {parse_open3d_camera(read_file(*file), file->string()), file->string()};
@@ -218,7 +222,7 @@ FolderLayout open_folder_layout(const fs::path& folder) {
   if (there(folder / "intrinsic" / "intrinsic_color.txt")) return open_scannet(folder);
   if (there(folder / "depth"))
     for (const char* colour : {"color", "image", "rgb"})
-      if (there(folder / colour)) return open_redwood(folder, colour);
+      if (!numbered_colour(folder / colour).empty()) return open_redwood(folder, colour);  // TUM's have stamps
   return open_tum(folder);
 }
 

@@ -163,6 +163,11 @@ TEST_F(Layouts, AnUnknownFolderIsToldWhatTumsLayoutLacks) {
             std::string::npos);
 }
 
+TEST_F(Layouts, TumsImagesWithoutTheirListsAreNotTakenForRedwood) {
+  colour("rgb/1700000000.000000.jpg"), depth("depth/1700000000.000000.png");
+  EXPECT_NE(error().find("rgb.txt: no such file"), std::string::npos) << error();
+}
+
 TEST(LayoutCameras, MutatedTextsThrowNothingButInputErrors) {
   const std::vector<std::pair<std::string, std::function<void(const std::string&)>>> parsers = {
       {kReplica, [](const std::string& text) { parse_replica_camera(text, "cam_params.json"); }},

@@ -19,7 +19,8 @@ using openni::OpenNI;
 void require(openni::Status status, const std::string& what) {
   if (status == openni::STATUS_OK) return;
   std::string reason = OpenNI::getExtendedError();
-  while (!reason.empty() && (reason.back() == '\n' || reason.back() == ' ')) reason.pop_back();
+  const size_t begin = reason.find_first_not_of(" \t\n"), end = reason.find_last_not_of(" \t\n");
+  reason = begin == std::string::npos ? "" : reason.substr(begin, end + 1 - begin);
   throw std::runtime_error("OpenNI 2 " + what + (reason.empty() ? "" : " (" + reason + ")"));
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "dkb/devices/fake_device.h"
 #include "dkb/devices/module_device.h"
@@ -86,7 +87,12 @@ SourceKind folder_kind() {
   SourceKind kind;
   kind.name = "folder", kind.form = "FOLDER";
   kind.fits = [](const std::string&) { return true; };
-  kind.open = [](const std::string& where, const SourceOptions& options) { return open_folder(where, options); };
+  kind.open = [](const std::string& where, const SourceOptions& options) {
+    std::error_code error;
+    if (!fs::exists(where, error))
+      throw InputError(where + ": no such folder, recording or camera; `dkb-slam sources` lists what there can be");
+    return open_folder(where, options);
+  };
   return kind;
 }
 
@@ -105,6 +111,23 @@ std::vector<SourceKind> source_kinds() {
           folder_kind()};
 }
 
+namespace {
+
+// What chooses among the topics of a bag would be lost on any other source without a word.
+void refuse_options_of_bags(const std::string& where, const SourceOptions& options) {
+  const std::pair<const char*, bool> given[] = {
+      {"--colour-topic", !options.colour_topic.empty()}, {"--depth-topic", !options.depth_topic.empty()},
+      {"--info-topic", !options.info_topic.empty()},     {"--odom-topic", !options.odom_topic.empty()},
+      {"--imu-topic", !options.imu_topic.empty()},       {"--prior odom", options.prior == PriorKind::odometry},
+      {"--prior imu", options.prior == PriorKind::imu}};
+  for (const auto& [option, is_given] : given)
+    if (is_given)
+      throw InputError(std::string(option) + ": " + where + " is no bag, and only bags have topics; leave it out" +
+                       (std::string(option).starts_with("--prior") ? ", or give --prior-file FILE" : ""));
+}
+
+}  // namespace
+
 bool is_live(const std::string& where) {
   const std::vector<SourceKind> kinds = source_kinds();
   const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SourceKind& k) { return k.fits(where); });
@@ -115,6 +138,9 @@ std::unique_ptr<Source> open_source(const std::string& where, const SourceOption
   for (const SourceKind& kind : source_kinds()) {
     if (!kind.fits(where)) continue;
     if (const std::string missing = kind.why_not(); !missing.empty()) throw InputError(where + ": " + missing);
+    std::error_code error;
+    const bool is_bag = kind.name == "bag" || kind.name == "mcap" || kind.name == "db3";
+    if (!is_bag && (kind.live || fs::exists(where, error))) refuse_options_of_bags(where, options);
     return kind.open(where, options);
   }
   throw InputError(where + ": no kind of source takes this; `dkb-slam sources` lists them");

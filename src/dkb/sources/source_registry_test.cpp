@@ -25,7 +25,25 @@ TEST(SourceRegistry, WhatIsNotThereIsNamed) {
     FAIL() << "it was opened";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/no/such/folder: no such folder"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("`dkb-slam sources`"), std::string::npos) << error.what();
   }
+}
+
+TEST(SourceRegistry, OptionsOfBagsAreRefusedElsewhere) {
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  const auto error_with = [&](const SourceOptions& options) -> std::string {
+    try {
+      open_source(folder, options);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "it was opened";
+  };
+  SourceOptions topic, prior;
+  topic.colour_topic = "/colour", prior.prior = PriorKind::odometry;
+  EXPECT_EQ(error_with(topic), "--colour-topic: " + folder + " is no bag, and only bags have topics; leave it out");
+  EXPECT_EQ(error_with(prior), "--prior odom: " + folder +
+                                   " is no bag, and only bags have topics; leave it out, or give --prior-file FILE");
 }
 
 TEST(SourceRegistry, LiveDevicesAreKnownByTheirScheme) {
