@@ -53,6 +53,7 @@ bool DeviceSource::wait_until_back() {
 }
 
 void DeviceSource::add(DeviceImage image, bool is_depth) {
+  if (!is_stamp(image.stamp_ns)) return pairs_.add(image, is_depth);  // which counts it
   if (gone_since_) {
     if (image.stamp_ns + shift_ns_ <= last_stamp_)
       shift_ns_ = last_stamp_ - image.stamp_ns +
@@ -60,7 +61,7 @@ void DeviceSource::add(DeviceImage image, bool is_depth) {
     gone_since_.reset();
   }
   image.stamp_ns += shift_ns_;
-  last_stamp_ = std::max(last_stamp_, image.stamp_ns);
+  if (is_stamp(image.stamp_ns)) last_stamp_ = std::max(last_stamp_, image.stamp_ns);
   pairs_.add(image, is_depth);
 }
 

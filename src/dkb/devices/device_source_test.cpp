@@ -90,6 +90,19 @@ TEST(ImagePairs, StampsThatDoNotRiseAreLeftOut) {
   EXPECT_EQ(source.counts().late, 4);
 }
 
+TEST(ImagePairs, StampsBeyondAllTimesAreLeftOut) {
+  ImagePairs pairs;
+  const std::vector<uint8_t> pixels(32 * 24 * 2);
+  const auto add = [&](int64_t ns, bool is_depth) {
+    pairs.add({{pixels.data(), 32, 24, 0, is_depth ? PixelFormat::depth_u16 : PixelFormat::grey8}, ns}, is_depth);
+  };
+  add(100 * kMs, false);
+  for (const int64_t ns : {INT64_MIN, int64_t{-1}, INT64_MAX}) add(ns, false), add(ns, true);
+  add(100 * kMs, true);
+  EXPECT_TRUE(pairs.take());
+  EXPECT_EQ(pairs.late(), 6);
+}
+
 TEST(ImagePairs, RandomArrivalsGiveRisingPairsWithinTheLimit) {
   Random random(3);
   ImagePairs pairs;

@@ -24,13 +24,11 @@ KeptImage::KeptImage(const DeviceImage& image) : view(image.view), stamp_ns(imag
 
 void ImagePairs::add(const DeviceImage& image, bool is_depth) {
   Stream& stream = is_depth ? depth_ : colour_;
-  if (stream.last) {
-    if (image.stamp_ns <= *stream.last) {
-      ++late_;
-      return;
-    }
-    stream.interval = image.stamp_ns - *stream.last;
+  if (!is_stamp(image.stamp_ns) || (stream.last && image.stamp_ns <= *stream.last)) {
+    ++late_;
+    return;
   }
+  if (stream.last) stream.interval = image.stamp_ns - *stream.last;
   stream.last = image.stamp_ns;
   if (stream.waiting.size() >= kMostWaiting) drop_front(stream);
   stream.waiting.emplace_back(image);

@@ -32,8 +32,14 @@ struct ImagePair {
   KeptImage colour, depth;
 };
 
+// Stamps lie between zero and this, 97 years, so that sums and differences of two can be computed with.
+constexpr int64_t kMaxStampNs = INT64_MAX / 3;
+inline bool is_stamp(int64_t ns) {
+  return ns >= 0 && ns <= kMaxStampNs;
+}
+
 // Pairs images of two streams, each colour image with the depth image of the nearest stamp within 20 ms, each used
-// once. An image whose stamp is not after the one before in its stream is left out.
+// once. An image whose stamp is not after the one before in its stream, or is none, is left out.
 class ImagePairs {
  public:
   void add(const DeviceImage& image, bool is_depth);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/devices/oni_codecs.h"
 
+#include <algorithm>
+
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -43,7 +45,7 @@ std::vector<uint16_t> decode_16z(std::span<const uint8_t> bytes, size_t pixels, 
   if (table.size() * 2 > bytes.size()) broken("its table is truncated");
   for (uint16_t& value : table) value = in.little_endian();
   std::vector<uint16_t> out;
-  out.reserve(pixels);
+  out.reserve(std::min(pixels, 30 * bytes.size()));  // no byte gives more
   uint16_t last = in.little_endian();
   const auto put = [&] {
     if (with_table && last >= table.size()) broken("a value beyond its table");

@@ -106,6 +106,7 @@ class OniFile final : public ImageDevice {
     in_.seekg(first_data == 0 ? static_cast<std::streamoff>(size_) : first_data);
     warnings_.clear(), cut_ = false;
     check();
+    checked_ = true;
   }
 
   const Stream& colour() const { return streams_.at(*colour_id_); }
@@ -118,7 +119,7 @@ class OniFile final : public ImageDevice {
       const bool is_depth = depth_id_ && record->stream == *depth_id_;
       if (record->type != kData || (!is_depth && record->stream != *colour_id_)) continue;
       const int64_t stamp_us = Fields(record->fields).take<int64_t>();
-      if (std::abs(stamp_us) > INT64_MAX / 1000) continue;
+      if (stamp_us < 0 || stamp_us > kMaxStampNs / 1000) continue;
       data_ = std::move(record->data);
       try {
         const ImageView view = is_depth ? depth_view(streams_.at(*depth_id_)) : colour_view(streams_.at(*colour_id_));
@@ -185,7 +186,12 @@ class OniFile final : public ImageDevice {
     const std::string property = fields.text();
     fields.take<uint32_t>();  // bytes that follow
     if (property == "xnMapOutputMode" && record.type == kGeneral) {
-      found->second.width = fields.take<int32_t>(), found->second.height = fields.take<int32_t>();
+      const auto width = fields.take<int32_t>(), height = fields.take<int32_t>();
+      if (checked_ && (width != found->second.width || height != found->second.height)) {
+        cut("its images change their size");
+        return;
+      }
+      found->second.width = width, found->second.height = height;
       found->second.fps = fields.take<int32_t>();
     } else if (property == "oniPixelFormat" && record.type == kInteger) {
       found->second.pixels = fields.take<int64_t>();
@@ -264,6 +270,7 @@ class OniFile final : public ImageDevice {
   Picture picture_;
   std::vector<std::string> warnings_;
   bool cut_ = false;
+  bool checked_ = false;  // the sizes are known and stay what they are
 };
 
 Camera camera_of(const OniFile& file, const std::string& name, const SourceOptions& options) {

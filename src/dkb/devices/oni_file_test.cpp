@@ -53,12 +53,17 @@ std::string flat_16z(uint16_t value) {
   for (int n = 0; n < 8; ++n) bytes += '\xEF';  // 30 pixels each
   return bytes + "\xE7" + "\x6D";               // 14 more, and one
 }
-std::string recording() {
-  std::string colours;
-  for (int i = 0; i < 256; ++i) colours += {static_cast<char>(i), 'b', 'c'};
+std::string colours() {
+  std::string bytes;
+  for (int i = 0; i < 256; ++i) bytes += {static_cast<char>(i), 'b', 'c'};
+  return bytes;
+}
+// Two pairs, and what is put between them.
+std::string recording(const std::string& between = "") {
   return std::string("NI10\1\0\1\0\0\0\0\0", 12) + raw<uint64_t>(66000) + raw<uint32_t>(2) + stream(1, 3, "NONE", 200) +
-         stream(2, 2, "16zP", 100) + integer(1, "xnMirror", 1) + data(1, 33000, colours) +
-         data(2, 33000, flat_16z(1500)) + data(1, 66000, colours) + data(2, 67000, flat_16z(2500)) + record(11, 0, "");
+         stream(2, 2, "16zP", 100) + integer(1, "xnMirror", 1) + data(1, 33000, colours()) +
+         data(2, 33000, flat_16z(1500)) + between + data(1, 66000, colours()) + data(2, 67000, flat_16z(2500)) +
+         record(11, 0, "");
 }
 
 class OniFiles : public testing::Test {
@@ -99,6 +104,29 @@ TEST_F(OniFiles, ARecordingThatIsCutOffIsUsedUpToThere) {
   const std::vector<std::string> warnings = source->take_warnings();
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find(": a record is truncated; used up to there"), std::string::npos);
+}
+
+TEST_F(OniFiles, ARecordingWhoseImagesChangeTheirSizeIsUsedUpToThere) {
+  for (const int32_t side : {16384, INT32_MAX, -1}) {
+    write(recording(general(2, "xnMapOutputMode", raw<int32_t>(side) + raw<int32_t>(side) + raw<int32_t>(30))));
+    const auto source = open_oni_file(path, {});
+    EXPECT_EQ(source->next().state, SourceState::frame);
+    EXPECT_EQ(source->next().state, SourceState::ended);
+    const std::vector<std::string> warnings = source->take_warnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find(": its images change their size; used up to there"), std::string::npos);
+  }
+}
+
+TEST_F(OniFiles, ImagesWithStampsBeyondAllTimesAreLeftOut) {
+  for (const int64_t stamp : {INT64_MIN, INT64_MIN / 1000, int64_t{-1}, INT64_MAX / 1000, INT64_MAX}) {
+    write(recording(data(1, static_cast<uint64_t>(stamp), colours()) +
+                    data(2, static_cast<uint64_t>(stamp), flat_16z(2000))));
+    const auto source = open_oni_file(path, {});
+    EXPECT_EQ(source->next().frame.stamp_ns(), 33'000'000);
+    EXPECT_EQ(source->next().frame.stamp_ns(), 66'000'000) << stamp;
+    EXPECT_EQ(source->next().state, SourceState::ended);
+  }
 }
 
 TEST_F(OniFiles, WhatIsWrongIsNamed) {
