@@ -25,6 +25,7 @@
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
+#include "report/run_report.h"
 #include "run_outputs.h"
 
 namespace dkb {
@@ -165,6 +166,32 @@ DetectorChoice detector_choice(const RunArguments& args, const Options& options,
   return choice_beside(options, args.disable, std::move(choice));
 }
 
+report::ReportFacts report_facts(const RunArguments& args, const Source& source, const Options& options,
+                                 const Slam& slam, const RunFacts& facts) {
+  report::ReportFacts r;
+  r.source = source.description();
+  r.version = version();
+  r.camera = source.camera();
+  r.realtime = options.realtime;
+  r.offered = facts.offered;
+  r.skipped = facts.skipped;
+  r.wall_s = facts.wall_s;
+  r.statistics = statistics_with(slam, facts);
+  r.trajectory = trajectories_by_map(slam.trajectory(), facts.stamps).front();
+  r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
+  r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
+  r.seed = options.seed;
+  r.choices = {{"source", args.source},
+               {"camera", fmt::format("{} x {}, fx {:g}, fy {:g}, cx {:g}, cy {:g}", r.camera.width, r.camera.height,
+                                      r.camera.fx, r.camera.fy, r.camera.cx, r.camera.cy)},
+               {"detector", r.statistics.detector},
+               {"preset", options.preset()},
+               {"pace", options.realtime ? "real time" : "as fast as it goes, waiting for mapping"}};
+  if (!args.load_map.empty()) r.choices.emplace_back(args.localize ? "localised in" : "went on in", args.load_map);
+  if (!args.prior_file.empty()) r.choices.emplace_back("motion prior", args.prior_file);
+  return r;
+}
+
 int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
   const Options options = options_of(args);
@@ -190,6 +217,7 @@ int run(const RunArguments& args) {
   RunFacts facts;
   facts.writes_map = !args.localize;
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
+  report::RunLog log;
   std::optional<PacedSource> paced;
   if (args.realtime) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
@@ -216,9 +244,12 @@ int run(const RunArguments& args) {
     const FrameResult result = slam.process(next.frame);
     for (const Mover& mover : result.movers)
       facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-    for (const Event& event : slam.take_events())
+    log.frame(next.frame, result);
+    for (const Event& event : slam.take_events()) {
+      log.event(event);
       if (event.kind == Event::Kind::warning)
         warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+    }
     if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
     if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
     progress.frame(next.index + 1, &result);
@@ -242,6 +273,9 @@ int run(const RunArguments& args) {
     if (!args.quiet) fmt::print("{}\n", line);
   }
   write_outputs(out, slam, facts);
+  const report::ReportFacts reported = report_facts(args, *recording, options, slam, facts);
+  write_file_atomically(out / "report.html",
+                        report_html(log, reported, report::truth_beside(args.source, reported.trajectory)));
   if (args.cv_orb && !interrupted) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
 
