@@ -91,15 +91,18 @@ class Progress {
   Stopwatch watch_;
 };
 
+std::string source_name(const fs::path& source) {
+  const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  return (fs::is_regular_file(source) ? name.stem() : name).string();
+}
+
 fs::path default_output(const fs::path& source) {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
   localtime_r(&now, &parts);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
-  fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
-  if (fs::is_regular_file(source)) name = name.stem();
-  return fs::path("dkb-out") / (name.string() + "-" + stamp);
+  return fs::path("dkb-out") / (source_name(source) + "-" + stamp);
 }
 
 void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
@@ -169,6 +172,7 @@ DetectorChoice detector_choice(const RunArguments& args, const Options& options,
 report::ReportFacts report_facts(const RunArguments& args, const Source& source, const Options& options,
                                  const Slam& slam, const RunFacts& facts) {
   report::ReportFacts r;
+  r.name = source_name(args.source);
   r.source = source.description();
   r.version = version();
   r.camera = source.camera();
@@ -217,7 +221,7 @@ int run(const RunArguments& args) {
   RunFacts facts;
   facts.writes_map = !args.localize;
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
-  report::RunLog log;
+  report::RunLog log(recording->size());
   std::optional<PacedSource> paced;
   if (args.realtime) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;

@@ -88,6 +88,7 @@ svg::Range range_of(const TimeChart& chart) {
   if (chart.from_zero) take(0);
   if (range.low > range.high) return {0, 1};
   if (range.length() < 1e-9) range.high += std::max(1e-3, std::abs(range.high));
+  if (chart.from_zero) range.high = std::max(range.high, chart.least_top);
   const double air = 0.06 * range.length();
   return {chart.from_zero ? 0 : range.low - air, range.high + air};
 }
@@ -109,7 +110,7 @@ std::string time_chart(const TimeChart& chart, double duration, const std::vecto
     const double y = panel.py(level.value);
     out += fmt::format("<line class=\"level\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", kLeft, y,
                        kLeft + kPanel, y);
-    out += svg::label(kLeft + kPanel - 4, y - 4, "end", 11, svg::kInk, level.name);
+    out += svg::label(kLeft + kPanel - 4, y - 5, "end", 11, svg::kInk, level.name, " class=\"halo\"");
   }
   return out + "</svg>\n";
 }
@@ -145,7 +146,7 @@ std::string keyframe_chart(const std::vector<KeyframeTicks>& rules, double durat
 }
 
 std::string stage_chart(const std::vector<StageRow>& stages, double frame_ms) {
-  constexpr double kTop = 30, kRow = 34, kNames = 112;
+  constexpr double kTop = 48, kRow = 34, kNames = 134;
   const double height = kRow * static_cast<double>(stages.size());
   size_t bins = 0;
   for (const StageRow& s : stages) bins = std::max(bins, s.counts.size());
@@ -179,7 +180,7 @@ std::string stage_chart(const std::vector<StageRow>& stages, double frame_ms) {
   const double x = x_of(frame_ms);
   out += fmt::format("<line class=\"budget\" x1=\"{0:.1f}\" y1=\"{1:.0f}\" x2=\"{0:.1f}\" y2=\"{2:.0f}\"/>\n", x,
                      kTop - 6, kTop + height);
-  out += svg::label(kWidth - kRight, 16, "end", 11, svg::kInk, fmt::format("dashed: {:.1f} ms a frame", frame_ms));
+  out += svg::label(kNames, 34, "start", 11, svg::kInk, fmt::format("dashed: the {:.1f} ms of a frame", frame_ms));
   return out + "</svg>\n";
 }
 

@@ -42,6 +42,7 @@ struct TimeChart {
   std::vector<Line> lines;
   bool from_zero = false;
   std::vector<Level> levels = {};  // dashed lines across
+  double least_top = 0;            // from zero at least to here, so that next to nothing looks like it
 };
 // `duration` [s]: of all charts of a page.
 std::string time_chart(const TimeChart& chart, double duration, const std::vector<Band>& bands);

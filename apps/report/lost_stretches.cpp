@@ -20,11 +20,10 @@ constexpr double kGap = 4;           // usual intervals between frames
 
 // What a set of frames is like, by medians.
 struct Likeness {
-  double features = 0, removed = 0, with_depth = 0, inliers = 0;  // a frame
-  double masked = 0, depth = 0, brightness = 0;
+  double features = 0, removed = 0, inliers = 0;  // a frame
+  double masked = 0, with_depth = 0, depth = 0, brightness = 0;
 
   double removed_share() const { return features > 0 ? removed / features : 0; }
-  double with_depth_share() const { return features > 0 ? with_depth / features : 0; }
 };
 
 Likeness likeness_of(const std::vector<const FrameRow*>& rows) {
@@ -35,8 +34,8 @@ Likeness likeness_of(const std::vector<const FrameRow*>& rows) {
     for (const FrameRow* r : rows) values.push_back(static_cast<double>(r->*field));
     return upper_median(values);
   };
-  return {median(&FrameRow::features),  median(&FrameRow::removed), median(&FrameRow::with_depth),
-          median(&FrameRow::inliers),   median(&FrameRow::masked),  median(&FrameRow::depth),
+  return {median(&FrameRow::features),  median(&FrameRow::removed),    median(&FrameRow::inliers),
+          median(&FrameRow::masked),    median(&FrameRow::with_depth), median(&FrameRow::depth),
           median(&FrameRow::brightness)};
 }
 
@@ -78,10 +77,10 @@ class Judge {
       say(stretch, "no features",
           fmt::format("{:.0f} features a frame, usually {:.0f}", now.features, usual_.features) +
               (dark ? fmt::format("; the picture is dark: grey level {:.0f} of 255", now.brightness) : ""));
-    else if (now.depth < kNoDepth || now.with_depth_share() < kNoDepth)
+    else if (now.depth < kNoDepth || now.with_depth < kNoDepth)
       say(stretch, "no depth",
           fmt::format("{} of the picture and {} of the features have depth, usually {} and {}", percent(now.depth),
-                      percent(now.with_depth_share()), percent(usual_.depth), percent(usual_.with_depth_share())));
+                      percent(now.with_depth), percent(usual_.depth), percent(usual_.with_depth)));
     else if (usual_interval_ > 0 && gap > kGap * usual_interval_)
       say(stretch, "frames missing",
           fmt::format("{:.2f} s without a frame before it, usually {:.3f} s", gap, usual_interval_));
@@ -91,7 +90,7 @@ class Judge {
     else
       say(stretch, "not recognised",
           fmt::format("{:.0f} features a frame, {} with depth, but only {:.0f} fit the map (at least {})", now.features,
-                      percent(now.with_depth_share()), now.inliers, limits_.min_inliers));
+                      percent(now.with_depth), now.inliers, limits_.min_inliers));
   }
 
  private:

@@ -11,7 +11,7 @@ FrameRow good(int frame) {
   row.stamp_ns = frame * int64_t{33'333'333};
   row.state = TrackingState::tracking;
   row.features = 1000;
-  row.with_depth = 800;
+  row.with_depth = 0.8F;
   row.inliers = 300;
   row.depth = 0.8F;
   row.brightness = 120;
@@ -39,8 +39,8 @@ using Rows = std::vector<FrameRow>;
 
 TEST(LostStretches, BlackPicturesHaveNoFeatures) {
   const LostStretch s = stretch_of([](Rows& rows, size_t i) {
-    rows[i].features = rows[i].with_depth = 0;
-    rows[i].depth = rows[i].brightness = 0;
+    rows[i].features = 0;
+    rows[i].with_depth = rows[i].depth = rows[i].brightness = 0;
   });
   EXPECT_EQ(s.cause, "no features");
   EXPECT_EQ(s.evidence, "0 features a frame, usually 1000; the picture is dark: grey level 0 of 255");
@@ -58,7 +58,7 @@ TEST(LostStretches, PeopleThatCoverThePictureAreNamed) {
 TEST(LostStretches, MissingDepthIsNamed) {
   const LostStretch s = stretch_of([](Rows& rows, size_t i) {
     rows[i].depth = 0.02F;
-    rows[i].with_depth = 10;
+    rows[i].with_depth = 0.01F;
   });
   EXPECT_EQ(s.cause, "no depth");
   EXPECT_EQ(s.evidence, "2 % of the picture and 1 % of the features have depth, usually 80 % and 80 %");

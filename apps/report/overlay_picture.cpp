@@ -18,19 +18,22 @@ constexpr int kQuality = 72;
 // Means over blocks of `factor` pixels a side. `channels` bytes a pixel.
 std::vector<uint8_t> reduced(const ImageView& image, int factor, int channels) {
   const int width = image.width / factor, height = image.height / factor;
-  std::vector<uint8_t> out(static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels));
-  std::vector<uint32_t> sums(static_cast<size_t>(width) * static_cast<size_t>(channels));
+  std::vector<uint8_t> out;
+  out.reserve(static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels));
+  std::vector<uint16_t> column(image.row_bytes());
   const auto area = static_cast<uint32_t>(factor * factor);
   for (int y = 0; y < height; ++y) {
-    std::fill(sums.begin(), sums.end(), 0U);
+    std::fill(column.begin(), column.end(), uint16_t{0});
     for (int dy = 0; dy < factor; ++dy) {
       const uint8_t* in = image.row(y * factor + dy);
-      for (int x = 0; x < width; ++x)
-        for (int dx = 0; dx < factor; ++dx)
-          for (int c = 0; c < channels; ++c) sums[static_cast<size_t>(x * channels + c)] += *in++;
+      for (size_t i = 0; i < column.size(); ++i) column[i] = static_cast<uint16_t>(column[i] + in[i]);
     }
-    uint8_t* row = out.data() + static_cast<size_t>(y) * sums.size();
-    for (size_t i = 0; i < sums.size(); ++i) row[i] = static_cast<uint8_t>(sums[i] / area);
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < channels; ++c) {
+        uint32_t sum = 0;
+        for (int dx = 0; dx < factor; ++dx) sum += column[static_cast<size_t>((x * factor + dx) * channels + c)];
+        out.push_back(static_cast<uint8_t>(sum / area));
+      }
   }
   return out;
 }

@@ -37,6 +37,7 @@ figcaption b{color:var(--ink)}
 svg{display:block;width:100%;height:auto;font-family:inherit}
 svg text{fill:var(--ink);font-size:11.5px}
 svg text.title{font-size:13.5px;font-weight:600}
+svg text.halo{paint-order:stroke;stroke:var(--paper);stroke-width:3px;stroke-linejoin:round}
 svg [stroke="#24292f"]{stroke:var(--line)}
 svg [stroke="#e6e8eb"],svg line.grid,.line.grid{stroke:var(--grid)}
 .line{fill:none;stroke-width:1.7;stroke-linejoin:round;stroke-linecap:round}
@@ -53,7 +54,7 @@ svg .line.grid{stroke-width:1}
 .band.lost{fill:var(--bad);opacity:.28}
 .band.predicted{fill:var(--pred);opacity:.28}
 .band.initialising{fill:var(--line);opacity:.28}
-.overlay{border-radius:4px;background:#000}
+.overlay{border-radius:4px;background:#000;outline:1px solid var(--grid)}
 .overlay path{fill:none;stroke-linecap:round;stroke-width:3}
 .overlay .used{stroke:#1de9b6}
 .overlay .unused{stroke:#fff;stroke-width:1.6;opacity:.75}
@@ -72,9 +73,11 @@ svg .line.grid{stroke-width:1}
 .wide{overflow-x:auto}
 table{border-collapse:collapse;font-size:14px;margin:6px 0 14px}
 th,td{border-bottom:1px solid var(--grid);padding:4px 12px 4px 0;text-align:left;vertical-align:top}
+td,th{overflow-wrap:normal}
 th{color:var(--dim);font-weight:600}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-@media (max-width:600px){body{padding:0 12px 30px}h1{font-size:21px}.tiles{grid-template-columns:1fr 1fr;gap:8px}
+@media (min-width:601px){.three svg:not(.overlay) text{font-size:14.5px}.three svg:not(.overlay) text.title{font-size:16.5px}}
+@media (max-width:600px){.grid.pictures{grid-template-columns:1fr 1fr;gap:10px}body{padding:0 12px 30px}h1{font-size:21px}.tiles{grid-template-columns:1fr 1fr;gap:8px}
 .tile .value{font-size:19px}svg text{font-size:13px}svg text.title{font-size:15px}.stretch{grid-template-columns:1fr}}
 @media print{body{max-width:none;padding:0;font-size:11pt}nav{display:none}h2{break-after:avoid}.tile{break-inside:avoid}
 .grid{grid-template-columns:1fr 1fr}.grid.three{grid-template-columns:1fr 1fr 1fr}.tiles{grid-template-columns:repeat(4,1fr)}

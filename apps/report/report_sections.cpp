@@ -16,6 +16,10 @@ namespace {
 std::string heading(const char* id, const char* title) {
   return fmt::format("<h2 id=\"{}\">{}</h2>\n", id, title);
 }
+std::string spaced(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
 std::string figure(const std::string& svg) {
   return "<figure>" + svg + "</figure>\n";
 }
@@ -161,7 +165,9 @@ std::string tracking_section(const Context& c) {
                           {line_of(c, "second", "of the features",
                                    [&](size_t i) { return 100.0 * rows[i].removed / std::max(1, rows[i].features); }),
                            line_of(c, "est", "of the picture", [&](size_t i) { return 100.0 * rows[i].masked; })},
-                          true};
+                          true,
+                          {},
+                          5};
   out += figure(time_chart(removed, c.duration, c.bands));
   std::vector<KeyframeTicks> ticks;
   for (size_t rule = 0; rule < c.log.rules().size(); ++rule) {
@@ -211,9 +217,9 @@ std::string stages_section(const Context& c) {
     out += fmt::format(
         "<tr><td>{}</td><td class=\"n\">{:.2f}</td><td class=\"n\">{:.2f}</td><td class=\"n\">{:.2f}</td><td "
         "class=\"n\">{:.1f}</td><td class=\"n\">{}</td></tr>\n",
-        svg::escaped(name), t.mean_ms, t.median_ms, t.p95_ms, t.max_ms, t.count);
+        svg::escaped(spaced(name)), t.mean_ms, t.median_ms, t.p95_ms, t.max_ms, t.count);
     const auto counts = s.stage_histograms.find(name);
-    stages.push_back({name, counts == s.stage_histograms.end() ? std::vector<int>() : counts->second});
+    stages.push_back({spaced(name), counts == s.stage_histograms.end() ? std::vector<int>() : counts->second});
   }
   out += "</table></div></div>\n" + figure(stage_chart(stages, frame_ms));
   return out + "</div><!--/clock-->\n";
@@ -257,7 +263,7 @@ std::string pictures_section(const Context& c) {
   out +=
       "<span><svg class=\"overlay\" viewBox=\"0 0 22 16\" aria-hidden=\"true\"><path class=\"mask\" d=\"M3 "
       "3h16v10h-16z\"/></svg>mover</span></div>\n";
-  out += "<div class=\"grid three\">\n";
+  out += "<div class=\"grid three pictures\">\n";
   for (size_t group : {0, 1, 2})
     for (const OverlayPicture* p : chosen[group]) {
       const char* name = group == 0 ? "Worst" : group == 1 ? "Best" : "Random";
@@ -274,7 +280,7 @@ std::string events_section(const Context& c) {
   std::string table;
   for (const Happening& h : c.log.happenings())
     table += fmt::format("<tr><td class=\"n\">{}</td><td class=\"n\">{:.2f}</td><td>{}</td><td>{}</td></tr>\n", h.row,
-                         c.seconds[h.row], name_of(h.kind), svg::escaped(h.text));
+                         c.seconds[h.row], spaced(name_of(h.kind)), svg::escaped(h.text));
   if (table.empty()) return "";
   return heading("events", "Events") +
          "<div class=\"wide\"><table>\n<tr><th class=\"n\">frame</th><th "

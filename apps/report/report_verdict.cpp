@@ -31,7 +31,7 @@ std::string headline(const Context& c) {
   std::string out = s.tracked == c.facts.offered
                         ? "All " + plural(s.tracked, "frame has a pose", "frames have a pose")
                         : fmt::format("{} of {} frames have a pose", s.tracked, c.facts.offered);
-  if (c.truth.evaluation) out += ", " + metres(c.truth.evaluation->ape.translation.rmse) + " from the truth";
+  if (c.truth.evaluation) out += ", " + metres(c.truth.evaluation->ape.translation.rmse) + " rmse from the truth";
   return out;
 }
 
@@ -72,12 +72,15 @@ std::string what_limited(const Context& c, double tracking_s, double waiting_s) 
            std::string(largest({"wait_mapper", "wait_detector"}) == "wait_mapper" ? "mapping" : "the detector") + ": " +
            share(waiting_s) + " of the time";
   if (rest > tracking_s)
-    return fmt::format("{}: {} of the time", c.facts.realtime ? "the camera's pace" : "reading the images",
+    return fmt::format("{} ({} of the time)", c.facts.realtime ? "the camera's pace" : "reading the images",
                        share(rest));
   const std::string stage = largest({"features", "motion", "filter", "keyframe_decision"});
   const double known = total("features") + total("motion") + total("filter") + total("keyframe_decision");
   const bool pose = tracking_s - known > total(stage);
-  return fmt::format("tracking: {} of the time, of which {} {}", share(tracking_s), pose ? "poses" : stage,
+  return fmt::format("tracking ({} of the time; {} alone {})", share(tracking_s),
+                     pose                           ? "the pose"
+                     : stage == "keyframe_decision" ? "keyframe decisions"
+                                                    : stage,
                      share(pose ? tracking_s - known : total(stage)));
 }
 
@@ -98,8 +101,8 @@ std::string verdict(const Context& c) {
   const Statistics& s = c.facts.statistics;
   const int unstarted = s.frames - s.tracked - s.lost;
   std::string out = "<header>\n<div class=\"dim\">Report of a run · dkb-slam " + svg::escaped(c.facts.version) +
-                    "</div>\n<h1>" + headline(c) + "</h1>\n<div class=\"dim\">" + svg::escaped(c.facts.source) +
-                    "</div>\n<nav>";
+                    "</div>\n<h1>" + headline(c) + "</h1>\n<div class=\"dim\">" +
+                    svg::escaped(c.facts.name + ": " + c.facts.source) + "</div>\n<nav>";
   for (const auto& [id, name] : {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"time", "Over time"},
                                  std::pair{"tracking", "Tracking"}, std::pair{"pictures", "Pictures"},
                                  std::pair{"stages", "Times"}, std::pair{"settings", "Settings"}})

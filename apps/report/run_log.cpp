@@ -8,7 +8,8 @@ namespace dkb::report {
 namespace {
 
 constexpr size_t kEvenPictures = 16, kLostPictures = 8, kHappenings = 200;
-constexpr int kGrid = 16;  // [px] between the pixels by which an image is judged
+constexpr int kGrid = 32;           // [px] between the pixels by which an image is judged
+constexpr size_t kEachFeature = 4;  // by which the features are
 
 void judge_image(const Frame& frame, FrameRow& row) {
   const ImageView grey = frame.grey(), depth = frame.depth();
@@ -28,12 +29,15 @@ void judge_image(const Frame& frame, FrameRow& row) {
 void judge_features(const Frame& frame, const FrameResult& result, FrameRow& row) {
   const ImageView depth = frame.depth();
   row.features = static_cast<int>(result.features.size());
-  for (const FeatureReport& f : result.features) {
-    row.removed += f.state == FeatureState::dynamic;
-    const int x = static_cast<int>(f.image_x), y = static_cast<int>(f.image_y);
-    if (x >= 0 && y >= 0 && x < depth.width && y < depth.height)
-      row.with_depth += reinterpret_cast<const float*>(depth.row(y))[x] > 0;
+  for (const FeatureReport& f : result.features) row.removed += f.state == FeatureState::dynamic;
+  int asked = 0, with_depth = 0;
+  for (size_t i = 0; i < result.features.size(); i += kEachFeature) {
+    const int x = static_cast<int>(result.features[i].image_x), y = static_cast<int>(result.features[i].image_y);
+    if (x < 0 || y < 0 || x >= depth.width || y >= depth.height) continue;
+    ++asked;
+    with_depth += reinterpret_cast<const float*>(depth.row(y))[x] > 0;
   }
+  if (asked > 0) row.with_depth = static_cast<float>(with_depth) / static_cast<float>(asked);
 }
 
 float masked_share(const MoverMask& mask) {
@@ -44,6 +48,9 @@ float masked_share(const MoverMask& mask) {
 }
 
 }  // namespace
+
+RunLog::RunLog(std::optional<size_t> expected)
+    : stride_(expected ? std::max<size_t>(1, (*expected + kEvenPictures - 1) / kEvenPictures) : 8) {}
 
 void RunLog::frame(const Frame& frame, const FrameResult& result) {
   FrameRow row;

@@ -18,9 +18,10 @@ struct FrameRow {
   bool keyframe = false;
   uint8_t rule = 0;                   // of a keyframe, index into RunLog::rules()
   uint16_t movers = 0;                // as obstacles
-  int features = 0, with_depth = 0;   // extracted; of these with depth where they are
+  int features = 0;                   // extracted
   int removed = 0, inliers = 0;       // kept from tracking by the filter; map points that the pose rests on
   float masked = 0, depth = 0;        // shares of the image: on movers; with depth
+  float with_depth = 0;               // share of the features that have depth where they are
   float brightness = 0;               // mean grey level
   float turned_deg = 0, moved_m = 0;  // since the frame before, when both have poses
   float position_sd = 0;              // [m] by the covariance; 0 = unknown
@@ -39,6 +40,8 @@ struct Happening {
 // Listens to a run. Keeps some 80 bytes a frame and at most 25 small pictures.
 class RunLog {
  public:
+  // `expected`: about how many frames there will be.
+  explicit RunLog(std::optional<size_t> expected = {});
   void frame(const Frame& frame, const FrameResult& result);
   void event(const Event& event);  // of the last frame
 
@@ -57,7 +60,7 @@ class RunLog {
   std::vector<std::string> rules_;
   std::vector<Happening> happenings_;
   std::optional<Rigid3> last_pose_;
-  size_t stride_ = 1;
+  size_t stride_;
   std::vector<OverlayPicture> even_, lost_;
   std::optional<OverlayPicture> fewest_;
 };

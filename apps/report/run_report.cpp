@@ -102,7 +102,7 @@ std::string report_html(const RunLog& log, const ReportFacts& facts, const Truth
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
       "content=\"width=device-width, initial-scale=1\"/>\n<meta http-equiv=\"Content-Security-Policy\" "
       "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"/>\n<title>Run: " +
-      svg::escaped(facts.source) + "</title>\n<style>" + kPageStyle + "</style>\n</head>\n<body>\n";
+      svg::escaped(facts.name) + "</title>\n<style>" + kPageStyle + "</style>\n</head>\n<body>\n";
   out += verdict(c);
   if (any) {
     out += lost_section(c) + path_section(c) + time_section(c) + tracking_section(c) + pictures_section(c) +

@@ -22,7 +22,8 @@ std::vector<ChangedSetting> changed_settings(const std::string& effective, const
 
 // What a run says of itself at its end.
 struct ReportFacts {
-  std::string source;                                        // for people
+  std::string name;                                          // of the recording
+  std::string source;                                        // what is read, for people
   std::string version;                                       // of the program
   std::vector<std::pair<std::string, std::string>> choices;  // how it was started: camera, detector ...
   Camera camera;
