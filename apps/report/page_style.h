@@ -79,7 +79,7 @@ td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 @media (min-width:601px){.three svg:not(.overlay) text{font-size:14.5px}.three svg:not(.overlay) text.title{font-size:16.5px}}
 @media (max-width:600px){.grid.pictures{grid-template-columns:1fr 1fr;gap:10px}body{padding:0 12px 30px}h1{font-size:21px}.tiles{grid-template-columns:1fr 1fr;gap:8px}
 .tile .value{font-size:19px}svg text{font-size:13px}svg text.title{font-size:15px}.stretch{grid-template-columns:1fr}}
-@media print{body{max-width:none;padding:0;font-size:11pt}nav{display:none}h2{break-after:avoid}.tile{break-inside:avoid}
+@media print{body{max-width:none;padding:0;font-size:11pt}nav{display:none}h2,h2+p,.key{break-after:avoid}table{break-inside:avoid}.tile{break-inside:avoid}
 .grid{grid-template-columns:1fr 1fr}.grid.three{grid-template-columns:1fr 1fr 1fr}.tiles{grid-template-columns:repeat(4,1fr)}
 *{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 @page{margin:14mm}
