@@ -28,7 +28,7 @@ std::string not_well_formed(const std::string& html) {
     at = end;
     if (tag.starts_with('!')) continue;
     const std::string name = tag.substr(0, tag.find_first_of(" \n/", 1));
-    static const std::regex attributes(R"re(/?[A-Za-z0-9]+(\s+[A-Za-z:-]+="[^"]*")*\s*/?)re");
+    static const std::regex attributes(R"re(/?[A-Za-z0-9]+(\s+[A-Za-z][A-Za-z0-9:-]*="[^"]*")*\s*/?)re");
     // Pictures are longer than what a regular expression likes.
     if (tag.size() < 2000 && !std::regex_match(tag, attributes)) return "the tag " + tag;
     if (tag.ends_with('/')) continue;

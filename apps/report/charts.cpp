@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kWidth = 480, kLeft = 62, kRight = 14;
 constexpr double kPanel = kWidth - kLeft - kRight;
-constexpr size_t kColumns = 400;      // of a chart over time, each with four points at most
+constexpr double kColumns = 400;      // of a chart over time, each with four points at most
 constexpr size_t kPathPoints = 3000;  // of a path through space
 
 std::string opening(double height, const std::string& description) {
@@ -54,14 +54,14 @@ struct Thinned {
 };
 Thinned thinned(const Line& line, double duration) {
   Thinned out;
-  const auto column = [&](size_t i) {
-    return static_cast<size_t>(std::max(0.0, line.seconds[i]) / duration * static_cast<double>(kColumns));
+  const auto column = [&](size_t i) { return std::floor(line.seconds[i] / least_gap(duration)); };
+  const auto follows = [&](size_t i) {
+    return line.rows[i] == line.rows[i - 1] + 1 || line.seconds[i] - line.seconds[i - 1] < least_gap(duration);
   };
   for (size_t i = 0; i < line.seconds.size();) {
-    const bool starts = i == 0 || line.rows[i] != line.rows[i - 1] + 1;
-    if (starts) out.starts.push_back(out.x.size());
+    if (i == 0 || !follows(i)) out.starts.push_back(out.x.size());
     size_t end = i + 1, low = i, high = i;
-    for (; end < line.seconds.size() && line.rows[end] == line.rows[end - 1] + 1 && column(end) == column(i); ++end) {
+    for (; end < line.seconds.size() && follows(end) && column(end) == column(i); ++end) {
       if (line.values[end] < line.values[low]) low = end;
       if (line.values[end] > line.values[high]) high = end;
     }
@@ -94,6 +94,10 @@ svg::Range range_of(const TimeChart& chart) {
 }
 
 }  // namespace
+
+double least_gap(double duration) {
+  return duration / kColumns;
+}
 
 std::string time_chart(const TimeChart& chart, double duration, const std::vector<Band>& bands) {
   constexpr double kTop = 46, kHeight = 150;
@@ -220,7 +224,7 @@ std::string thin_path(const SpacePath& path, const std::vector<Eigen::Vector2d>&
 std::string path_svg(const SpacePath& path, const std::vector<Eigen::Vector2d>& px) {
   double least = 0.7;
   std::string d = thin_path(path, px, least);
-  while (d.size() > 11 * kPathPoints) d = thin_path(path, px, least *= 2);
+  while (d.size() > 11 * kPathPoints && least < 100) d = thin_path(path, px, least *= 2);
   return fmt::format("<path class=\"line {}\" d=\"{}\"/>\n", path.style, d);
 }
 

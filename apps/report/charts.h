@@ -12,6 +12,9 @@
 // size does not grow with the number of frames.
 namespace dkb::report {
 
+// [s] Gaps below are too short to be seen in a chart of that duration.
+double least_gap(double duration);
+
 // A line over time. Where `row`s do not follow on one another nothing is drawn between them.
 struct Line {
   const char* style = "";  // class of the page

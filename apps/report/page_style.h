@@ -60,7 +60,7 @@ svg .line.grid{stroke-width:1}
 .overlay .unused{stroke:#fff;stroke-width:1.6;opacity:.75}
 .overlay .outlier{stroke:#ffd600;stroke-width:1.3}
 .overlay .dynamic{fill:#ff5a1f;stroke:#000;stroke-width:.4}
-.overlay .mask{fill:#d55e00;fill-opacity:.38}
+.overlay .mask{fill:#2f6bff;fill-opacity:.42}
 .overlay rect.box{fill:none;stroke:#fff;stroke-width:1.2;stroke-dasharray:4 2}
 .overlay text.box{fill:#fff;font-size:10px;paint-order:stroke;stroke:#000;stroke-width:2px}
 .key{display:flex;flex-wrap:wrap;gap:4px 20px;font-size:14px;margin:4px 0 12px}

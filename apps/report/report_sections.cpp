@@ -54,8 +54,9 @@ SpacePath estimated_path(const Context& c) {
   SpacePath path{"est", "estimate (dot: start)", {}, {}};
   size_t last = 0;
   for (const StampedPose& p : c.facts.trajectory) {
-    const size_t row = c.row_of(p.timestamp);
-    if (path.points.empty() || row != last + 1) path.starts.push_back(path.points.size());
+    const size_t row = std::min(c.row_of(p.timestamp), c.seconds.size() - 1);
+    if (path.points.empty() || (row != last + 1 && c.seconds[row] - c.seconds[last] > least_gap(c.duration)))
+      path.starts.push_back(path.points.size());
     last = row;
     path.points.push_back(drawn(c, p.world_from_cam));
   }

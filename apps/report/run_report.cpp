@@ -68,8 +68,13 @@ Context::Context(const RunLog& run_log, const ReportFacts& run_facts, const Trut
   fps = facts.camera.fps > 0 ? facts.camera.fps : frame_rate_of(stamps);
   if (!seconds.empty()) duration = std::max(seconds.back(), 1 / fps);
   stretches = lost_stretches(rows, facts.limits);
-  for (const LostStretch& s : stretches)
-    bands.push_back({seconds[s.begin], s.end < seconds.size() ? seconds[s.end] : duration, name_of(s.state)});
+  for (const LostStretch& s : stretches) {
+    const double end = s.end < seconds.size() ? seconds[s.end] : duration;
+    if (!bands.empty() && seconds[s.begin] - bands.back().end < least_gap(duration))
+      bands.back().end = end;
+    else
+      bands.push_back({seconds[s.begin], end, name_of(s.state)});
+  }
   error_m.assign(rows.size(), std::numeric_limits<double>::quiet_NaN());
   if (!truth.evaluation) return;
   const Evaluation& e = *truth.evaluation;
