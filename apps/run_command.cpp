@@ -27,6 +27,7 @@
 #include "dkb_slam/slam.h"
 #include "interrupt.h"
 #include "live_report.h"
+#include "report/run_report.h"
 #include "run_outputs.h"
 
 namespace dkb {
@@ -88,16 +89,19 @@ class Progress {
   Stopwatch watch_;
 };
 
+std::string source_name(const fs::path& source) {
+  if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
+  const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  return (fs::is_regular_file(source) ? name.stem() : name).string();
+}
+
 fs::path default_output(const fs::path& source) {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
   localtime_r(&now, &parts);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
-  fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
-  if (fs::is_regular_file(source)) name = name.stem();
-  if (is_live(source.string())) name = source.string().substr(0, source.string().find(':'));
-  return fs::path("dkb-out") / (name.string() + "-" + stamp);
+  return fs::path("dkb-out") / (source_name(source) + "-" + stamp);
 }
 
 void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
@@ -164,6 +168,33 @@ DetectorChoice detector_choice(const RunArguments& args, const Options& options,
   return choice_beside(options, args.disable, std::move(choice));
 }
 
+report::ReportFacts report_facts(const RunArguments& args, const Source& source, const Options& options,
+                                 const Slam& slam, const RunFacts& facts) {
+  report::ReportFacts r;
+  r.name = source_name(args.source);
+  r.source = source.description();
+  r.version = version();
+  r.camera = source.camera();
+  r.realtime = options.realtime;
+  r.offered = facts.offered;
+  r.skipped = facts.skipped;
+  r.wall_s = facts.wall_s;
+  r.statistics = statistics_with(slam, facts);
+  r.trajectory = trajectories_by_map(slam.trajectory(), facts.stamps).front();
+  r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
+  r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
+  r.seed = options.seed;
+  r.choices = {{"source", args.source},
+               {"camera", fmt::format("{} x {}, fx {:g}, fy {:g}, cx {:g}, cy {:g}", r.camera.width, r.camera.height,
+                                      r.camera.fx, r.camera.fy, r.camera.cx, r.camera.cy)},
+               {"detector", r.statistics.detector},
+               {"preset", options.preset()},
+               {"pace", options.realtime ? "real time" : "as fast as it goes, waiting for mapping"}};
+  if (!args.load_map.empty()) r.choices.emplace_back(args.localize ? "localised in" : "went on in", args.load_map);
+  if (!args.prior_file.empty()) r.choices.emplace_back("motion prior", args.prior_file);
+  return r;
+}
+
 int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
   const Options options = options_of(args);
@@ -187,11 +218,12 @@ int run(const RunArguments& args) {
   RunFacts facts;
   facts.writes_map = !args.localize;
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
+  report::RunLog log(recording->size());
   std::optional<PacedSource> paced;
   if (args.realtime && !live) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
   const Interrupt interrupt([&] { source.stop(); });
-  LiveReport report;
+  LiveReport camera;
   Progress progress(recording->size(), args.quiet);
   const auto warn = [&] {
     for (const std::string& line : recording->take_warnings()) warnings.warn(line, line);
@@ -206,7 +238,7 @@ int run(const RunArguments& args) {
       if (next.state == SourceState::ended) break;
       if (next.state != SourceState::unplugged) facts.offered = static_cast<int>(next.index) + 1;
       if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
-      report.add(next);
+      camera.add(next);
       if (next.state == SourceState::unplugged) {
         warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
         continue;
@@ -222,9 +254,12 @@ int run(const RunArguments& args) {
       const FrameResult result = slam.process(next.frame);
       for (const Mover& mover : result.movers)
         facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-      for (const Event& event : slam.take_events())
+      log.frame(next.frame, result);
+      for (const Event& event : slam.take_events()) {
+        log.event(event);
         if (event.kind == Event::Kind::warning)
           warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+      }
       if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
       if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
       progress.frame(next.index + 1, &result);
@@ -260,6 +295,9 @@ int run(const RunArguments& args) {
     if (!args.quiet) fmt::print("{}\n", line);
   }
   write_outputs(out, slam, facts);
+  const report::ReportFacts reported = report_facts(args, *recording, options, slam, facts);
+  write_file_atomically(out / "report.html",
+                        report_html(log, reported, report::truth_beside(args.source, reported.trajectory)));
   if (args.cv_orb && !Interrupt::happened()) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
   if (failure) std::rethrow_exception(failure);
@@ -269,7 +307,7 @@ int run(const RunArguments& args) {
     fmt::print("{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_at,
                s.tracked, facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
-  if (const std::string line = report.text(source.counts()); (live || args.live) && !args.quiet && !line.empty())
+  if (const std::string line = camera.text(source.counts()); (live || args.live) && !args.quiet && !line.empty())
     fmt::print("{}\n", line);
   if (const SourceCounts lost = recording->counts(); !live && !args.quiet && lost.unpaired + lost.late > 0)
     fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);

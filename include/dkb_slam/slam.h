@@ -36,7 +36,7 @@ struct Event {
   int frame = 0;         ///< index of the frame it came with, as in FrameResult
   int64_t stamp_ns = 0;  ///< of that frame
   int keyframe = -1;     ///< of keyframe, loop and merge
-  std::string text;      ///< one line for people, may be empty; of warnings what is wrong
+  std::string text;      ///< one line for people, may be empty; of warnings what is wrong, of keyframes the rule
 };
 DKB_SLAM_API const char* name_of(Event::Kind kind);
 
@@ -68,6 +68,9 @@ struct Statistics {
   double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
   int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
   std::map<std::string, StageSummary> stages;  ///< times by stage: "tracking", "mapping", "wait_mapper" ...
+  /// By stage: how often it took how long. Element k counts durations from 2^(k/4 - 5) ms to those of element k + 1, the
+  /// first and the 64th, which is the last that there may be, also what lies beyond.
+  std::map<std::string, std::vector<int>> stage_histograms;
 };
 
 /// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map() and the switches.

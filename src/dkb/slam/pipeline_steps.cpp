@@ -308,7 +308,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.world_from_odom = odometry_.world_from_odom();
   record_.add(tracked, result, tracker_.map());
   note_changes(tracked);
-  if (decision.insert) note(Event::Kind::keyframe, "", tracked.reference);
+  if (decision.insert) note(Event::Kind::keyframe, rule_of(decision), tracked.reference);
   if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
 
   const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
