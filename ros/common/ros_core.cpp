@@ -1,0 +1,622 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ros_core.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <future>
+
+#include "outputs.h"
+
+namespace dkb_ros {
+namespace {
+
+constexpr int64_t kRepeatAfter = 10'000'000'000;  // [ns] before the same complaint is made again
+constexpr size_t kMaxUnplaced = 30;               // [frames] that wait for the robot's odometry
+
+int64_t steady_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+std::chrono::steady_clock::time_point in_seconds(double s) {
+  return std::chrono::steady_clock::now() +
+         std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
+}
+
+// Messages that differ in their numbers say the same.
+std::string without_digits(std::string text) {
+  std::erase_if(text, [](char c) { return c >= '0' && c <= '9'; });
+  return text;
+}
+
+dkb::ImageView view_of(const ImageMessage& image, bool depth) {
+  using dkb::PixelFormat;
+  static const std::map<std::string, PixelFormat> colours = {
+      {"rgb8", PixelFormat::rgb8},   {"bgr8", PixelFormat::bgr8},   {"8UC3", PixelFormat::bgr8},
+      {"rgba8", PixelFormat::rgba8}, {"bgra8", PixelFormat::bgra8}, {"8UC4", PixelFormat::bgra8},
+      {"mono8", PixelFormat::grey8}, {"8UC1", PixelFormat::grey8}};
+  static const std::map<std::string, PixelFormat> depths = {
+      {"16UC1", PixelFormat::depth_u16}, {"mono16", PixelFormat::depth_u16}, {"32FC1", PixelFormat::depth_f32}};
+  const std::string topic = depth ? "depth/image" : "rgb/image";
+  const auto& known = depth ? depths : colours;
+  const auto format = known.find(image.encoding);
+  if (format == known.end())
+    throw dkb::InputError(topic + ": encoding \"" + image.encoding + "\" is not read; publish " +
+                          (depth ? "16UC1 or 32FC1" : "rgb8, bgr8, rgba8, bgra8 or mono8 (image_proc converts others)"));
+  dkb::ImageView view{image.data, image.width, image.height, image.step, format->second};
+  const bool one_byte = !depth;
+  if (!one_byte && image.is_bigendian != (std::endian::native == std::endian::big))
+    throw dkb::InputError(topic + ": its byte order is not this machine's; publish it in this machine's");
+  if (image.width <= 0 || image.height <= 0 || view.stride < view.row_bytes() ||
+      image.size < view.stride * static_cast<size_t>(image.height - 1) + view.row_bytes())
+    throw dkb::InputError(topic + ": " + std::to_string(image.size) + " bytes are fewer than its width, height and step say");
+  return view;
+}
+
+dkb::Camera camera_of(const CameraInfoMessage& info, bool rectified) {
+  dkb::Camera camera;
+  camera.width = info.width;
+  camera.height = info.height;
+  if (rectified) {
+    camera.fx = info.p[0], camera.fy = info.p[5], camera.cx = info.p[2], camera.cy = info.p[6];
+  } else {
+    camera.fx = info.k[0], camera.fy = info.k[4], camera.cx = info.k[2], camera.cy = info.k[5];
+    const bool distorted = std::any_of(info.d.begin(), info.d.end(), [](double d) { return d != 0; });
+    if (distorted && (info.distortion_model != "plumb_bob" || info.d.size() > 5))
+      throw dkb::InputError("rgb/camera_info: distortion model \"" + info.distortion_model +
+                            "\" is not known, plumb_bob is; publish rectified images and set `rectified`");
+    double* const fields[] = {&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
+    for (size_t i = 0; distorted && i < info.d.size(); ++i) *fields[i] = info.d[i];
+  }
+  if (!(camera.fx > 0 && camera.fy > 0))
+    throw dkb::InputError("rgb/camera_info: it holds no calibration (focal length 0); calibrate, or set `camera`");
+  return camera;
+}
+
+const char* text_of(bool on) {
+  return on ? "on" : "off";
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+}  // namespace
+
+RosCore::RosCore(const Parameters& parameters, Middleware& middleware)
+    : parameters_(parameters),
+      middleware_(middleware),
+      pairing_(static_cast<int64_t>(1e9 * parameters.sync_tolerance), static_cast<size_t>(parameters.queue_size)),
+      odometry_(parameters.prior_drift) {
+  parameters_.options.check();
+  tracking_ = std::thread([this] { run_tracking(); });
+  reports_ = std::thread([this] { run_reports(); });
+  if (parameters_.grid_period > 0) grids_ = std::thread([this] { run_grids(); });
+}
+
+RosCore::~RosCore() {
+  {
+    const std::scoped_lock lock(input_mutex_, report_mutex_);
+    stopping_ = true;
+  }
+  input_changed_.notify_all();
+  report_due_.notify_all();
+  tracking_.join();
+  reports_.join();
+  if (grids_.joinable()) grids_.join();
+}
+
+void RosCore::colour(ImageMessage image) {
+  image.arrived_ns = steady_ns();
+  const std::lock_guard lock(input_mutex_);
+  last_image_ns_ = image.arrived_ns;
+  enqueue(pairing_.add_colour(std::move(image)));
+}
+
+void RosCore::depth(ImageMessage image) {
+  image.arrived_ns = steady_ns();
+  const std::lock_guard lock(input_mutex_);
+  last_image_ns_ = image.arrived_ns;
+  enqueue(pairing_.add_depth(std::move(image)));
+}
+
+void RosCore::enqueue(std::vector<ImagePair> pairs) {
+  for (ImagePair& pair : pairs) {
+    if (pairs_.size() == static_cast<size_t>(parameters_.queue_size)) {
+      const bool jumped = pairs_.front().clock_jumped;
+      pairs_.pop_front();
+      ++dropped_;
+      if (jumped) (pairs_.empty() ? pair : pairs_.front()).clock_jumped = true;
+    }
+    pairs_.push_back(std::move(pair));
+  }
+  if (!pairs_.empty()) input_changed_.notify_one();
+}
+
+void RosCore::camera_info(const CameraInfoMessage& info) {
+  const std::lock_guard lock(input_mutex_);
+  if (!camera_info_) camera_info_ = info;
+}
+
+void RosCore::odometry(const OdometryMessage& odometry) {
+  const std::lock_guard lock(input_mutex_);
+  if (!odometry_.add(odometry)) ++late_motion_;
+}
+
+void RosCore::imu(const ImuMessage& imu) {
+  const std::lock_guard lock(input_mutex_);
+  if (!gyro_.add(imu)) ++late_motion_;
+}
+
+void RosCore::request(Task task, Done done) {
+  {
+    const std::lock_guard lock(input_mutex_);
+    if (!stopping_) {
+      tasks_.emplace_back(std::move(task), std::move(done));
+      input_changed_.notify_one();
+      return;
+    }
+  }
+  done({false, "the node is stopping"});
+}
+
+void RosCore::save_map(const std::string& path, Done done) {
+  request(
+      [path](dkb::Slam& slam) {
+        slam.save_map(path);
+        return Answer{true, "map written to " + path};
+      },
+      std::move(done));
+}
+
+void RosCore::load_map(const std::string& path, Done done) {
+  request(
+      [this, path](dkb::Slam& slam) {
+        slam.load_map(path);
+        forget_motion();
+        return Answer{true, "going on in " + path};
+      },
+      std::move(done));
+}
+
+void RosCore::reset(Done done) {
+  request(
+      [this](dkb::Slam& slam) {
+        slam.reset();
+        forget_motion();
+        return Answer{true, "a new world begins"};
+      },
+      std::move(done));
+}
+
+void RosCore::pause(bool on, Done done) {
+  request(
+      [on](dkb::Slam& slam) {
+        slam.pause(on);
+        return Answer{true, std::string("pause is ") + text_of(on)};
+      },
+      std::move(done));
+}
+
+void RosCore::localize_only(bool on, Done done) {
+  request(
+      [on](dkb::Slam& slam) {
+        slam.localize_only(on);
+        return Answer{true, std::string("localize_only is ") + text_of(on)};
+      },
+      std::move(done));
+}
+
+void RosCore::run_tracking() {
+  std::unique_lock lock(input_mutex_);
+  while (true) {
+    input_changed_.wait(lock, [this] { return stopping_ || !tasks_.empty() || !pairs_.empty(); });
+    if (!tasks_.empty()) {
+      const auto [task, done] = std::move(tasks_.front());
+      tasks_.pop_front();
+      const bool stopping = stopping_;
+      lock.unlock();
+      Answer answer{false, stopping ? "the node is stopping" : "no frame has come yet, so there is no map"};
+      if (slam_ && !stopping) try {
+          answer = task(*slam_);
+        } catch (const dkb::InputError& error) {
+          answer = {false, error.what()};
+        }
+      if (!answer.success) complain(LogLevel::warning, answer.message);
+      done(answer);
+      lock.lock();
+      continue;
+    }
+    if (stopping_) return;
+    const ImagePair pair = std::move(pairs_.front());
+    pairs_.pop_front();
+    lock.unlock();
+    try {
+      process(pair);
+    } catch (const dkb::InputError& error) {
+      complain(LogLevel::error, error.what());
+      const std::lock_guard report(report_mutex_);
+      ++counts_.rejected;
+      trouble_ = error.what();
+    }
+    lock.lock();
+  }
+}
+
+void RosCore::process(const ImagePair& pair) {
+  if (pair.clock_jumped) {
+    {
+      const std::lock_guard lock(input_mutex_);
+      odometry_.clear();
+      gyro_.clear();
+    }
+    complain(LogLevel::warning, "the stamps of the images went back by more than a second: a new world begins");
+    if (slam_) slam_->reset();
+    forget_motion();
+  }
+  if (!slam_ && !start(pair)) return;
+  const dkb::FrameInput input = input_of(pair);
+  const dkb::FrameResult result = slam_->process(input);
+  if (result.state != dkb::TrackingState::paused) last_stamp_ns_ = pair.colour.stamp_ns;
+  publish(pair, input, result);
+}
+
+const std::string& RosCore::camera_frame(const ImagePair& pair) const {
+  return parameters_.camera_frame.empty() ? pair.colour.frame_id : parameters_.camera_frame;
+}
+
+// Makes the library's system once the camera and its mount are known.
+bool RosCore::start(const ImagePair& pair) {
+  const auto wait_for = [this](const std::string& what) {
+    complain(LogLevel::warning, what);
+    const std::lock_guard lock(report_mutex_);
+    ++counts_.waiting;
+    trouble_ = what;
+    return false;
+  };
+  const std::optional<dkb::Camera> camera = find_camera();
+  if (!camera) return wait_for("waiting for rgb/camera_info; without it, set `camera`");
+  const std::string& frame = camera_frame(pair);
+  const auto mount = parameters_.base_from_cam ? parameters_.base_from_cam
+                                               : middleware_.transform(parameters_.base_frame, frame, std::nullopt);
+  if (!mount)
+    return wait_for("waiting for the transform from " + parameters_.base_frame + " to " + frame +
+                    "; without one, set `base_from_cam`");
+  base_from_cam_ = *mount;
+  camera_frame_ = frame;
+  dkb::Options options = parameters_.options;
+  options.base_from_cam = base_from_cam_;
+  auto slam = std::make_shared<dkb::Slam>(*camera, options, dkb::make_detectors(parameters_.detector, *camera));
+  slam->localize_only(parameters_.localize_only);
+  if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
+  middleware_.log(LogLevel::info, "started: camera " + std::to_string(camera->width) + " x " +
+                                      std::to_string(camera->height) + " in " + frame);
+  if (pair.depth.frame_id != pair.colour.frame_id)
+    middleware_.log(LogLevel::warning, "depth/image is in frame " + pair.depth.frame_id + ", rgb/image in " +
+                                           pair.colour.frame_id + ": taken for registered to the colour image");
+  const std::lock_guard lock(report_mutex_);
+  slam_ = std::move(slam);
+  return true;
+}
+
+std::optional<dkb::Camera> RosCore::find_camera() {
+  std::optional<dkb::Camera> camera;
+  if (!parameters_.camera.empty()) {
+    camera = std::filesystem::exists(parameters_.camera) ? dkb::Camera::load(parameters_.camera)
+                                                         : dkb::Camera::named(parameters_.camera);
+  } else {
+    const std::lock_guard lock(input_mutex_);
+    if (!camera_info_) return std::nullopt;
+    const CameraInfoMessage info = *camera_info_;
+    camera_info_.reset();  // a wrong one may be followed by a right one
+    camera = camera_of(info, parameters_.rectified);
+    camera_info_ = info;
+  }
+  camera->depth_factor = parameters_.depth_factor;
+  camera->check();
+  return camera;
+}
+
+dkb::FrameInput RosCore::input_of(const ImagePair& pair) {
+  dkb::FrameInput input;
+  input.stamp_ns = pair.colour.stamp_ns;
+  input.colour = view_of(pair.colour, false);
+  input.depth = view_of(pair.depth, true);
+  input.depth_stamp_ns = pair.depth.stamp_ns;
+  if (last_stamp_ns_) input.prior = prior(input.stamp_ns);
+  return input;
+}
+
+// What wheels or gyroscope say of the motion since the frame before.
+std::optional<dkb::MotionPrior> RosCore::prior(int64_t stamp_ns) {
+  const PriorKind kind = parameters_.prior;
+  std::optional<dkb::MotionPrior> motion;
+  std::string frame;
+  {
+    const std::lock_guard lock(input_mutex_);
+    if ((kind == PriorKind::odom || kind == PriorKind::automatic) && !odometry_.empty()) {
+      motion = odometry_.between(*last_stamp_ns_, stamp_ns);
+      frame = odometry_.child_frame_id();
+    }
+    if (!motion && (kind == PriorKind::imu || kind == PriorKind::automatic) && !gyro_.empty()) {
+      motion = gyro_.between(*last_stamp_ns_, stamp_ns);
+      frame = gyro_.frame_id();
+    }
+  }
+  if (!motion) return std::nullopt;
+  const std::optional<Rigid3> cam_from_frame = cam_from(frame);
+  if (!cam_from_frame) {
+    complain(LogLevel::warning, "no transform from " + camera_frame_ + " to " + frame + ": its motion is not used");
+    return std::nullopt;
+  }
+  const std::lock_guard lock(report_mutex_);
+  ++counts_.priors;
+  return moved_to_camera(*motion, *cam_from_frame);
+}
+
+std::optional<Rigid3> RosCore::cam_from(const std::string& frame) {
+  if (frame.empty() || frame == parameters_.base_frame) return base_from_cam_.inverse();
+  const auto known = cam_from_frame_.find(frame);
+  if (known != cam_from_frame_.end()) return known->second;
+  const std::optional<Rigid3> found = middleware_.transform(camera_frame_, frame, std::nullopt);
+  if (found) cam_from_frame_.emplace(frame, *found);
+  return found;
+}
+
+void RosCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
+  publish_poses(result);
+  const double out_ms = 1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
+  {
+    const std::lock_guard lock(report_mutex_);
+    trouble_.clear();
+    state_ = result.state;
+    last_result_stamp_ns_ = result.stamp_ns;
+    ++counts_.frames;
+    counts_.tracked += result.tracked();
+    counts_.predicted += result.state == dkb::TrackingState::predicted;
+    counts_.lost += result.state == dkb::TrackingState::lost;
+    ++recent_.frames;
+    recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
+    recent_.tracking_ms.add(result.tracking_ms);
+    recent_.latency_ms.add(out_ms);
+    recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
+  }
+  if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
+    MoversOutput movers{result.stamp_ns, parameters_.map_frame, Eigen::Quaterniond::Identity(), result.movers};
+    if (result.world_from_cam) movers.axes = result.world_from_cam->rotation;
+    middleware_.publish(movers);
+  }
+  if (middleware_.wanted(Topic::features_image))
+    middleware_.publish(ColourImageOutput{result.stamp_ns, camera_frame_, draw_features(input.colour, result)});
+  tell_events();
+}
+
+void RosCore::publish_poses(const dkb::FrameResult& result) {
+  const Rigid3 cam_from_base = base_from_cam_.inverse();
+  std::vector<TransformOutput> transforms;
+  if (!result.tracked()) {
+    last_pose_.reset();
+    if (parameters_.publish_map_tf && map_from_odom_)
+      transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
+    if (!transforms.empty()) middleware_.publish(transforms);
+    return;
+  }
+  const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
+  const Rigid3 odom_from_base = *result.odom_from_cam * cam_from_base;
+  const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
+
+  if (parameters_.publish_odom_tf) {
+    map_from_odom_ = result.world_from_odom;
+    transforms.push_back({result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, odom_from_base});
+  } else {
+    place_robots_odometry(result.stamp_ns, map_from_base);
+  }
+  if (parameters_.publish_map_tf && map_from_odom_)
+    transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
+  if (!transforms.empty()) middleware_.publish(transforms);
+
+  OdometryOutput odometry;
+  odometry.pose = {result.stamp_ns, parameters_.odom_frame, odom_from_base,
+                   ros_covariance(covariance, base_from_cam_, odom_from_base.rotation)};
+  odometry.child_frame_id = parameters_.base_frame;
+  const Matrix6d to_base = adjoint(base_from_cam_);
+  const Matrix6d in_base = to_base * covariance * to_base.transpose();
+  const double dt = last_pose_ ? 1e-9 * static_cast<double>(result.stamp_ns - last_pose_->stamp_ns) : 0;
+  if (dt > 0) {
+    // The errors of both poses are taken for independent: an upper bound, since they share the map's.
+    odometry.twist = twist_of(last_pose_->odom_from_base.inverse() * odom_from_base) / dt;
+    odometry.twist_covariance = (last_pose_->covariance + in_base) / (dt * dt);
+  } else {
+    odometry.twist_covariance = 1e6 * Matrix6d::Identity();  // not known
+  }
+  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
+  middleware_.publish(odometry);
+  if (middleware_.wanted(Topic::pose))
+    middleware_.publish(PoseMessage{result.stamp_ns, parameters_.map_frame, map_from_base,
+                                    ros_covariance(covariance, base_from_cam_, map_from_base.rotation)});
+}
+
+// map -> odom, where odom -> base is the robot's. Its odometry of a frame's time may come later than the frame's pose.
+void RosCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base) {
+  unplaced_.emplace_back(stamp_ns, map_from_base);
+  if (unplaced_.size() > kMaxUnplaced) unplaced_.pop_front();
+  for (auto frame = unplaced_.rbegin(); frame != unplaced_.rend(); ++frame) {
+    const auto odom_from_base = middleware_.transform(parameters_.odom_frame, parameters_.base_frame, frame->first);
+    if (!odom_from_base) continue;
+    map_from_odom_ = frame->second * odom_from_base->inverse();
+    unplaced_.erase(unplaced_.begin(), frame.base());
+    return;
+  }
+  if (unplaced_.size() == kMaxUnplaced)
+    complain(LogLevel::warning, "no transform from " + parameters_.odom_frame + " to " + parameters_.base_frame +
+                                    " at the images' times; with `publish_odom_tf` false the robot must send it");
+}
+
+void RosCore::forget_motion() {
+  last_stamp_ns_.reset();
+  last_pose_.reset();
+  map_from_odom_.reset();
+  unplaced_.clear();
+}
+
+void RosCore::tell_events() {
+  for (const dkb::Event& e : slam_->take_events()) {
+    using Kind = dkb::Event::Kind;
+    if (e.kind == Kind::keyframe) continue;
+    const bool bad = e.kind == Kind::warning || e.kind == Kind::lost;
+    middleware_.log(bad ? LogLevel::warning : LogLevel::info,
+                    std::string(dkb::name_of(e.kind)) + (e.text.empty() ? "" : ": " + e.text));
+  }
+}
+
+// The same complaint is made again only after a while.
+void RosCore::complain(LogLevel level, const std::string& text) {
+  const int64_t now = steady_ns();
+  const std::string gist = without_digits(text);
+  if (gist == last_complaint_ && now - last_complaint_ns_ < kRepeatAfter) return;
+  last_complaint_ = gist;
+  last_complaint_ns_ = now;
+  middleware_.log(level, text);
+}
+
+void RosCore::run_reports() {
+  auto diagnostics_due = in_seconds(1), map_due = in_seconds(parameters_.map_period);
+  int64_t published_ns = 0;
+  std::unique_lock lock(report_mutex_);
+  while (true) {
+    const auto due = parameters_.map_period > 0 ? std::min(diagnostics_due, map_due) : diagnostics_due;
+    if (report_due_.wait_until(lock, due, [this] { return stopping_; })) return;
+    const auto now = std::chrono::steady_clock::now();
+    const std::shared_ptr<const dkb::Slam> slam = slam_;
+    const int64_t stamp_ns = last_result_stamp_ns_;
+    lock.unlock();
+    if (now >= diagnostics_due) {
+      publish_diagnostics(slam.get());
+      diagnostics_due = in_seconds(1);
+    }
+    if (parameters_.map_period > 0 && now >= map_due) {
+      if (slam && stamp_ns != published_ns) publish_map(*slam, stamp_ns);
+      published_ns = stamp_ns;
+      map_due = in_seconds(parameters_.map_period);
+    }
+    lock.lock();
+  }
+}
+
+void RosCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
+  if (middleware_.wanted(Topic::map_points))
+    middleware_.publish(CloudOutput{stamp_ns, parameters_.map_frame, slam.map().points()});
+  if (middleware_.wanted(Topic::path))
+    middleware_.publish(PathOutput{stamp_ns, parameters_.map_frame,
+                                   path_of(slam.trajectory(), slam.options().base_from_cam.inverse(),
+                                           parameters_.path_step)});
+}
+
+// The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.
+void RosCore::run_grids() {
+#ifdef __linux__
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
+#endif
+  std::unique_lock lock(report_mutex_);
+  while (!report_due_.wait_until(lock, in_seconds(parameters_.grid_period), [this] { return stopping_; })) {
+    lock.unlock();
+    if (middleware_.wanted(Topic::grid)) {
+      std::promise<Answer> answered;
+      std::function<dkb::DenseMap()> make_dense_map;
+      int64_t stamp_ns = 0;
+      request(
+          [&](dkb::Slam& slam) {
+            make_dense_map = slam.dense_map_task();
+            stamp_ns = last_stamp_ns_.value_or(0);
+            return Answer{true, ""};
+          },
+          [&](const Answer& answer) { answered.set_value(answer); });
+      if (answered.get_future().get().success) try {
+          const dkb::DenseMap dense = make_dense_map();
+          if (dense.grid) {
+            GridOutput grid = grid_in_map(*dense.grid);
+            grid.stamp_ns = stamp_ns;
+            grid.frame_id = parameters_.map_frame;
+            middleware_.publish(grid);
+          }
+        } catch (const dkb::InputError& error) {
+          middleware_.log(LogLevel::warning, error.what());
+        }
+    }
+    lock.lock();
+  }
+}
+
+void RosCore::publish_diagnostics(const dkb::Slam* slam) {
+  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, last_image_ns = 0;
+  {
+    const std::lock_guard lock(input_mutex_);
+    unpaired = pairing_.unpaired();
+    late = pairing_.late();
+    late_motion = late_motion_;
+    dropped = dropped_;
+    last_image_ns = last_image_ns_;
+  }
+  const int maps = slam == nullptr ? 0 : slam->statistics().maps;
+  std::unique_lock lock(report_mutex_);
+  const int64_t newly_dropped = dropped - reported_dropped_;
+  reported_dropped_ = dropped;
+  const double silent = 1e-9 * static_cast<double>(steady_ns() - last_image_ns);
+  using Level = DiagnosticsOutput::Level;
+  DiagnosticsOutput d;
+  d.stamp_ns = middleware_.now_ns();
+  const auto say = [&](Level level, const std::string& message) {
+    if (level <= d.level && !d.message.empty()) return;
+    d.level = level;
+    d.message = message;
+  };
+  if (last_image_ns == 0)
+    say(Level::error, "no images have come");
+  else if (silent > 2)
+    say(Level::error, "no images for " + number(silent) + " s");
+  if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
+  if (slam != nullptr && state_ == dkb::TrackingState::predicted)
+    say(Level::warning, "carried by the motion prior");
+  else if (slam != nullptr && (state_ == dkb::TrackingState::lost || state_ == dkb::TrackingState::initialising))
+    say(Level::warning, "not localised");
+  if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
+  if (maps > 1) say(Level::warning, std::to_string(maps) + " maps that are not joined: poses are in the newest");
+  if (d.message.empty()) d.message = dkb::name_of(state_);
+  const auto add = [&](const std::string& key, const std::string& value) { d.values.emplace_back(key, value); };
+  const auto count = [&](const std::string& key, int64_t value) { add(key, std::to_string(value)); };
+  add("state", slam == nullptr ? "waiting" : dkb::name_of(state_));
+  count("frames", counts_.frames);
+  count("tracked", counts_.tracked);
+  count("predicted", counts_.predicted);
+  count("lost", counts_.lost);
+  count("dropped", dropped);
+  count("unpaired", unpaired);
+  count("late", late);
+  count("late odometry", late_motion);
+  count("rejected", counts_.rejected);
+  count("waiting", counts_.waiting);
+  count("with prior", counts_.priors);
+  count("maps", maps);
+  count("rate [1/s]", recent_.frames);
+  const auto series = [&](const std::string& name, const Series& s) {
+    add(name + " mean [ms]", number(s.count == 0 ? 0 : s.sum / static_cast<double>(s.count)));
+    add(name + " max [ms]", number(s.max));
+  };
+  series("skew", recent_.skew_ms);
+  series("tracking", recent_.tracking_ms);
+  series("latency", recent_.latency_ms);
+  series("overhead", recent_.overhead_ms);
+  recent_ = {};
+  lock.unlock();
+  middleware_.publish(d);
+}
+
+}  // namespace dkb_ros
