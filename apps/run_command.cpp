@@ -15,6 +15,7 @@
 
 #include "bench/bench_cv_orb.h"
 #include "dkb/dataset/folder_source.h"
+#include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/map/map_file.h"
 #include "dkb/util/errors.h"
@@ -38,7 +39,7 @@ struct RunArguments {
   int threads = 0;
   DetectorChoice detection;
   std::string filter, disable;
-  std::string load_map;
+  std::string load_map, prior_file;
   bool localize = false;
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
        quiet = false;
@@ -138,7 +139,10 @@ int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
   const Options options = options_of(args);
   if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
-  FolderSource folder(args.dataset, folder_options(args));
+  auto opened = std::make_unique<FolderSource>(args.dataset, folder_options(args));
+  FolderSource& folder = *opened;
+  std::unique_ptr<Source> recording = std::move(opened);
+  if (!args.prior_file.empty()) recording = with_prior(std::move(recording), read_odometry(args.prior_file));
   const Stopwatch loading;
   Detectors detectors = make_detectors(detector_choice(args, options, folder), folder.camera());
   const double loading_s = loading.ms() / 1000;
@@ -158,8 +162,8 @@ int run(const RunArguments& args) {
   facts.offered = static_cast<int>(*folder.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
-  if (args.realtime) paced.emplace(folder);
-  Source& source = paced ? static_cast<Source&>(*paced) : folder;
+  if (args.realtime) paced.emplace(*recording);
+  Source& source = paced ? static_cast<Source&>(*paced) : *recording;
   Progress progress(*folder.size(), args.quiet);
   const Stopwatch wall;
   while (!interrupted) {
@@ -251,6 +255,8 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--max-frames", args->folder.max_frames, "Pairs at most, counted from --start");
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
+  command->add_option("--prior-file", args->prior_file,
+                      "Wheel odometry in TUM format: guides tracking, and bridges what the images do not tell");
   command->add_flag("--localize", args->localize, "Track in that map without changing it");
   command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");

@@ -67,6 +67,7 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
   nlohmann::ordered_json j;
   j["frames"] = facts.offered;
   j["tracked"] = s.tracked;
+  j["predicted"] = s.predicted;
   j["lost"] = s.lost;
   j["skipped"] = facts.skipped;
   j["keyframes"] = s.keyframes;

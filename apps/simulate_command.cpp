@@ -16,6 +16,7 @@ namespace {
 struct SimulateArguments {
   SimulatorOptions options;
   std::string out;
+  std::vector<double> blackout;
 };
 
 void run_simulate(const SimulateArguments& arguments) {
@@ -48,7 +49,16 @@ void register_simulate(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)");
   command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")->capture_default_str();
+  command->add_option("--blackout", arguments->blackout, "START,SECONDS: colour and depth are black from there on")
+      ->delimiter(',')
+      ->expected(2);
+  command->add_option("--odometry", o.odometry_drift,
+                      "write odometry.txt: a share of error in length, and as many rad/m in heading");
   command->callback([arguments, &exit_code] {
+    if (arguments->blackout.size() == 2) {
+      arguments->options.blackout_start = arguments->blackout[0];
+      arguments->options.blackout_seconds = arguments->blackout[1];
+    }
     run_simulate(*arguments);
     exit_code = 0;
   });

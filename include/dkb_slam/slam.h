@@ -51,6 +51,7 @@ struct TrajectoryFrame {
 /// What has happened since the world began.
 struct Statistics {
   int frames = 0, tracked = 0, lost = 0;       ///< accepted; with a pose; without one although there is a map
+  int predicted = 0;                           ///< of the tracked ones, by a motion prior alone
   int relocalisations = 0;                     ///< how often a lost camera was found
   int keyframes = 0, keyframes_inserted = 0;   ///< in the map now; ever made
   int maps = 0;                                ///< that are not joined
@@ -100,6 +101,10 @@ class DKB_SLAM_API Slam {
   void pause(bool on);
   /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
   void localize_only(bool on);
+  /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found. The pose
+  /// is in the world of the map, the covariance a right perturbation, [translation m, rotation rad], camera axes.
+  /// Throws InputError when a number is not finite or the covariance is not positive.
+  void suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance);
   /// Every frame's result then says which of the keyframe tests said what, with their numbers.
   void explain_keyframes(bool on);
 

@@ -3,6 +3,8 @@
 
 #include <chrono>
 
+#include "dkb/image/skipped_motion.h"
+
 namespace dkb {
 
 PacedSource::PacedSource(Source& source) : source_(source), thread_([this] { run(); }) {}
@@ -37,7 +39,13 @@ void PacedSource::run() {
       std::unique_lock lock(mutex_);
       if (wake_.wait_until(lock, due, [&] { return stopped_; })) break;
     }
-    dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame)));
+    const auto leave_motion = [](const SourceFrame& dropped, SourceFrame& next) {
+      if (dropped.state != SourceState::frame || next.state != SourceState::frame) return;
+      SkippedMotion skipped;
+      skipped.skip(dropped.frame);
+      next.frame = skipped.with_motion(std::move(next.frame));
+    };
+    dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
   }
   queue_.close();
 }

@@ -47,6 +47,24 @@ std::string camera_file(const CameraModel& camera) {
   return text;
 }
 
+// What a robot's wheels would tell that is off by `drift` in length and turns by `drift` rad more in every metre, about
+// the world's vertical. The body is the camera; it starts where the camera does.
+Trajectory wheel_odometry(const std::vector<FrameRecord>& records, double drift) {
+  Trajectory odometry;
+  Rigid3 odom_from_cam = records.front().world_from_cam, world_from_before = odom_from_cam;
+  for (const FrameRecord& r : records) {
+    Rigid3 step = world_from_before.inverse() * r.world_from_cam;
+    const Eigen::Vector3d up_in_cam = world_from_before.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::AngleAxisd turn(drift * step.translation.norm(), up_in_cam);
+    step.translation *= 1 + drift;
+    step.rotation = (Eigen::Quaterniond(turn) * step.rotation).normalized();
+    odom_from_cam = odom_from_cam * step;
+    world_from_before = r.world_from_cam;
+    odometry.push_back({r.timestamp, r.stamp, odom_from_cam});
+  }
+  return odometry;
+}
+
 void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& records,
                  const std::filesystem::path& folder) {
   std::string rgb = "# timestamp filename\n", depth = rgb;
@@ -68,6 +86,9 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
   }
   write_file_atomically(folder / "camera.yaml", camera_file(simulator.camera()));
   write_trajectory(folder / "groundtruth.txt", truth);
+  if (const auto drift = simulator.odometry_drift())
+    write_file_atomically(folder / "odometry.txt",
+                          fmt::format("# drift {}\n", *drift) + trajectory_to_text(wheel_odometry(records, *drift)));
   write_file_atomically(folder / "boxes.txt", boxes);
   write_file_atomically(folder / "movers.csv", movers);
   write_file_atomically(folder / "rgb.txt", rgb);

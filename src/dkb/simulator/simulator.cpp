@@ -61,6 +61,11 @@ void SimulatorOptions::check() const {
   require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure,
                  "0.001 ... 0.03 s, or 0 for the scene's own");
   require_option(readout >= 0 && readout <= 0.033, "readout", readout, "0 ... 0.033 s");
+  require_option(std::isfinite(blackout_start) && blackout_start >= 0, "blackout.start", blackout_start,
+                 "at least 0 s");
+  require_option(std::isfinite(blackout_seconds) && blackout_seconds >= 0, "blackout.seconds", blackout_seconds,
+                 "at least 0 s");
+  if (odometry_drift) require_option(std::abs(*odometry_drift) <= 0.5, "odometry", *odometry_drift, "-0.5 ... 0.5");
   require_option(grey_noise >= 0 && grey_noise <= 20, "grey_noise", grey_noise, "0 ... 20 grey levels");
 }
 
@@ -208,6 +213,9 @@ const CameraModel& Simulator::camera() const {
 double Simulator::exposure() const {
   return impl_->exposure;
 }
+std::optional<double> Simulator::odometry_drift() const {
+  return impl_->options.odometry_drift;
+}
 const std::vector<std::string>& Simulator::notes() const {
   return impl_->scene.notes;
 }
@@ -216,6 +224,11 @@ Rigid3 Simulator::world_from_cam(double seconds) const {
 }
 double Simulator::stamp(int index) const {
   return static_cast<double>(impl_->start_us() + impl_->colour_us(index)) * 1e-6;
+}
+
+bool Simulator::black(int index) const {
+  const double t = static_cast<double>(impl_->colour_us(index)) * 1e-6, start = impl_->options.blackout_start;
+  return t >= start && t < start + impl_->options.blackout_seconds;
 }
 
 double Simulator::nearest_mover(double seconds) const {
@@ -246,6 +259,14 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   const Rigid3 middle = m.scene.path(t);
   frame.world_from_cam = m.scene.world_from_scene * middle;
   frame.world_from_depth_cam = m.scene.world_from_scene * m.scene.path(depth_t);
+
+  if (black(index)) {
+    frame.image.colour = ColourImage(m.camera.width, m.camera.height);
+    frame.image.grey = frame.mask = GreyImage(m.camera.width, m.camera.height);
+    frame.image.depth = DepthImage(m.camera.width, m.camera.height);
+    if (with_true_depth) frame.true_depth = frame.image.depth;
+    return frame;
+  }
 
   // What may be seen at any moment of the frame.
   double slack = 0;

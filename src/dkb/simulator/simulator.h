@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,10 @@ struct SimulatorOptions {
   // about as hard as the real clip, whose rolling shutter is longer but mostly modelled.
   double readout = 0.018;
   double grey_noise = 2.4;  // [grey levels] standard deviation of the sensor noise of the grey image, 0 ... 20
+  double blackout_start = 0, blackout_seconds = 0;  // [s] from the first frame: colour and depth are black, >= 0
+  // Wheel odometry beside the frames: its error in length, as a share, and in heading [rad/m], -0.5 ... 0.5; nothing =
+  // there is none.
+  std::optional<double> odometry_drift;
   bool depth_noise = true;  // noise, disparity steps and holes of a structured-light sensor
 
   void check() const;  // throws InvalidOption
@@ -72,6 +77,7 @@ class Simulator {
   int frames() const;
   const CameraModel& camera() const;
   double exposure() const;  // [s]
+  std::optional<double> odometry_drift() const;
   // Remarks for the user, one line each, e.g. that a path was shorter than the frames asked for.
   const std::vector<std::string>& notes() const;
 
@@ -82,6 +88,7 @@ class Simulator {
   // Truth at any time [s] from the first frame's stamp.
   Rigid3 world_from_cam(double seconds) const;
   double stamp(int index) const;  // [s] of the colour image
+  bool black(int index) const;    // the frame lies in the blackout
   // Distance of the camera from the nearest mover's middle axis [m] at that time; infinity without movers.
   double nearest_mover(double seconds) const;
 

@@ -282,14 +282,21 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.state = tracked.state;
   result.detections = scene.boxes;
   result.mask = scene.mask;
-  if (tracked.tracked()) {
+  if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
-    odometry_.update(world_from_cam, tracked.state == TrackingState::relocalised && tracked.index == 0);
+    // Where the images tell the pose again, the step is the prior's: what it was off by is the map's business.
+    const bool seen_again = last_state_ == TrackingState::predicted && tracked.tracked();
+    if (seen_again && tracked.predicted_cam_from_world)
+      odometry_.update(tracked.predicted_cam_from_world->inverse(), false);
+    odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
     result.covariance = tracked.covariance;
-    result.inliers = tracked.inliers;
     result.reference_keyframe = tracked.reference;
+  }
+  if (tracked.tracked()) {
+    const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
+    result.inliers = tracked.inliers;
     result.keyframe = decision.insert;
     if (explain_keyframes_) result.keyframe_explanation = explained(decision);
     if (options_.dynamics.filter == FilterKind::standard)

@@ -23,6 +23,7 @@ void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const 
   counts_.lost += result.state == TrackingState::lost;
   if (!result.tracked()) return;
   ++counts_.tracked;
+  counts_.predicted += result.state == TrackingState::predicted;
   counts_.relocalisations += result.state == TrackingState::relocalised;
   records_.push_back({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam});
 }

@@ -2,11 +2,14 @@
 // The library's front door; what happens to a frame stands in pipeline.cpp.
 #include "dkb_slam/slam.h"
 
+#include <Eigen/Cholesky>
+#include <cmath>
 #include <deque>
 #include <exception>
 #include <mutex>
 #include <utility>
 
+#include "dkb/image/skipped_motion.h"
 #include "dkb/map/map_file.h"
 #include "dkb/slam/pipeline.h"
 #include "dkb/util/errors.h"
@@ -107,6 +110,7 @@ class Slam::Impl {
 
   void start(Map map) {
     failure = nullptr;
+    skipped = {};
     pipeline.reset();
     auto fresh = std::make_shared<RunRecord>();
     {
@@ -132,6 +136,7 @@ class Slam::Impl {
   Options options;
   PipelineContext context;
   bool paused = false, localize_only = false, explain_keyframes = false;
+  SkippedMotion skipped;
   EventOutlet events;
   std::exception_ptr failure;
   mutable std::mutex record_mutex;
@@ -149,16 +154,19 @@ FrameResult Slam::process(const FrameInput& input) {
   return process(Frame(impl_->context.camera, input));
 }
 
-FrameResult Slam::process(const Frame& frame) {
+FrameResult Slam::process(const Frame& given) {
   if (impl_->paused) {
+    impl_->skipped.skip(given);
     FrameResult result;
-    result.stamp_ns = frame.stamp_ns();
+    result.stamp_ns = given.stamp_ns();
     result.state = TrackingState::paused;
     return result;
   }
+  const Frame frame = impl_->skipped.with_motion(given);
   impl_->throw_failure();
   impl_->pipeline->check(frame);
   FrameResult result = impl_->guarded([&] { return impl_->pipeline->process(frame); });
+  impl_->skipped = {};
   impl_->events.deliver(impl_->pipeline->take_events());
   return result;
 }
@@ -177,6 +185,14 @@ void Slam::pause(bool on) {
 void Slam::localize_only(bool on) {
   impl_->localize_only = on;
   if (impl_->pipeline) impl_->pipeline->localize_only(on);
+}
+void Slam::suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance) {
+  const Eigen::LLT<Matrix6d> root(covariance);
+  if (!world_from_cam.translation.allFinite() || !(std::abs(world_from_cam.rotation.norm() - 1) < 1e-3))
+    throw InputError("suggested pose: it is no rigid motion of finite numbers; give a unit quaternion");
+  if (!covariance.allFinite() || root.info() != Eigen::Success)
+    throw InputError("suggested pose: its covariance is not positive definite; give variances above 0");
+  if (impl_->pipeline) impl_->pipeline->suggest_pose({world_from_cam.inverse(), covariance});
 }
 void Slam::explain_keyframes(bool on) {
   impl_->explain_keyframes = on;

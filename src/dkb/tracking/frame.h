@@ -25,8 +25,9 @@ struct TrackedFrame {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
   TrackingState state = TrackingState::initialising;
-  bool starts_map = false;  // it wants to be a map's first keyframe
-  // What follows holds when tracking or relocalised.
+  bool starts_map = false;                         // it wants to be a map's first keyframe
+  std::optional<Rigid3> predicted_cam_from_world;  // by a motion prior
+  // What follows holds when tracking or relocalised; of a predicted frame the reference and the pose.
   std::shared_ptr<const RgbdFeatures> features;
   std::vector<FeatureMotion> motion;  // per feature
   std::vector<PointId> points;        // per feature: the map point it shows (inliers of the pose), else kNoPoint

@@ -307,14 +307,19 @@ bool Tracker::within_travel_distance(const PoseProposal& found, double timestamp
   if (!last_) return true;
   if (map_.root(last_->reference) != map_.root(found.keyframe)) return false;
   const double distance = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
-  return distance <= kMaxDistance + kMaxSpeed * (timestamp - last_->timestamp);
+  return distance <= kMaxDistance + kMaxSpeed * (timestamp - last_seen_);
 }
 
-bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
-  auto found = relocaliser_.find(
-      map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
-  if (!found) return false;
-  if (!within_travel_distance(*found, frame.timestamp) && found->similarity() < kMinSimilarityFar) return false;
+// `expected`: where to look first; may be null.
+bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected) {
+  std::optional<PoseProposal> found;
+  if (expected != nullptr) found = find_near(*expected, frame.matchable(), appearance);
+  if (!found) {
+    found = relocaliser_.find(
+        map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
+    if (!found) return false;
+    if (!within_travel_distance(*found, frame.timestamp) && found->similarity() < kMinSimilarityFar) return false;
+  }
   candidates_made_.reset();
   return track_local_map(found->cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->points, frame);
 }
@@ -323,27 +328,35 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance) {
 // rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
 bool Tracker::confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior) {
   if (!unconfirmed_) return false;
+  const TrackingState before = state_;
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
   if (last_->index + 1 == frame.index && track_from_last(frame, prior)) return true;
   last_ = std::move(before_loss);
-  state_ = TrackingState::lost;
+  state_ = before;
   return false;
 }
 
-// A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight.
-bool Tracker::start_map(TrackedFrame& frame) {
+// A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight. Where
+// a prior tells how the camera came here, the old map goes on instead, with a keyframe that shows nothing of it.
+bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   int with_depth = 0;
   for (size_t f = 0; f < frame.features->size(); ++f)
     with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
   if (with_depth < options_.initial_points) return false;
-  if (state_ == TrackingState::lost) {
+  if (state_ != TrackingState::initialising) {
     if (!lost_since_) lost_since_ = frame.timestamp;
     if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < options_.new_map_after) return false;
   }
   frame.inliers = with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : start_;
+  if (expected != nullptr) {
+    frame.cam_from_world = expected->cam_from_world;
+    frame.covariance = expected->covariance;
+    frame.reference = last_->reference;
+    frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
+  }
   drop_unmatched_suspects(frame);
   candidates_made_.reset();
   velocity_.reset();
@@ -363,34 +376,37 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.odometry.assign(n, std::nullopt);
 
   const bool has_map = state_ != TrackingState::initialising;
+  const auto predicted = predict(frame.index, frame.timestamp, input.prior);
+  if (predicted) frame.predicted_cam_from_world = predicted->cam_from_world;
+  const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
   bool followed = has_map && track_from_last(frame, input.prior);
   bool found_again = has_map && !followed && confirm_relocalisation(frame, input.prior);
-  if (has_map && !followed && !found_again && relocalise(frame, input.appearance)) {
-    // At once where it is but a step from the frame before; else when the next frame agrees.
-    followed = moved_plausibly_from_last(frame);
+  if (has_map && !followed && !found_again && relocalise(frame, input.appearance, expected)) {
+    // At once where it is but a step from the frame before, or where it was expected; else when the next frame agrees.
+    followed = moved_plausibly_from_last(frame) || (expected != nullptr && expected->agrees(frame.cam_from_world));
     found_again = followed;
     if (!followed) {
       finish(frame);
       unconfirmed_ = frame;
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
-      velocity_.reset();
-      frame.state = state_ = TrackingState::lost;
+      go_on_unseen(predicted, frame);
       return frame;
     }
   }
   if (!followed && !found_again) {
-    if (has_map) state_ = TrackingState::lost;
-    velocity_.reset();
     odometry_.clear();
-    frame.starts_map = input.may_start_map && start_map(frame);
-    if (frame.starts_map) {
-      state_ = TrackingState::tracking;
-      lost_since_.reset();
-      last_ = frame;
+    frame.starts_map = input.may_start_map && start_map(frame, predicted ? &*predicted : nullptr);
+    if (!frame.starts_map) {
+      go_on_unseen(predicted, frame);
+      return frame;
     }
-    frame.state = state_;
+    frame.state = state_ = TrackingState::tracking;
+    lost_since_.reset();
+    last_ = frame;
+    last_seen_ = frame.timestamp;
     return frame;
   }
+  suggested_.reset();
   lost_since_.reset();
   unconfirmed_.reset();
   if (!last_ || frame.timestamp <= last_->timestamp) {
@@ -398,16 +414,19 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   } else {
     // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
     // now. The full half would carry the noise of both steps into every feature.
-    const Vector6d step = velocity_to(frame);
+    // After a stretch without images the step holds what the prior was off by as well: its own velocity is better.
+    const bool seen_before = last_->state != TrackingState::predicted;
+    const Vector6d step = seen_before || !velocity_ ? velocity_to(frame) : *velocity_;
     const Vector6d before = velocity_.value_or(step);
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
-    velocity_ = velocity_to(frame);
+    velocity_ = seen_before ? velocity_to(frame) : step;
   }
   drop_unmatched_suspects(frame);
   finish(frame);
   frame.state = found_again ? TrackingState::relocalised : TrackingState::tracking;
   state_ = TrackingState::tracking;
   last_ = frame;
+  last_seen_ = frame.timestamp;
   odometry_.remember(frame);
   return frame;
 }

@@ -34,6 +34,15 @@ struct PointInView {
   double depth = 0;       // [m]
 };
 
+// Where the camera is by what is not in the images.
+struct PosePrediction {
+  Rigid3 cam_from_world;
+  Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
+
+  // Whether a pose by the images may be the same one.
+  bool agrees(const Rigid3& found_cam_from_world) const;
+};
+
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.
 // Deterministic: the same frames and views in the same order give the same poses.
 class Tracker {
@@ -72,6 +81,8 @@ class Tracker {
   std::vector<std::optional<Eigen::Vector3d>> positions(const std::vector<PointId>& points) const;
   // Forgets velocity and the last frame, so that the next frame is found anew in the map.
   void reset_motion();
+  // Somebody says where the camera is: the next frames are sought there first, until one is found.
+  void suggest(const PosePrediction& pose);
   // Where the camera of the very first map stands; later ones start where the camera was seen last.
   void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
@@ -93,12 +104,18 @@ class Tracker {
   std::vector<Rigid3> expected_poses(double dt, const MotionPrior* prior) const;
   bool track_from_last(TrackedFrame& frame, const MotionPrior* prior);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
-  bool relocalise(TrackedFrame& frame, PointAppearance* appearance);
+  std::optional<PosePrediction> predict(FrameIndex index, double timestamp, const MotionPrior* prior) const;
+  void go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame);
+  void go_on_by(const PosePrediction& prediction, TrackedFrame& frame);
+  double search_radius(double radius) const;
+  std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features,
+                                        PointAppearance* appearance) const;
+  bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
   bool moved_plausibly_from_last(const TrackedFrame& frame) const;
   bool confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior);
   Rigid3 express_anew(TrackedFrame& frame) const;
   bool within_travel_distance(const PoseProposal& found, double timestamp) const;
-  bool start_map(TrackedFrame& frame);
+  bool start_map(TrackedFrame& frame, const PosePrediction* expected);
   bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                        TrackedFrame& frame);
   bool is_retracted(PointId id) const;
@@ -130,6 +147,8 @@ class Tracker {
   OdometryPoints odometry_;                  // from the last frame
   std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
   std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
+  double last_seen_ = 0;                     // [s] when the images told the pose last
+  std::optional<PosePrediction> suggested_;  // by the user
   std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map
   std::vector<Candidate> candidates_;        // from the view
   std::optional<double> candidates_made_;    // [s] nothing = the view is newer

@@ -87,7 +87,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
   std::vector<PointId> points(frame.points.size(), kNoPoint);
   std::optional<Rigid3> pose;
   for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, prior))
-    if (!pose) pose = track_last_frame(expected, kRadiusLastFrame, features, points);
+    if (!pose) pose = track_last_frame(expected, search_radius(kRadiusLastFrame), features, points);
   if (!pose) pose = match_last_frame(frame, points);
   if (!pose) pose = track_last_frame(last_->cam_from_world, kRadiusWide, features, points);
   if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {

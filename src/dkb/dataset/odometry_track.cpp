@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dataset/odometry_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/dataset/text_rows.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kUsualDrift = 0.01;  // of wheels on a floor
+constexpr double kMaxGap = 0.5;       // [s] between poses that motion is interpolated over
+// Drift is systematic: over a way of this length the standard deviation is that of the drift, over a shorter one more.
+// A sum of independent steps can only grow with the root of the way.
+constexpr double kDriftLength = 10;                         // [m]
+constexpr double kMinPositionSd = 1e-3, kMinTurnSd = 1e-3;  // [m, rad] of a step: wheels slip and shake
+
+class PriorSource final : public Source {
+ public:
+  PriorSource(std::unique_ptr<Source> source, OdometryTrack track)
+      : source_(std::move(source)), track_(std::move(track)) {}
+
+  const Camera& camera() const override { return source_->camera(); }
+  SourceFrame next() override {
+    SourceFrame next = source_->next();
+    if (next.state != SourceState::frame) return next;
+    const double now = seconds_from_ns(next.frame.stamp_ns());
+    if (before_) next.frame.set_prior(track_.between(*before_, now));
+    before_ = now;
+    return next;
+  }
+  void stop() override { source_->stop(); }
+  std::vector<std::string> take_warnings() override { return source_->take_warnings(); }
+  SourceCounts counts() const override { return source_->counts(); }
+  std::optional<size_t> size() const override { return source_->size(); }
+  std::string description() const override { return source_->description(); }
+
+ private:
+  std::unique_ptr<Source> source_;
+  OdometryTrack track_;
+  std::optional<double> before_;  // [s] the last frame's stamp
+};
+
+}  // namespace
+
+OdometryTrack::OdometryTrack(Trajectory odom_from_body, double drift)
+    : poses_(std::move(odom_from_body)), drift_(drift) {}
+
+std::optional<Rigid3> OdometryTrack::at(double time) const {
+  const auto later = [](double t, const StampedPose& pose) { return t < pose.timestamp; };
+  const auto next = std::upper_bound(poses_.begin(), poses_.end(), time, later);
+  if (next == poses_.begin()) return std::nullopt;
+  const StampedPose& a = *std::prev(next);
+  if (a.timestamp == time) return a.world_from_cam;
+  if (next == poses_.end() || next->timestamp - a.timestamp > kMaxGap) return std::nullopt;
+  const double share = (time - a.timestamp) / (next->timestamp - a.timestamp);
+  return Rigid3(
+      a.world_from_cam.rotation.slerp(share, next->world_from_cam.rotation),
+      a.world_from_cam.translation + share * (next->world_from_cam.translation - a.world_from_cam.translation));
+}
+
+std::optional<MotionPrior> OdometryTrack::between(double before, double now) const {
+  const auto from = at(before), to = at(now);
+  if (!from || !to) return std::nullopt;
+  MotionPrior prior;
+  prior.previous_from_current = from->inverse() * *to;
+  const double length = prior.previous_from_current.translation.norm();
+  const double grown = drift_ * drift_ * length * kDriftLength;
+  prior.covariance.setZero();
+  prior.covariance.diagonal().head<3>().setConstant(kMinPositionSd * kMinPositionSd + grown);
+  prior.covariance.diagonal().tail<3>().setConstant(kMinTurnSd * kMinTurnSd + grown);
+  return prior;
+}
+
+OdometryTrack read_odometry(const std::filesystem::path& path) {
+  const std::string text = read_file(path);
+  double drift = kUsualDrift;
+  constexpr std::string_view key = "# drift ";
+  if (text.starts_with(key)) {
+    const std::string_view value = std::string_view(text).substr(key.size(), text.find_first_of("\r\n") - key.size());
+    drift = std::abs(read_number(value, path.string() + ":1", "drift"));
+  }
+  Trajectory poses = parse_trajectory(text, path.string());
+  const auto same_time = [](const StampedPose& a, const StampedPose& b) { return a.timestamp == b.timestamp; };
+  poses.erase(std::unique(poses.begin(), poses.end(), same_time), poses.end());
+  if (poses.size() < 2)
+    throw InputError(path.string() + ": holds " + std::to_string(poses.size()) +
+                     " poses; motion needs at least 2 at different times");
+  return {std::move(poses), drift};
+}
+
+std::unique_ptr<Source> with_prior(std::unique_ptr<Source> source, OdometryTrack track) {
+  return std::make_unique<PriorSource>(std::move(source), std::move(track));
+}
+
+}  // namespace dkb

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "dkb/dataset/trajectory_file.h"
+#include "dkb_slam/source.h"
+
+namespace dkb {
+
+// Poses of a robot by its wheels, as motion priors between any two times.
+class OdometryTrack {
+ public:
+  // Poses of the body in a frame of its own; the body's axes are the camera's. `drift`: the share of a way that its
+  // length is off by, and the heading [rad/m]. Stamps must rise.
+  OdometryTrack(Trajectory odom_from_body, double drift);
+
+  // Nothing when one of the times [s] lies outside of the track, or in a gap of more than half a second.
+  std::optional<MotionPrior> between(double before, double now) const;
+
+ private:
+  std::optional<Rigid3> at(double time) const;
+
+  Trajectory poses_;
+  double drift_;
+};
+
+// A trajectory file in TUM format whose relative motion is taken; a first line `# drift D` says how good it is, without
+// one it is taken for 1 %. Throws InputError with file and line.
+OdometryTrack read_odometry(const std::filesystem::path& path);
+
+// The frames of a source with priors by a track.
+std::unique_ptr<Source> with_prior(std::unique_ptr<Source> source, OdometryTrack track);
+
+}  // namespace dkb

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a motion prior tells when the images do not: where the camera is by now, and where it is to be sought.
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/tracking/tracker.h"
+
+namespace dkb {
+namespace {
+
+// Without a prior for the translation the velocity is taken to last. What a hand or a robot accelerates by makes the
+// place uncertain, and beyond this nobody knows it.
+constexpr double kAcceleration = 1.0;         // [m/s^2] standard deviation
+constexpr double kMaxGuessedPosition = 0.25;  // [m] standard deviation
+
+constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
+// What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
+constexpr double kFoundPositionSd = 0.02;  // [m]
+constexpr double kFoundRotationSd = 0.01;  // [rad]
+
+constexpr size_t kKeyframesNearby = 3;    // that an expected pose is sought from
+constexpr double kMaxViewDistance = 3.0;  // [m] between cameras that may show the same ...
+constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: about the field of view
+
+double guessed_position_sd(double seconds) {
+  return 0.5 * kAcceleration * seconds * seconds;
+}
+
+}  // namespace
+
+std::optional<PosePrediction> Tracker::predict(FrameIndex index, double timestamp, const MotionPrior* prior) const {
+  if (prior == nullptr || !last_ || last_->index + 1 != index || state_ == TrackingState::lost) return std::nullopt;
+  MotionPrior step = *prior;
+  if (step.rotation_only) {
+    if (!velocity_) return std::nullopt;
+    const double sd = guessed_position_sd(timestamp - last_seen_);
+    if (sd > kMaxGuessedPosition) return std::nullopt;
+    const double before = guessed_position_sd(last_->timestamp - last_seen_);
+    step.previous_from_current.translation = expected_motion(timestamp - last_->timestamp).inverse().translation;
+    step.covariance.topRows<3>().setZero();
+    step.covariance.leftCols<3>().setZero();
+    step.covariance.topLeftCorner<3, 3>().diagonal().setConstant(sd * sd - before * before);
+    step.rotation_only = false;
+  }
+  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, step);
+  const Rigid3 cam_from_world = whole.previous_from_current.inverse();
+  if (!plausible_motion(cam_from_world, timestamp)) return std::nullopt;
+  return PosePrediction{cam_from_world, whole.covariance};
+}
+
+bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
+  const Rigid3 off = cam_from_world * found_cam_from_world.inverse();  // right perturbation of world_from_cam
+  Vector6d delta;
+  delta << off.translation, vector_from_rotation(off.rotation);
+  Matrix6d sum = covariance;
+  sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
+  sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
+  return delta.dot(sum.ldlt().solve(delta)) <= kChi2Pose;
+}
+
+// The frame has no pose by its images: the prior's stands in, and the next frame goes on from it.
+void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
+  frame.state = state_ = TrackingState::predicted;
+  frame.cam_from_world = prediction.cam_from_world;
+  frame.covariance = prediction.covariance;
+  frame.reference = last_->reference;
+  frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
+  const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
+  Vector6d tangent;
+  tangent << step.translation, vector_from_rotation(step.rotation);
+  velocity_ = tangent / (frame.timestamp - last_->timestamp);
+  // What was seen last is still what the camera may see next.
+  last_->index = frame.index;
+  last_->timestamp = frame.timestamp;
+  last_->cam_from_world = frame.cam_from_world;
+  last_->cam_from_reference = frame.cam_from_reference;
+  last_->covariance = frame.covariance;
+  last_->state = frame.state;
+}
+
+void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame) {
+  if (prediction) return go_on_by(*prediction, frame);
+  velocity_.reset();
+  if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
+  frame.state = state_;
+}
+
+// [px] around where a point is expected, three standard deviations beyond what tracking takes: of a point 1 m away,
+// nearer than most.
+double Tracker::search_radius(double radius) const {
+  if (!last_ || last_->state != TrackingState::predicted) return radius;
+  constexpr double kMaxRadius = 60;  // [px] beyond, nearly everything is a candidate of everything
+  const auto sd = last_->covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const double pixels = camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
+  return std::min(kMaxRadius, radius + 3 * pixels);
+}
+
+// The keyframes whose cameras stand nearest to the expected one and look the same way.
+std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected, const MatchableFeatures& features,
+                                               PointAppearance* appearance) const {
+  const Eigen::Vector3d centre = centre_in_world(expected.cam_from_world);
+  const double reach = kMaxViewDistance + 3 * std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
+  std::vector<std::pair<double, KeyframeId>> nearby;
+  for (KeyframeId id : map_.view().live_keyframes()) {
+    const Rigid3& k = map_.view().keyframe(id)->cam_from_world;
+    const double distance = (centre_in_world(k) - centre).norm();
+    const Eigen::Vector3d axis = (expected.cam_from_world.rotation * k.rotation.conjugate()) * Eigen::Vector3d::UnitZ();
+    const double angle = std::acos(std::clamp(axis.z(), -1.0, 1.0));
+    if (distance <= reach && angle <= kMaxViewAngle)
+      nearby.emplace_back(distance / kMaxViewDistance + angle / kMaxViewAngle, id);
+  }
+  std::sort(nearby.begin(), nearby.end());
+  if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
+  for (const auto& [off, id] : nearby) {
+    auto found = relocaliser_.propose_from(
+        map_.view(), id, features, [this](PointId point) { return is_retracted(point); }, appearance);
+    if (found && found->verified && expected.agrees(found->cam_from_world)) return found;
+  }
+  return std::nullopt;
+}
+
+void Tracker::suggest(const PosePrediction& pose) {
+  reset_motion();
+  suggested_ = pose;
+}
+
+}  // namespace dkb
