@@ -7,13 +7,13 @@
 namespace dkb_ros {
 namespace {
 
-constexpr double kNs = 1e-9;                   // [s]
-constexpr int64_t kMaxGap = 500'000'000;       // [ns] between odometry messages that are interpolated over
-constexpr int64_t kMaxGyroGap = 100'000'000;   // [ns] the same of angular velocities
-constexpr int64_t kMaxAhead = 100'000'000;     // [ns] beyond the newest message
-constexpr size_t kMaxMessages = 4000;          // 10 s at 400 Hz
-constexpr double kMinSd = 1e-4;                // [m, rad] no sensor is better between two images
-constexpr double kGyroBias = 0.005;            // [rad/s] standard deviation of what a gyroscope shows at rest
+constexpr double kNs = 1e-9;                  // [s]
+constexpr int64_t kMaxGap = 500'000'000;      // [ns] between odometry messages that are interpolated over
+constexpr int64_t kMaxGyroGap = 100'000'000;  // [ns] the same of angular velocities
+constexpr int64_t kMaxAhead = 100'000'000;    // [ns] beyond the newest message
+constexpr size_t kMaxMessages = 4000;         // 10 s at 400 Hz
+constexpr double kMinSd = 1e-4;               // [m, rad] no sensor is better between two images
+constexpr double kGyroBias = 0.005;           // [rad/s] standard deviation of what a gyroscope shows at rest
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;

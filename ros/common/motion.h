@@ -16,9 +16,11 @@ Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector);
 Matrix6d adjoint(const Rigid3& a_from_b);
 // The library's covariance, a right perturbation in camera axes, as that of the base's pose in ROS' order: position and
 // rotation about the fixed axes of the parent frame.
-Matrix6d ros_covariance(const Matrix6d& in_camera, const Rigid3& base_from_cam, const Eigen::Quaterniond& parent_from_base);
+Matrix6d ros_covariance(const Matrix6d& in_camera, const Rigid3& base_from_cam,
+                        const Eigen::Quaterniond& parent_from_base);
 // The reverse, for /initialpose.
-Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam, const Eigen::Quaterniond& parent_from_base);
+Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam,
+                           const Eigen::Quaterniond& parent_from_base);
 
 // Poses of wheel odometry; answers with the motion between two times.
 class OdometryHistory {

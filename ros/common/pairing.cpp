@@ -19,10 +19,7 @@ bool Pairing::accept(Stream* stream, const ImageMessage& image) {
     stream->far_behind = image.stamp_ns < *stream->newest - kJump ? stream->far_behind + 1 : 0;
     ++late_;
     if (stream->far_behind < kJumpMessages) return false;
-    for (Stream* s : {&colour_, &depth_}) {
-      unpaired_ += static_cast<int64_t>(s->waiting.size());
-      *s = {};
-    }
+    restart();
     clock_jumped_ = true;
   }
   if (stream->newest) {
@@ -33,6 +30,13 @@ bool Pairing::accept(Stream* stream, const ImageMessage& image) {
   stream->newest = image.stamp_ns;
   stream->far_behind = 0;
   return true;
+}
+
+void Pairing::restart() {
+  for (Stream* s : {&colour_, &depth_}) {
+    unpaired_ += static_cast<int64_t>(s->waiting.size());
+    *s = {};
+  }
 }
 
 void Pairing::drop_first(Stream* stream) {

@@ -21,6 +21,9 @@ class Pairing {
   std::vector<ImagePair> add_colour(ImageMessage image) { return add(&colour_, std::move(image)); }
   std::vector<ImagePair> add_depth(ImageMessage image) { return add(&depth_, std::move(image)); }
 
+  // The next images may have any stamps.
+  void restart();
+
   int64_t unpaired() const { return unpaired_; }  // images without a partner
   int64_t late() const { return late_; }          // images whose stamp was not after the one before
 

@@ -62,7 +62,8 @@ void read_range(const std::string& text, ParameterDescription* d) {
   }
 }
 
-// The library writes its settings as YAML, a line each: "  count: 1000  # [features] wanted (at least 1; default 1000)".
+// The library writes its settings as YAML, a line each: "  count: 1000  # [features] wanted (at least 1; default
+// 1000)".
 std::vector<ParameterDescription> settings() {
   std::vector<ParameterDescription> found;
   std::istringstream yaml{dkb::Options().to_yaml()};

@@ -16,7 +16,7 @@ struct ParameterDescription {
   ParameterValue initial;  // its type is the parameter's
   std::string meaning;     // with the unit in front: "[m] ..."
   double min = -std::numeric_limits<double>::infinity(), max = std::numeric_limits<double>::infinity();
-  std::vector<std::string> choices;  // of texts that take nothing else
+  std::vector<std::string> choices = {};  // of texts that take nothing else
 };
 
 // Those of the node, then every setting of the library, which the node reads once, when it starts.

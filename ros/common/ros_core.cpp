@@ -47,15 +47,17 @@ dkb::ImageView view_of(const ImageMessage& image, bool depth) {
   const auto& known = depth ? depths : colours;
   const auto format = known.find(image.encoding);
   if (format == known.end())
-    throw dkb::InputError(topic + ": encoding \"" + image.encoding + "\" is not read; publish " +
-                          (depth ? "16UC1 or 32FC1" : "rgb8, bgr8, rgba8, bgra8 or mono8 (image_proc converts others)"));
+    throw dkb::InputError(
+        topic + ": encoding \"" + image.encoding + "\" is not read; publish " +
+        (depth ? "16UC1 or 32FC1" : "rgb8, bgr8, rgba8, bgra8 or mono8 (image_proc converts others)"));
   dkb::ImageView view{image.data, image.width, image.height, image.step, format->second};
   const bool one_byte = !depth;
   if (!one_byte && image.is_bigendian != (std::endian::native == std::endian::big))
     throw dkb::InputError(topic + ": its byte order is not this machine's; publish it in this machine's");
   if (image.width <= 0 || image.height <= 0 || view.stride < view.row_bytes() ||
       image.size < view.stride * static_cast<size_t>(image.height - 1) + view.row_bytes())
-    throw dkb::InputError(topic + ": " + std::to_string(image.size) + " bytes are fewer than its width, height and step say");
+    throw dkb::InputError(topic + ": " + std::to_string(image.size) +
+                          " bytes are fewer than its width, height and step say");
   return view;
 }
 
@@ -156,6 +158,25 @@ void RosCore::imu(const ImuMessage& imu) {
   if (!gyro_.add(imu)) ++late_motion_;
 }
 
+void RosCore::initial_pose(const PoseMessage& pose) {
+  request(
+      [this, pose](dkb::Slam& slam) {
+        const auto map_from_frame = pose.frame_id.empty() || pose.frame_id == parameters_.map_frame
+                                        ? Rigid3()
+                                        : middleware_.transform(parameters_.map_frame, pose.frame_id, std::nullopt);
+        if (!map_from_frame)
+          return Answer{false, "initialpose: no transform from " + parameters_.map_frame + " to " + pose.frame_id};
+        if (!pose.pose.translation.allFinite() || !(std::abs(pose.pose.rotation.norm() - 1) < 0.01))
+          return Answer{false, "initialpose: it is no pose"};
+        const Rigid3 base(pose.pose.rotation.normalized(), pose.pose.translation);
+        Matrix6d covariance = camera_covariance(pose.covariance, base_from_cam_, base.rotation);
+        covariance.diagonal().array() += 1e-4;  // RViz gives none for height, roll and pitch
+        slam.suggest_pose(*map_from_frame * base * base_from_cam_, covariance);
+        return Answer{true, ""};
+      },
+      [](const Answer&) {});
+}
+
 void RosCore::request(Task task, Done done) {
   {
     const std::lock_guard lock(input_mutex_);
@@ -181,7 +202,7 @@ void RosCore::load_map(const std::string& path, Done done) {
   request(
       [this, path](dkb::Slam& slam) {
         slam.load_map(path);
-        forget_motion();
+        begin_anew();
         return Answer{true, "going on in " + path};
       },
       std::move(done));
@@ -191,7 +212,7 @@ void RosCore::reset(Done done) {
   request(
       [this](dkb::Slam& slam) {
         slam.reset();
-        forget_motion();
+        begin_anew();
         return Answer{true, "a new world begins"};
       },
       std::move(done));
@@ -373,7 +394,8 @@ std::optional<Rigid3> RosCore::cam_from(const std::string& frame) {
 
 void RosCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
   publish_poses(result);
-  const double out_ms = 1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
+  const double out_ms =
+      1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
   {
     const std::lock_guard lock(report_mutex_);
     trouble_.clear();
@@ -460,6 +482,15 @@ void RosCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_bas
                                     " at the images' times; with `publish_odom_tf` false the robot must send it");
 }
 
+// After a service: the images that follow may have any stamps.
+void RosCore::begin_anew() {
+  forget_motion();
+  const std::lock_guard lock(input_mutex_);
+  pairing_.restart();
+  odometry_.clear();
+  gyro_.clear();
+}
+
 void RosCore::forget_motion() {
   last_stamp_ns_.reset();
   last_pose_.reset();
@@ -515,9 +546,9 @@ void RosCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
   if (middleware_.wanted(Topic::map_points))
     middleware_.publish(CloudOutput{stamp_ns, parameters_.map_frame, slam.map().points()});
   if (middleware_.wanted(Topic::path))
-    middleware_.publish(PathOutput{stamp_ns, parameters_.map_frame,
-                                   path_of(slam.trajectory(), slam.options().base_from_cam.inverse(),
-                                           parameters_.path_step)});
+    middleware_.publish(
+        PathOutput{stamp_ns, parameters_.map_frame,
+                   path_of(slam.trajectory(), slam.options().base_from_cam.inverse(), parameters_.path_step)});
 }
 
 // The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.

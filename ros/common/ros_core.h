@@ -85,6 +85,7 @@ class RosCore {
   void publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result);
   void publish_poses(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
+  void begin_anew();
   void forget_motion();
   void tell_events();
   void complain(LogLevel level, const std::string& text);

@@ -44,9 +44,9 @@ struct CameraInfoMessage {
 struct OdometryMessage {
   int64_t stamp_ns = 0;
   std::string child_frame_id;
-  Rigid3 pose;                                    // of the child frame in a frame that stands still
-  Vector6d twist = Vector6d::Zero();              // [v m/s, w rad/s] in the child frame
-  Matrix6d twist_covariance = Matrix6d::Zero();   // of `twist`; zero = unknown
+  Rigid3 pose;                                   // of the child frame in a frame that stands still
+  Vector6d twist = Vector6d::Zero();             // [v m/s, w rad/s] in the child frame
+  Matrix6d twist_covariance = Matrix6d::Zero();  // of `twist`; zero = unknown
 };
 
 struct ImuMessage {
@@ -104,8 +104,8 @@ struct PathOutput {
 struct GridOutput {
   int64_t stamp_ns = 0;
   std::string frame_id;
-  double cell = 0.05;                           // [m]
-  int width = 0, height = 0;                    // [cells]
+  double cell = 0.05;                              // [m]
+  int width = 0, height = 0;                       // [cells]
   double origin_x = 0, origin_y = 0, floor_z = 0;  // [m] of the lower left corner, axes as the frame's
   std::vector<int8_t> cells;
 };
