@@ -7,6 +7,7 @@
 #   scripts/deps.sh check    installs nothing: fails with one line when something is missing that `make build` needs
 #   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
+#   scripts/deps.sh ros      what `make test` needs, and ROS 1 for the tests of its package
 #   scripts/deps.sh slurm    the same and Slurm, for bench/slurm/one_node_cluster.sh
 #
 # DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
@@ -27,9 +28,18 @@ case "${1:-}" in
   "") ;;
   check) packages=("${needed[@]}") ;;
   docs) packages=(doxygen) ;;
+  ros)
+    packages+=(
+      catkin libroscpp-dev libtf2-ros-dev libnodeletlib-dev libnodeletlib-tools ros-message-generation ros-geometry-msgs
+      ros-std-msgs libgeometry-msgs-dev libnav-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev
+      libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev rosout python3-roslaunch python3-rosbag python3-std-msgs
+      python3-geometry-msgs python3-nav-msgs python3-sensor-msgs python3-visualization-msgs python3-diagnostic-msgs
+      python3-std-srvs python3-tf2-msgs python3-pil
+    )
+    ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|docs|lint|slurm]" >&2; exit 2 ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|docs|lint|ros|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

@@ -115,7 +115,7 @@ TEST(Architecture, TheLibraryNeitherSleepsNorExitsNorTunesForOneMachine) {
 }
 
 TEST(Architecture, EverySourceFileNamesItsLicence) {
-  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake"}) {
+  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "ros"}) {
     for (const std::string& file : files_below(folder, {".cpp", ".h", ".txt", ".cmake"})) {
       const std::vector<std::string> lines = read_lines(source_dir() / file);
       EXPECT_TRUE(!lines.empty() && lines[0].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)
@@ -126,7 +126,7 @@ TEST(Architecture, EverySourceFileNamesItsLicence) {
 
 // A hint for the reader of the log, not a failure: a long file often does two jobs.
 TEST(Architecture, LongFilesAreNamed) {
-  for (const std::string folder : {"src", "apps", "tests"}) {
+  for (const std::string folder : {"src", "apps", "tests", "ros"}) {
     for (const std::string& file : files_below(folder, kCpp)) {
       const size_t lines = read_lines(source_dir() / file).size();
       if (lines > 500) std::cout << "warning: " << file << " has " << lines << " lines; is it still one job?\n";

@@ -2,7 +2,10 @@
 // Motions and their covariances in ROS' terms, and motion priors from wheel odometry and gyroscopes.
 #pragma once
 
+#include <dkb_slam/frame.h>
+
 #include <deque>
+#include <optional>
 
 #include "types.h"
 

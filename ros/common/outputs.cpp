@@ -23,26 +23,52 @@ dkb::Rgb colour_of(dkb::FeatureState state) {
 
 }  // namespace
 
-dkb::ColourImage draw_features(const dkb::ImageView& image, const dkb::FrameResult& result) {
-  dkb::ColourImage drawn(image.width, image.height);
+ColourImageOutput draw_features(const dkb::ImageView& image, const dkb::FrameResult& result) {
+  ColourImageOutput drawn;
+  drawn.width = image.width;
+  drawn.height = image.height;
+  drawn.rgb.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.height) * 3);
   const int channels = dkb::bytes_per_pixel(image.format);
+  const bool grey = channels == 1;
   const bool bgr = image.format == dkb::PixelFormat::bgr8 || image.format == dkb::PixelFormat::bgra8;
+  uint8_t* to = drawn.rgb.data();
   for (int y = 0; y < image.height; ++y) {
     const uint8_t* from = image.row(y);
-    for (int x = 0; x < image.width; ++x, from += channels) {
-      if (channels == 1)
-        drawn(x, y) = {from[0], from[0], from[0]};
-      else
-        drawn(x, y) = {from[bgr ? 2 : 0], from[1], from[bgr ? 0 : 2]};
+    for (int x = 0; x < image.width; ++x, from += channels, to += 3) {
+      to[0] = from[grey || !bgr ? 0 : 2];
+      to[1] = from[grey ? 0 : 1];
+      to[2] = from[grey || bgr ? 0 : 2];
     }
   }
   for (const dkb::FeatureReport& f : result.features) {
     const int cx = static_cast<int>(std::lround(f.image_x)), cy = static_cast<int>(std::lround(f.image_y));
-    for (int y = cy - 1; y <= cy + 1; ++y)
-      for (int x = cx - 1; x <= cx + 1; ++x)
-        if (drawn.contains(x, y)) drawn(x, y) = colour_of(f.state);
+    const dkb::Rgb colour = colour_of(f.state);
+    for (int y = std::max(cy - 1, 0); y <= std::min(cy + 1, image.height - 1); ++y)
+      for (int x = std::max(cx - 1, 0); x <= std::min(cx + 1, image.width - 1); ++x) {
+        uint8_t* pixel =
+            drawn.rgb.data() + 3 * (static_cast<size_t>(y) * static_cast<size_t>(image.width) + static_cast<size_t>(x));
+        pixel[0] = colour.r, pixel[1] = colour.g, pixel[2] = colour.b;
+      }
   }
   return drawn;
+}
+
+MoversOutput movers_of(const dkb::FrameResult& result) {
+  MoversOutput out;
+  out.stamp_ns = result.stamp_ns;
+  if (result.world_from_cam) out.axes = result.world_from_cam->rotation;
+  for (const dkb::Mover& m : result.movers)
+    out.movers.push_back({m.id, m.class_name, m.position_in_world, m.velocity_in_world, m.size, m.covariance, m.box.x,
+                          m.box.y, m.box.w, m.box.h});
+  return out;
+}
+
+CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points) {
+  CloudOutput out;
+  out.points.reserve(points.size());
+  for (const dkb::PointInfo& p : points)
+    out.points.push_back({p.position_in_world.cast<float>(), p.colour.r, p.colour.g, p.colour.b});
+  return out;
 }
 
 std::vector<PathOutput::Pose> path_of(const std::vector<dkb::TrajectoryFrame>& trajectory, const Rigid3& cam_from_base,

@@ -2,12 +2,17 @@
 // The library's results as what ROS shows.
 #pragma once
 
+#include <dkb_slam/slam.h>
+
 #include "types.h"
 
 namespace dkb_ros {
 
 // The colour (or grey) image with its features: green = used, red = dynamic, yellow = outlier, grey = unused.
-dkb::ColourImage draw_features(const dkb::ImageView& image, const dkb::FrameResult& result);
+ColourImageOutput draw_features(const dkb::ImageView& image, const dkb::FrameResult& result);
+
+MoversOutput movers_of(const dkb::FrameResult& result);
+CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points);
 
 // The trajectory, thinned to poses of the base at least `step` metres or 10 degrees apart; the last one stays. Only
 // frames of the newest map, since maps that are not joined have worlds of their own.

@@ -15,10 +15,14 @@ TEST(DrawFeatures, ColoursSayWhatBecameOfThem) {
   dkb::FrameResult result;
   result.features.push_back({5, 5, dkb::FeatureState::used, dkb::FeatureReason::none});
   result.features.push_back({19.4F, 0, dkb::FeatureState::dynamic, dkb::FeatureReason::on_mover});
-  const dkb::ColourImage drawn = draw_features({pixels.data(), 20, 10, 0, dkb::PixelFormat::bgr8}, result);
-  EXPECT_EQ(drawn(5, 5), (dkb::Rgb{0, 230, 0}));
-  EXPECT_EQ(drawn(19, 0), (dkb::Rgb{230, 0, 0}));
-  EXPECT_EQ(drawn(10, 8), (dkb::Rgb{7, 7, 7}));
+  const ColourImageOutput drawn = draw_features({pixels.data(), 20, 10, 0, dkb::PixelFormat::bgr8}, result);
+  const auto at = [&](int x, int y) {
+    const auto first = drawn.rgb.begin() + 3 * (20 * y + x);
+    return std::vector<int>(first, first + 3);
+  };
+  EXPECT_EQ(at(5, 5), (std::vector<int>{0, 230, 0}));
+  EXPECT_EQ(at(19, 0), (std::vector<int>{230, 0, 0}));
+  EXPECT_EQ(at(10, 8), (std::vector<int>{7, 7, 7}));
 }
 
 TEST(Path, IsThinnedAndEndsWhereTheRobotIs) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What goes between the core and a middleware: messages as plain structs, so that the core knows neither ROS.
+// What goes between the core and a middleware: messages as plain structs, so that the core knows neither ROS. C++17 at
+// most, here and in ros_core.h and messages.h: message headers of ROS 1 do not compile as C++20.
 // Stamps are nanoseconds. Frames follow REP 103 and REP 105: x forward, y left, z up; `map` -> `odom` -> base.
 #pragma once
 
-#include <dkb_slam/slam.h>
+#include <dkb_slam/errors.h>
+#include <dkb_slam/geometry.h>
 
 #include <array>
 #include <cstdint>
@@ -80,14 +82,25 @@ struct TransformOutput {
 struct MoversOutput {
   int64_t stamp_ns = 0;
   std::string frame_id;
-  Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  // of the boxes: the camera's axes in that frame
-  std::vector<dkb::Mover> movers;
+  Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  // of the sizes: the camera's axes in that frame
+  struct Mover {
+    int id = 0;
+    std::string class_name;
+    Eigen::Vector3d position{0, 0, 0}, velocity{0, 0, 0}, size{0, 0, 0};  // [m], [m/s], [m]
+    Matrix6d covariance = Matrix6d::Zero();                               // of [position, velocity]
+    float image_x = 0, image_y = 0, image_width = 0, image_height = 0;    // [px] its box
+  };
+  std::vector<Mover> movers;
 };
 
 struct CloudOutput {
   int64_t stamp_ns = 0;
   std::string frame_id;
-  std::vector<dkb::PointInfo> points;
+  struct Point {
+    Eigen::Vector3f position{0, 0, 0};  // [m]
+    uint8_t r = 0, g = 0, b = 0;
+  };
+  std::vector<Point> points;
 };
 
 struct PathOutput {
@@ -113,7 +126,8 @@ struct GridOutput {
 struct ColourImageOutput {
   int64_t stamp_ns = 0;
   std::string frame_id;
-  dkb::ColourImage image;
+  int width = 0, height = 0;
+  std::vector<uint8_t> rgb;  // rows are packed
 };
 
 struct DiagnosticsOutput {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ros_core.h"
+#include "slam_core.h"
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -10,6 +10,7 @@
 #include <cmath>
 #include <filesystem>
 #include <future>
+#include <utility>
 
 #include "outputs.h"
 
@@ -93,7 +94,7 @@ std::string number(double value) {
 
 }  // namespace
 
-RosCore::RosCore(const Parameters& parameters, Middleware& middleware)
+SlamCore::SlamCore(const Parameters& parameters, Middleware& middleware)
     : parameters_(parameters),
       middleware_(middleware),
       pairing_(static_cast<int64_t>(1e9 * parameters.sync_tolerance), static_cast<size_t>(parameters.queue_size)),
@@ -104,7 +105,7 @@ RosCore::RosCore(const Parameters& parameters, Middleware& middleware)
   if (parameters_.grid_period > 0) grids_ = std::thread([this] { run_grids(); });
 }
 
-RosCore::~RosCore() {
+SlamCore::~SlamCore() {
   {
     const std::scoped_lock lock(input_mutex_, report_mutex_);
     stopping_ = true;
@@ -116,21 +117,21 @@ RosCore::~RosCore() {
   if (grids_.joinable()) grids_.join();
 }
 
-void RosCore::colour(ImageMessage image) {
+void SlamCore::colour(ImageMessage image) {
   image.arrived_ns = steady_ns();
   const std::lock_guard lock(input_mutex_);
   last_image_ns_ = image.arrived_ns;
   enqueue(pairing_.add_colour(std::move(image)));
 }
 
-void RosCore::depth(ImageMessage image) {
+void SlamCore::depth(ImageMessage image) {
   image.arrived_ns = steady_ns();
   const std::lock_guard lock(input_mutex_);
   last_image_ns_ = image.arrived_ns;
   enqueue(pairing_.add_depth(std::move(image)));
 }
 
-void RosCore::enqueue(std::vector<ImagePair> pairs) {
+void SlamCore::enqueue(std::vector<ImagePair> pairs) {
   for (ImagePair& pair : pairs) {
     if (pairs_.size() == static_cast<size_t>(parameters_.queue_size)) {
       const bool jumped = pairs_.front().clock_jumped;
@@ -143,22 +144,22 @@ void RosCore::enqueue(std::vector<ImagePair> pairs) {
   if (!pairs_.empty()) input_changed_.notify_one();
 }
 
-void RosCore::camera_info(const CameraInfoMessage& info) {
+void SlamCore::camera_info(const CameraInfoMessage& info) {
   const std::lock_guard lock(input_mutex_);
   if (!camera_info_) camera_info_ = info;
 }
 
-void RosCore::odometry(const OdometryMessage& odometry) {
+void SlamCore::odometry(const OdometryMessage& odometry) {
   const std::lock_guard lock(input_mutex_);
   if (!odometry_.add(odometry)) ++late_motion_;
 }
 
-void RosCore::imu(const ImuMessage& imu) {
+void SlamCore::imu(const ImuMessage& imu) {
   const std::lock_guard lock(input_mutex_);
   if (!gyro_.add(imu)) ++late_motion_;
 }
 
-void RosCore::initial_pose(const PoseMessage& pose) {
+void SlamCore::initial_pose(const PoseMessage& pose) {
   request(
       [this, pose](dkb::Slam& slam) {
         const auto map_from_frame = pose.frame_id.empty() || pose.frame_id == parameters_.map_frame
@@ -177,7 +178,7 @@ void RosCore::initial_pose(const PoseMessage& pose) {
       [](const Answer&) {});
 }
 
-void RosCore::request(Task task, Done done) {
+void SlamCore::request(Task task, Done done) {
   {
     const std::lock_guard lock(input_mutex_);
     if (!stopping_) {
@@ -189,7 +190,7 @@ void RosCore::request(Task task, Done done) {
   done({false, "the node is stopping"});
 }
 
-void RosCore::save_map(const std::string& path, Done done) {
+void SlamCore::save_map(const std::string& path, Done done) {
   request(
       [path](dkb::Slam& slam) {
         slam.save_map(path);
@@ -198,7 +199,7 @@ void RosCore::save_map(const std::string& path, Done done) {
       std::move(done));
 }
 
-void RosCore::load_map(const std::string& path, Done done) {
+void SlamCore::load_map(const std::string& path, Done done) {
   request(
       [this, path](dkb::Slam& slam) {
         slam.load_map(path);
@@ -208,7 +209,7 @@ void RosCore::load_map(const std::string& path, Done done) {
       std::move(done));
 }
 
-void RosCore::reset(Done done) {
+void SlamCore::reset(Done done) {
   request(
       [this](dkb::Slam& slam) {
         slam.reset();
@@ -218,7 +219,7 @@ void RosCore::reset(Done done) {
       std::move(done));
 }
 
-void RosCore::pause(bool on, Done done) {
+void SlamCore::pause(bool on, Done done) {
   request(
       [on](dkb::Slam& slam) {
         slam.pause(on);
@@ -227,7 +228,7 @@ void RosCore::pause(bool on, Done done) {
       std::move(done));
 }
 
-void RosCore::localize_only(bool on, Done done) {
+void SlamCore::localize_only(bool on, Done done) {
   request(
       [on](dkb::Slam& slam) {
         slam.localize_only(on);
@@ -236,7 +237,7 @@ void RosCore::localize_only(bool on, Done done) {
       std::move(done));
 }
 
-void RosCore::run_tracking() {
+void SlamCore::run_tracking() {
   std::unique_lock lock(input_mutex_);
   while (true) {
     input_changed_.wait(lock, [this] { return stopping_ || !tasks_.empty() || !pairs_.empty(); });
@@ -272,7 +273,7 @@ void RosCore::run_tracking() {
   }
 }
 
-void RosCore::process(const ImagePair& pair) {
+void SlamCore::process(const ImagePair& pair) {
   if (pair.clock_jumped) {
     {
       const std::lock_guard lock(input_mutex_);
@@ -290,12 +291,12 @@ void RosCore::process(const ImagePair& pair) {
   publish(pair, input, result);
 }
 
-const std::string& RosCore::camera_frame(const ImagePair& pair) const {
+const std::string& SlamCore::camera_frame(const ImagePair& pair) const {
   return parameters_.camera_frame.empty() ? pair.colour.frame_id : parameters_.camera_frame;
 }
 
 // Makes the library's system once the camera and its mount are known.
-bool RosCore::start(const ImagePair& pair) {
+bool SlamCore::start(const ImagePair& pair) {
   const auto wait_for = [this](const std::string& what) {
     complain(LogLevel::warning, what);
     const std::lock_guard lock(report_mutex_);
@@ -328,7 +329,7 @@ bool RosCore::start(const ImagePair& pair) {
   return true;
 }
 
-std::optional<dkb::Camera> RosCore::find_camera() {
+std::optional<dkb::Camera> SlamCore::find_camera() {
   std::optional<dkb::Camera> camera;
   if (!parameters_.camera.empty()) {
     camera = std::filesystem::exists(parameters_.camera) ? dkb::Camera::load(parameters_.camera)
@@ -346,7 +347,7 @@ std::optional<dkb::Camera> RosCore::find_camera() {
   return camera;
 }
 
-dkb::FrameInput RosCore::input_of(const ImagePair& pair) {
+dkb::FrameInput SlamCore::input_of(const ImagePair& pair) {
   dkb::FrameInput input;
   input.stamp_ns = pair.colour.stamp_ns;
   input.colour = view_of(pair.colour, false);
@@ -357,7 +358,7 @@ dkb::FrameInput RosCore::input_of(const ImagePair& pair) {
 }
 
 // What wheels or gyroscope say of the motion since the frame before.
-std::optional<dkb::MotionPrior> RosCore::prior(int64_t stamp_ns) {
+std::optional<dkb::MotionPrior> SlamCore::prior(int64_t stamp_ns) {
   const PriorKind kind = parameters_.prior;
   std::optional<dkb::MotionPrior> motion;
   std::string frame;
@@ -383,7 +384,7 @@ std::optional<dkb::MotionPrior> RosCore::prior(int64_t stamp_ns) {
   return moved_to_camera(*motion, *cam_from_frame);
 }
 
-std::optional<Rigid3> RosCore::cam_from(const std::string& frame) {
+std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
   if (frame.empty() || frame == parameters_.base_frame) return base_from_cam_.inverse();
   const auto known = cam_from_frame_.find(frame);
   if (known != cam_from_frame_.end()) return known->second;
@@ -392,7 +393,7 @@ std::optional<Rigid3> RosCore::cam_from(const std::string& frame) {
   return found;
 }
 
-void RosCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
+void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
   publish_poses(result);
   const double out_ms =
       1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
@@ -412,16 +413,20 @@ void RosCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const
     recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
   }
   if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
-    MoversOutput movers{result.stamp_ns, parameters_.map_frame, Eigen::Quaterniond::Identity(), result.movers};
-    if (result.world_from_cam) movers.axes = result.world_from_cam->rotation;
+    MoversOutput movers = movers_of(result);
+    movers.frame_id = parameters_.map_frame;
     middleware_.publish(movers);
   }
-  if (middleware_.wanted(Topic::features_image))
-    middleware_.publish(ColourImageOutput{result.stamp_ns, camera_frame_, draw_features(input.colour, result)});
+  if (middleware_.wanted(Topic::features_image)) {
+    ColourImageOutput image = draw_features(input.colour, result);
+    image.stamp_ns = result.stamp_ns;
+    image.frame_id = camera_frame_;
+    middleware_.publish(image);
+  }
   tell_events();
 }
 
-void RosCore::publish_poses(const dkb::FrameResult& result) {
+void SlamCore::publish_poses(const dkb::FrameResult& result) {
   const Rigid3 cam_from_base = base_from_cam_.inverse();
   std::vector<TransformOutput> transforms;
   if (!result.tracked()) {
@@ -467,7 +472,7 @@ void RosCore::publish_poses(const dkb::FrameResult& result) {
 }
 
 // map -> odom, where odom -> base is the robot's. Its odometry of a frame's time may come later than the frame's pose.
-void RosCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base) {
+void SlamCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base) {
   unplaced_.emplace_back(stamp_ns, map_from_base);
   if (unplaced_.size() > kMaxUnplaced) unplaced_.pop_front();
   for (auto frame = unplaced_.rbegin(); frame != unplaced_.rend(); ++frame) {
@@ -483,7 +488,7 @@ void RosCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_bas
 }
 
 // After a service: the images that follow may have any stamps.
-void RosCore::begin_anew() {
+void SlamCore::begin_anew() {
   forget_motion();
   const std::lock_guard lock(input_mutex_);
   pairing_.restart();
@@ -491,14 +496,14 @@ void RosCore::begin_anew() {
   gyro_.clear();
 }
 
-void RosCore::forget_motion() {
+void SlamCore::forget_motion() {
   last_stamp_ns_.reset();
   last_pose_.reset();
   map_from_odom_.reset();
   unplaced_.clear();
 }
 
-void RosCore::tell_events() {
+void SlamCore::tell_events() {
   for (const dkb::Event& e : slam_->take_events()) {
     using Kind = dkb::Event::Kind;
     if (e.kind == Kind::keyframe) continue;
@@ -509,7 +514,7 @@ void RosCore::tell_events() {
 }
 
 // The same complaint is made again only after a while.
-void RosCore::complain(LogLevel level, const std::string& text) {
+void SlamCore::complain(LogLevel level, const std::string& text) {
   const int64_t now = steady_ns();
   const std::string gist = without_digits(text);
   if (gist == last_complaint_ && now - last_complaint_ns_ < kRepeatAfter) return;
@@ -518,7 +523,7 @@ void RosCore::complain(LogLevel level, const std::string& text) {
   middleware_.log(level, text);
 }
 
-void RosCore::run_reports() {
+void SlamCore::run_reports() {
   auto diagnostics_due = in_seconds(1), map_due = in_seconds(parameters_.map_period);
   int64_t published_ns = 0;
   std::unique_lock lock(report_mutex_);
@@ -542,9 +547,13 @@ void RosCore::run_reports() {
   }
 }
 
-void RosCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
-  if (middleware_.wanted(Topic::map_points))
-    middleware_.publish(CloudOutput{stamp_ns, parameters_.map_frame, slam.map().points()});
+void SlamCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
+  if (middleware_.wanted(Topic::map_points)) {
+    CloudOutput cloud = cloud_of(slam.map().points());
+    cloud.stamp_ns = stamp_ns;
+    cloud.frame_id = parameters_.map_frame;
+    middleware_.publish(cloud);
+  }
   if (middleware_.wanted(Topic::path))
     middleware_.publish(
         PathOutput{stamp_ns, parameters_.map_frame,
@@ -552,14 +561,16 @@ void RosCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
 }
 
 // The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.
-void RosCore::run_grids() {
+void SlamCore::run_grids() {
 #ifdef __linux__
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
 #endif
+  bool said_no_floor = false;
   std::unique_lock lock(report_mutex_);
   while (!report_due_.wait_until(lock, in_seconds(parameters_.grid_period), [this] { return stopping_; })) {
+    const bool started = slam_ != nullptr;
     lock.unlock();
-    if (middleware_.wanted(Topic::grid)) {
+    if (started && middleware_.wanted(Topic::grid)) {
       std::promise<Answer> answered;
       std::function<dkb::DenseMap()> make_dense_map;
       int64_t stamp_ns = 0;
@@ -577,6 +588,8 @@ void RosCore::run_grids() {
             grid.stamp_ns = stamp_ns;
             grid.frame_id = parameters_.map_frame;
             middleware_.publish(grid);
+          } else if (!std::exchange(said_no_floor, true)) {
+            middleware_.log(LogLevel::warning, "no grid: the floor has not been seen");
           }
         } catch (const dkb::InputError& error) {
           middleware_.log(LogLevel::warning, error.what());
@@ -586,7 +599,7 @@ void RosCore::run_grids() {
   }
 }
 
-void RosCore::publish_diagnostics(const dkb::Slam* slam) {
+void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, last_image_ns = 0;
   {
     const std::lock_guard lock(input_mutex_);
@@ -648,6 +661,10 @@ void RosCore::publish_diagnostics(const dkb::Slam* slam) {
   recent_ = {};
   lock.unlock();
   middleware_.publish(d);
+}
+
+std::unique_ptr<RosCore> make_core(const std::map<std::string, ParameterValue>& parameters, Middleware& middleware) {
+  return std::make_unique<SlamCore>(Parameters::from_values(parameters), middleware);
 }
 
 }  // namespace dkb_ros

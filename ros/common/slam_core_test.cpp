@@ -6,9 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <filesystem>
 #include <future>
-#include <iostream>
+#include <mutex>
 
 namespace dkb_ros {
 namespace {
@@ -105,7 +106,7 @@ CameraInfoMessage info_of(const dkb::Camera& c) {
   return info;
 }
 
-class RosCoreTest : public testing::Test {
+class SlamCoreTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     source_camera() = dkb::Camera();
@@ -123,9 +124,9 @@ class RosCoreTest : public testing::Test {
     return camera;
   }
 
-  static Parameters parameters(std::map<std::string, ParameterValue> values = {}) {
+  std::unique_ptr<RosCore> start(std::map<std::string, ParameterValue> values = {}) {
     values.emplace("base_from_cam", std::vector<double>{0.1, 0, 0.4, -0.5, 0.5, -0.5, 0.5});
-    return Parameters::from_values(values);
+    return make_core(values, out);
   }
   void feed(RosCore& core, size_t i) {
     core.colour(message_of(frames().at(i), false));
@@ -148,10 +149,10 @@ class RosCoreTest : public testing::Test {
   Recorder out;
 };
 
-TEST_F(RosCoreTest, TracksAndPublishesPosesOfTheBase) {
-  RosCore core(parameters({{"grid_period", 0.2}, {"map_period", 0.2}}), out);
-  core.camera_info(info_of(source_camera()));
-  feed_all(core, 0, 30);
+TEST_F(SlamCoreTest, TracksAndPublishesPosesOfTheBase) {
+  const auto core = start({{"grid_period", 0.2}, {"map_period", 0.2}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 30);
   const Rigid3 first = out.odometry[0].pose.pose;
   EXPECT_LT(first.translation.norm(), 1e-6);
   EXPECT_LT(first.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
@@ -171,39 +172,37 @@ TEST_F(RosCoreTest, TracksAndPublishesPosesOfTheBase) {
     EXPECT_NEAR(out.odometry[i].twist.head<3>().norm(), motion.translation.norm() / dt, 0.02);
   }
   EXPECT_GT(out.clouds.back().points.size(), 100u);
-  EXPECT_EQ(out.images.back().image.width(), source_camera().width);
+  EXPECT_EQ(out.images.back().width, source_camera().width);
   ASSERT_TRUE(out.wait([&] { return out.last_value("frames") == "30"; }));
   EXPECT_EQ(out.last_value("tracked"), "30");
   EXPECT_EQ(out.last_value("dropped"), "0");
 }
 
-TEST_F(RosCoreTest, WaitsForTheCameraAndItsMountAndSaysSo) {
-  Parameters p = parameters();
-  p.base_from_cam.reset();
-  RosCore core(p, out);
-  feed(core, 0);
+TEST_F(SlamCoreTest, WaitsForTheCameraAndItsMountAndSaysSo) {
+  const auto core = make_core({}, out);
+  feed(*core, 0);
   ASSERT_TRUE(out.wait([&] { return out.logged.size() == 1; }));
   EXPECT_NE(out.logged[0].find("rgb/camera_info"), std::string::npos);
-  core.camera_info(info_of(source_camera()));
-  feed(core, 1);
+  core->camera_info(info_of(source_camera()));
+  feed(*core, 1);
   ASSERT_TRUE(out.wait([&] { return out.logged.size() == 2; }));
   EXPECT_NE(out.logged[1].find("base_link to camera_optical"), std::string::npos);
   {
     const std::lock_guard lock(out.mutex);
     out.known_transforms["base_link camera_optical"] = optical();
   }
-  feed_all(core, 2, 3);
+  feed_all(*core, 2, 3);
   ASSERT_TRUE(out.wait([&] { return out.last_value("waiting") == "2"; }));
 }
 
-TEST_F(RosCoreTest, GoesOnAfterBadImages) {
-  RosCore core(parameters(), out);
-  core.camera_info(info_of(source_camera()));
-  feed_all(core, 0, 2);
+TEST_F(SlamCoreTest, GoesOnAfterBadImages) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 2);
   const auto complaint = [&](ImageMessage colour, size_t frame) {
     const size_t before = out.logged.size();
-    core.colour(std::move(colour));
-    core.depth(message_of(frames()[frame], true));
+    core->colour(std::move(colour));
+    core->depth(message_of(frames()[frame], true));
     EXPECT_TRUE(out.wait([&] { return out.logged.size() > before; }));
     return out.logged.back();
   };
@@ -215,61 +214,61 @@ TEST_F(RosCoreTest, GoesOnAfterBadImages) {
   EXPECT_NE(complaint(cut, 3).find("fewer than its width"), std::string::npos);
   small.height /= 2;
   EXPECT_NE(complaint(small, 4), "");
-  feed_all(core, 5, 2);
+  feed_all(*core, 5, 2);
   ASSERT_TRUE(out.wait([&] { return out.last_value("rejected") == "3"; }));
 }
 
-TEST_F(RosCoreTest, ServicesAreAnsweredBetweenFrames) {
+TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
   const std::string file = testing::TempDir() + "dkb_ros_core_test.dkb";
-  RosCore core(parameters(), out);
-  EXPECT_FALSE(answer_of([&](auto done) { core.save_map(file, done); }).success);  // nothing has come yet
-  core.camera_info(info_of(source_camera()));
-  feed_all(core, 0, 10);
-  EXPECT_TRUE(answer_of([&](auto done) { core.save_map(file, done); }).success);
+  const auto core = start();
+  EXPECT_FALSE(answer_of([&](auto done) { core->save_map(file, done); }).success);  // nothing has come yet
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 10);
+  EXPECT_TRUE(answer_of([&](auto done) { core->save_map(file, done); }).success);
   EXPECT_GT(std::filesystem::file_size(file), 1000u);
-  EXPECT_FALSE(answer_of([&](auto done) { core.save_map("/nowhere/map.dkb", done); }).success);
-  EXPECT_FALSE(answer_of([&](auto done) { core.load_map("/nowhere/map.dkb", done); }).success);
-  feed_all(core, 10, 1);  // a failed service harms nothing
-  EXPECT_TRUE(answer_of([&](auto done) { core.reset(done); }).success);
-  feed_all(core, 0, 2);  // a new clock as well
+  EXPECT_FALSE(answer_of([&](auto done) { core->save_map("/nowhere/map.dkb", done); }).success);
+  EXPECT_FALSE(answer_of([&](auto done) { core->load_map("/nowhere/map.dkb", done); }).success);
+  feed_all(*core, 10, 1);  // a failed service harms nothing
+  EXPECT_TRUE(answer_of([&](auto done) { core->reset(done); }).success);
+  feed_all(*core, 0, 2);  // a new clock as well
   EXPECT_LT(out.odometry[11].pose.pose.translation.norm(), 1e-6);
-  EXPECT_TRUE(answer_of([&](auto done) { core.load_map(file, done); }).success);
-  EXPECT_TRUE(answer_of([&](auto done) { core.localize_only(true, done); }).success);
+  EXPECT_TRUE(answer_of([&](auto done) { core->load_map(file, done); }).success);
+  EXPECT_TRUE(answer_of([&](auto done) { core->localize_only(true, done); }).success);
   PoseMessage there;
   there.pose.translation.setZero();
   there.covariance.diagonal().setConstant(0.01);
-  core.initial_pose(there);
-  feed_all(core, 5, 3);  // found in the map
-  EXPECT_TRUE(answer_of([&](auto done) { core.pause(true, done); }).success);
-  feed(core, 8);
+  core->initial_pose(there);
+  feed_all(*core, 5, 3);  // found in the map
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(true, done); }).success);
+  feed(*core, 8);
   ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "paused"; }));
   EXPECT_EQ(out.odometry.size(), 16u);
   std::filesystem::remove(file);
 }
 
-TEST_F(RosCoreTest, AFullQueueDropsTheOldestAndCounts) {
-  RosCore core(parameters({{"queue_size", int64_t{4}}}), out);
-  core.camera_info(info_of(source_camera()));
-  feed_all(core, 0, 1);
+TEST_F(SlamCoreTest, AFullQueueDropsTheOldestAndCounts) {
+  const auto core = start({{"queue_size", int64_t{4}}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 1);
   std::promise<void> held, go_on;
-  core.pause(false, [&](const Answer&) {
+  core->pause(false, [&](const Answer&) {
     held.set_value();
     go_on.get_future().wait();
   });
   held.get_future().wait();
-  for (size_t i = 1; i <= 10; ++i) feed(core, i);
+  for (size_t i = 1; i <= 10; ++i) feed(*core, i);
   go_on.set_value();
   ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
   EXPECT_EQ(out.odometry[1].pose.stamp_ns, frames()[7].stamp_ns());
   ASSERT_TRUE(out.wait([&] { return out.last_value("dropped") == "6"; }));
 }
 
-TEST_F(RosCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
-  RosCore core(parameters({{"publish_odom_tf", false}}), out);
-  core.camera_info(info_of(source_camera()));
+TEST_F(SlamCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
+  const auto core = start({{"publish_odom_tf", false}});
+  core->camera_info(info_of(source_camera()));
   const Rigid3 odom_from_base(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {3, 1, 0});
   out.known_transforms["odom base_link"] = odom_from_base;
-  feed_all(core, 0, 3);
+  feed_all(*core, 0, 3);
   ASSERT_TRUE(out.wait([&] { return out.poses.size() == 3; }));
   ASSERT_EQ(out.transforms.back().size(), 1u);
   EXPECT_EQ(out.transforms.back()[0].child, "odom");
@@ -277,15 +276,15 @@ TEST_F(RosCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
   EXPECT_LT(error.translation.norm(), 1e-9);
 }
 
-TEST_F(RosCoreTest, StampsThatGoBackBeginANewWorld) {
-  RosCore core(parameters(), out);
-  core.camera_info(info_of(source_camera()));
+TEST_F(SlamCoreTest, StampsThatGoBackBeginANewWorld) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
   const auto feed_at = [&](size_t i, int64_t offset) {
     ImageMessage colour = message_of(frames().at(i), false), depth = message_of(frames().at(i), true);
     colour.stamp_ns += offset;
     depth.stamp_ns += offset;
-    core.colour(std::move(colour));
-    core.depth(std::move(depth));
+    core->colour(std::move(colour));
+    core->depth(std::move(depth));
   };
   for (size_t i = 0; i < 5; ++i) feed_at(i, 100'000'000'000);
   ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
@@ -294,15 +293,15 @@ TEST_F(RosCoreTest, StampsThatGoBackBeginANewWorld) {
   EXPECT_LT(out.odometry[5].pose.pose.translation.norm(), 1e-6);
 }
 
-TEST_F(RosCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
-  RosCore core(parameters(), out);
-  core.camera_info(info_of(source_camera()));
+TEST_F(SlamCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
   for (size_t i = 0; i < 6; ++i) {
     OdometryMessage odometry;
     odometry.stamp_ns = frames()[i].stamp_ns();
     odometry.child_frame_id = "base_link";
-    core.odometry(odometry);
-    feed_all(core, i, 1);
+    core->odometry(odometry);
+    feed_all(*core, i, 1);
   }
   ASSERT_TRUE(out.wait([&] { return out.last_value("with prior") == "5"; }));
 }
