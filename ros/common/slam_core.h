@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -12,6 +13,11 @@
 #include "ros_core.h"
 
 namespace dkb_ros {
+
+inline int64_t steady_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
 
 // The core at work. Tracking has a thread of its own, and so has what is slow and not urgent: map, path, diagnostics,
 // grid.
