@@ -25,7 +25,9 @@ bool Pairing::accept(Stream* stream, const ImageMessage& image) {
   if (stream->newest) {
     stream->intervals.push_back(image.stamp_ns - *stream->newest);
     if (stream->intervals.size() > kIntervals) stream->intervals.pop_front();
-    stream->period = *std::min_element(stream->intervals.begin(), stream->intervals.end());
+    std::vector<int64_t> sorted(stream->intervals.begin(), stream->intervals.end());
+    std::sort(sorted.begin(), sorted.end());
+    stream->period = sorted[(sorted.size() - 1) / 2];
   }
   stream->newest = image.stamp_ns;
   stream->far_behind = 0;

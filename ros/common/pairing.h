@@ -31,7 +31,7 @@ class Pairing {
   struct Stream {
     std::deque<ImageMessage> waiting;  // by stamp
     std::optional<int64_t> newest;     // stamp
-    int64_t period = 0;                // [ns] shortest of the last intervals, 0 = not known
+    int64_t period = 0;                // [ns] median of the last intervals, 0 = not known
     std::deque<int64_t> intervals;     // [ns] the last ones
     int far_behind = 0;                // images in a row that were more than a second late
   };

@@ -29,7 +29,9 @@ set +u
 # shellcheck disable=SC1091
 source "$work/install/share/dkb_slam_ros/local_setup.bash"
 set -u
-export LD_LIBRARY_PATH=$work/prefix/lib:$LD_LIBRARY_PATH ROS_LOCALHOST_ONLY=1 ROS_DOMAIN_ID=$((RANDOM % 100 + 1)) ROS_LOG_DIR=$work/log
+export LD_LIBRARY_PATH=$work/prefix/lib:$LD_LIBRARY_PATH ROS_DOMAIN_ID=$((RANDOM % 100 + 1)) ROS_LOG_DIR=$work/log
+export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+if [[ ${ROS_DISTRO:-} == humble ]]; then export ROS_LOCALHOST_ONLY=1; fi
 
 started=()
 stop() {
