@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "bench/bench_command.h"
+#include "convert_command.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "dkb_slam/version.h"
 #include "eval/eval_command.h"
+#include "export_command.h"
 #include "map_command.h"
 #include "run_command.h"
 #include "simulate_command.h"
@@ -66,6 +68,8 @@ int main(int argc, char** argv) {
     dkb::register_eval(app, exit_code);
     dkb::register_simulate(app, exit_code);
     dkb::register_map(app, exit_code);
+    dkb::register_convert(app, exit_code);
+    dkb::register_export(app, exit_code);
     dkb::register_bench(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -14,6 +14,10 @@
 #include "dkb/slam/map_merge.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb_slam/slam.h"
+#include "dkb_slam/source.h"
+#include "export/keyframe_pictures.h"
+#include "export/map_model.h"
 
 namespace dkb {
 namespace {
@@ -61,10 +65,40 @@ void print_info(const std::string& path) {
 }
 
 struct ExportArguments {
-  std::string file, format, out;
+  std::string file, format, out, images;
+  DetectorChoice detection;
 };
 
-void export_cloud(const ExportArguments& arguments) {
+// A model for photogrammetry or splatting, with pictures and masks where their source is given.
+void export_model(const ExportArguments& arguments) {
+  const MapFile file = load_map(arguments.file);
+  const bool colmap = arguments.format == "colmap";
+  const std::filesystem::path out = arguments.out;
+  std::string pictures = "no images: --images SOURCE adds them, with masks of what moves";
+  if (!arguments.images.empty()) {
+    SourceOptions reading;
+    reading.fallback_camera = file.context.camera;
+    const std::unique_ptr<Source> source = open_source(arguments.images, reading);
+    Options options;
+    options.set("features.scale", fmt::format("{}", file.context.scale_factor), "map");
+    options.set("features.levels", std::to_string(file.context.levels), "map");
+    Slam slam(source->camera(), options, make_detectors(arguments.detection, source->camera()));
+    slam.load_map(arguments.file);
+    slam.localize_only(true);
+    const int written =
+        write_keyframe_pictures(file, *source, slam, colmap ? MaskNames::with_ending : MaskNames::as_picture, out);
+    pictures = std::to_string(written) + " images with masks";
+  }
+  if (colmap)
+    write_colmap(file, out);
+  else
+    write_nerfstudio(file, !arguments.images.empty(), out);
+  fmt::print("{}: {} keyframes, {} points; {}\n", arguments.out, keyframes_of_first_map(file.map).size(),
+             file.map.point_count(), pictures);
+}
+
+void export_map(const ExportArguments& arguments) {
+  if (arguments.format == "colmap" || arguments.format == "nerfstudio") return export_model(arguments);
   const MapFile file = load_map(arguments.file);
   const std::string cloud = arguments.format == "ply"   ? point_cloud_ply(file.map)
                             : arguments.format == "pcd" ? point_cloud_pcd(file.map)
@@ -113,15 +147,18 @@ void register_map(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 
-  CLI::App* cloud = command->add_subcommand("export", "Write the map points as a coloured cloud");
+  CLI::App* cloud = command->add_subcommand("export", "Write the map for other tools");
   auto arguments = std::make_shared<ExportArguments>();
   cloud->add_option("FILE", arguments->file, "map.dkb")->required();
-  cloud->add_option("--format", arguments->format, "ply, pcd or json")
+  cloud->add_option("--format", arguments->format, "ply, pcd, json: the points as a cloud; colmap, nerfstudio: a model")
       ->required()
-      ->check(CLI::IsMember({"ply", "pcd", "json"}));
-  cloud->add_option("--out", arguments->out, "file to write")->required();
+      ->check(CLI::IsMember({"ply", "pcd", "json", "colmap", "nerfstudio"}));
+  cloud->add_option("--out", arguments->out, "file to write; of a model the folder")->required();
+  cloud->add_option("--images", arguments->images, "source of the map: keyframes' images and masks go into the model");
+  cloud->add_option("--detector", arguments->detection.kinds, "of the masks: auto, yolo, motion, none");
+  cloud->add_option("--model", arguments->detection.model, "ONNX file of the yolo detector");
   cloud->callback([arguments, &exit_code] {
-    export_cloud(*arguments);
+    export_map(*arguments);
     exit_code = 0;
   });
 

@@ -4,16 +4,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "bench/bench_cv_orb.h"
+#include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
@@ -21,6 +22,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
+#include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
 #include "run_outputs.h"
@@ -30,10 +32,11 @@ namespace fs = std::filesystem;
 namespace {
 
 struct RunArguments {
-  std::string dataset, camera, preset = "default", out;
+  std::string source, preset = "default", out;
   std::vector<std::string> set;
   std::string config;
-  SourceOptions folder;
+  SourceOptions reading;
+  std::string prior = "auto";
   uint64_t seed = 1;
   bool has_seed = false;
   int threads = 0;
@@ -53,37 +56,48 @@ void on_interrupt(int) {
 // One line that renews itself on a terminal; plain lines now and then elsewhere.
 class Progress {
  public:
-  Progress(size_t total, bool quiet) : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+  // `total`: about how many frames there are.
+  Progress(std::optional<size_t> total, bool quiet)
+      : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
   void frame(size_t done, const FrameResult* result) {
     if (quiet_) return;
     const double ms = watch_.ms();
-    if (done < total_ && ms - last_ms_ < (terminal_ ? 100 : 5000)) return;
+    if (done != total_ && ms - last_ms_ < (terminal_ ? 100 : 5000)) return;
     last_ms_ = ms;
     const double rate = ms > 0 ? 1000.0 * static_cast<double>(done) / ms : 0;
-    const double eta = rate > 0 ? static_cast<double>(total_ - done) / rate : 0;
-    std::string line = fmt::format("frame {}/{}  {:.0f} frames/s  ETA {:.0f} s", done, total_, rate, eta);
+    std::string line = fmt::format("frame {}", done);
+    if (total_) line += fmt::format("/{}", std::max(*total_, done));
+    line += fmt::format("  {:.0f} frames/s", rate);
+    if (total_ && rate > 0)
+      line += fmt::format("  ETA {:.0f} s", static_cast<double>(*total_ - std::min(*total_, done)) / rate);
     if (result != nullptr) line += fmt::format("  {} {} inliers", name_of(result->state), result->inliers);
     if (terminal_)
-      fmt::print(stderr, "\r\033[K{}{}", line, done >= total_ ? "\n" : "");
+      fmt::print(stderr, "\r\033[K{}", line);
     else
       fmt::print(stderr, "{}\n", line);
     std::fflush(stderr);
+    open_line_ = terminal_;
+  }
+  void finish() {
+    if (open_line_) fmt::print(stderr, "\n");
+    open_line_ = false;
   }
 
  private:
-  size_t total_;
-  bool quiet_, terminal_;
+  std::optional<size_t> total_;
+  bool quiet_, terminal_, open_line_ = false;
   double last_ms_ = -1e9;
   Stopwatch watch_;
 };
 
-fs::path default_output(const fs::path& dataset) {
+fs::path default_output(const fs::path& source) {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
   localtime_r(&now, &parts);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
-  const fs::path name = dataset.filename().empty() ? dataset.parent_path().filename() : dataset.filename();
+  fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  if (fs::is_regular_file(source)) name = name.stem();
   return fs::path("dkb-out") / (name.string() + "-" + stamp);
 }
 
@@ -113,62 +127,83 @@ Options options_of(const RunArguments& args) {
   return options;
 }
 
-SourceOptions folder_options(const RunArguments& args) {
-  SourceOptions folder = args.folder;
-  folder.camera = args.camera;
-  folder.threaded = args.threads != 1 || args.realtime;
-  // A folder that does not tell its camera takes the map's.
-  if (!args.load_map.empty()) folder.fallback_camera = load_map(args.load_map).context.camera;
-  return folder;
+PriorKind prior_kind(const std::string& name) {
+  const std::vector<std::string> names = {"none", "odom", "imu", "auto"};
+  constexpr PriorKind kinds[] = {PriorKind::none, PriorKind::odometry, PriorKind::imu, PriorKind::automatic};
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError("--prior: there is no \"" + name + "\"" + did_you_mean(name, names) + "; none, odom, imu, auto");
+  return kinds[found - names.begin()];
 }
 
-// Without a filter nothing is to be detected.
-DetectorChoice detector_choice(const RunArguments& args, const Options& options, const FolderSource& source) {
+std::unique_ptr<Source> open_source(const RunArguments& args, bool threaded) {
+  SourceOptions options = args.reading;
+  options.threaded = threaded;
+  // What is given is not to be mixed with what the recording holds.
+  options.prior = args.prior_file.empty() ? prior_kind(args.prior) : PriorKind::none;
+  try {
+    return open_source(args.source, options);
+  } catch (const InputError&) {
+    if (args.load_map.empty() || !options.camera.empty()) throw;
+    // A source that does not tell its camera takes the map's.
+    options.fallback_camera = load_map(args.load_map).context.camera;
+    return open_source(args.source, options);
+  }
+}
+
+// Of up to 60 images, evenly spread over the `pairs` that the run was given.
+std::optional<double> cv_orb_of(const RunArguments& args, const Source& source, int pairs) {
+  if (const auto* folder = dynamic_cast<const FolderSource*>(&source))
+    return measure_cv_orb(folder->pairs(), folder->camera());
+  const std::unique_ptr<Source> again = open_source(args, false);
+  return measure_cv_orb(*again, static_cast<size_t>(pairs));
+}
+
+DetectorChoice detector_choice(const RunArguments& args, const Options& options, const ReaderSource* source) {
   DetectorChoice choice = args.detection;
-  for (const DatasetPair& pair : source.pairs()) choice.stamps_ns.push_back(pair.stamp_ns);
-  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
-  if (options.dynamics.filter != FilterKind::none) return choice;
-  const bool asked_for = ("," + args.disable + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
-  if (asked_for) choice.masks.clear();
-  choice.kinds = "none";
-  choice.boxes.clear();
-  return choice;
+  if (source != nullptr) choice.stamps_ns = source->stamps_ns();
+  return choice_beside(options, args.disable, std::move(choice));
 }
 
 int run(const RunArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "{}\n", line); });
   const Options options = options_of(args);
   if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
-  auto opened = std::make_unique<FolderSource>(args.dataset, folder_options(args));
-  FolderSource& folder = *opened;
-  std::unique_ptr<Source> recording = std::move(opened);
+  std::unique_ptr<Source> recording = open_source(args, args.threads != 1 || args.realtime);
+  const Source& opened = *recording;
+  const auto* reader = dynamic_cast<const ReaderSource*>(recording.get());
   if (!args.prior_file.empty()) recording = with_prior(std::move(recording), read_odometry(args.prior_file));
   const Stopwatch loading;
-  Detectors detectors = make_detectors(detector_choice(args, options, folder), folder.camera());
+  Detectors detectors = make_detectors(detector_choice(args, options, reader), recording->camera());
   const double loading_s = loading.ms() / 1000;
-  Slam slam(folder.camera(), options, std::move(detectors));
+  Slam slam(recording->camera(), options, std::move(detectors));
   if (!args.load_map.empty()) slam.load_map(args.load_map);
   slam.localize_only(args.localize);
   slam.explain_keyframes(args.debug_log);
-  const fs::path out = args.out.empty() ? default_output(args.dataset) : fs::path(args.out);
+  const fs::path out = args.out.empty() ? default_output(args.source) : fs::path(args.out);
   make_output_folder(out);
-  if (!args.quiet) fmt::print("{}, results in {}\n", folder.description(), out.string());
+  if (!args.quiet) fmt::print("{}, results in {}\n", recording->description(), out.string());
 
   interrupted = false;
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   RunFacts facts;
   facts.writes_map = !args.localize;
-  facts.offered = static_cast<int>(*folder.size());
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   std::optional<PacedSource> paced;
   if (args.realtime) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
-  Progress progress(*folder.size(), args.quiet);
+  Progress progress(recording->size(), args.quiet);
+  const auto warn = [&] {
+    for (const std::string& line : recording->take_warnings()) warnings.warn(line, line);
+  };
+  warn();
   const Stopwatch wall;
   while (!interrupted) {
     SourceFrame next = source.next();
+    warn();
     if (next.state == SourceState::ended) break;
+    facts.offered = static_cast<int>(next.index) + 1;
     if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
     if (next.state != SourceState::frame) {
       ++facts.skipped;
@@ -188,15 +223,17 @@ int run(const RunArguments& args) {
     if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
     progress.frame(next.index + 1, &result);
   }
+  progress.finish();
+  if (interrupted) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
   if (paced) {
     paced->stop();
     facts.skipped += paced->dropped();
   }
-  folder.stop();
+  recording->stop();
   slam.finish();
   facts.wall_s = wall.ms() / 1000;
   facts.config_yaml = options.to_yaml();
-  facts.times = folder.times();
+  if (reader != nullptr) facts.times = reader->times();
   if (args.dense) {
     const Stopwatch building;
     const DenseMap map = slam.dense_map();
@@ -205,7 +242,7 @@ int run(const RunArguments& args) {
     if (!args.quiet) fmt::print("{}\n", line);
   }
   write_outputs(out, slam, facts);
-  if (args.cv_orb && !interrupted) write_cv_orb(out, measure_cv_orb(folder.pairs(), folder.camera()));
+  if (args.cv_orb && !interrupted) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
 
   const Statistics s = slam.statistics();
@@ -213,6 +250,8 @@ int run(const RunArguments& args) {
     fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked,
                facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+  if (const SourceCounts lost = recording->counts(); !args.quiet && lost.unpaired + lost.late > 0)
+    fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
   if (interrupted) return 130;
   if (s.tracked > 0) return 0;
   if (args.localize)
@@ -228,8 +267,10 @@ int run(const RunArguments& args) {
 void register_run(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<RunArguments>();
   CLI::App* command = app.add_subcommand("run", "Track a recorded sequence: trajectory, map and statistics");
-  command->add_option("dataset", args->dataset, "Folder in TUM layout")->required();
-  command->add_option("--camera", args->camera, "Camera file, or fr1, fr2, fr3, bonn");
+  SourceOptions& reading = args->reading;
+  command->add_option("source", args->source, "Folder in TUM layout, FILE.bag, FILE.mcap, FILE.db3 or its folder")
+      ->required();
+  command->add_option("--camera", reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
   command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
   command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
   command->add_option("--set", args->set,
@@ -249,12 +290,18 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
-  command->add_option("--skip-pairs", args->folder.skip_pairs, "Pairs left out at the beginning, before all else");
-  command->add_option("--start", args->folder.start, "[s] after the first pair");
-  command->add_option("--end", args->folder.end, "[s] after the first pair");
-  command->add_option("--max-frames", args->folder.max_frames, "Pairs at most, counted from --start");
+  command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else");
+  command->add_option("--start", reading.start, "[s] after the first pair");
+  command->add_option("--end", reading.end, "[s] after the first pair");
+  command->add_option("--max-frames", reading.max_frames, "Pairs at most, counted from --start");
   command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
+  command->add_option("--colour-topic", reading.colour_topic, "Of a recording with several topics of colour images");
+  command->add_option("--depth-topic", reading.depth_topic, "Likewise of depth images");
+  command->add_option("--info-topic", reading.info_topic, "Likewise of CameraInfo: the one of the colour images");
+  command->add_option("--odom-topic", reading.odom_topic, "Likewise of odometry");
+  command->add_option("--imu-topic", reading.imu_topic, "Likewise of an inertial unit");
+  command->add_option("--prior", args->prior, "What of a recording guides tracking: none, odom, imu, auto");
   command->add_option("--prior-file", args->prior_file,
                       "Wheel odometry in TUM format: guides tracking, and bridges what the images do not tell");
   command->add_flag("--localize", args->localize, "Track in that map without changing it");

@@ -14,7 +14,6 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/map/point_cloud.h"
 #include "dkb/util/files.h"
-#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -33,22 +32,6 @@ double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-// One trajectory a map; the first is there in any case.
-std::vector<Trajectory> with_stamps(const std::vector<TrajectoryFrame>& frames,
-                                    const std::vector<std::string>& stamps) {
-  std::vector<Trajectory> by_map(1);
-  for (const TrajectoryFrame& f : frames) {
-    const auto map = static_cast<size_t>(f.map);
-    if (by_map.size() <= map) by_map.resize(map + 1);
-    // Keyframes of a loaded map are of no frame of this run.
-    by_map[map].push_back(
-        {seconds_from_ns(f.stamp_ns), f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "", f.world_from_cam});
-  }
-  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; };
-  for (Trajectory& t : by_map) std::stable_sort(t.begin(), t.end(), earlier);
-  return by_map;
 }
 
 // NAME.txt has the frames of the first map; maps that were never joined to it have worlds and files of their own,
@@ -122,9 +105,9 @@ double seconds_since_process_start() {
 }
 
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
-  write_by_map(folder, "trajectory", with_stamps(slam.trajectory(), facts.stamps));
-  write_by_map(folder, "trajectory_online", with_stamps(slam.online_trajectory(), facts.stamps));
-  write_by_map(folder, "keyframes", with_stamps(slam.keyframes(), facts.stamps));
+  write_by_map(folder, "trajectory", trajectories_by_map(slam.trajectory(), facts.stamps));
+  write_by_map(folder, "trajectory_online", trajectories_by_map(slam.online_trajectory(), facts.stamps));
+  write_by_map(folder, "keyframes", trajectories_by_map(slam.keyframes(), facts.stamps));
   if (facts.writes_map) {
     slam.save_map(folder / "map.dkb");
     write_file_atomically(folder / "map.ply", point_cloud_ply(*slam.map().map()));

@@ -22,6 +22,7 @@
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/image/test_frame.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/random.h"

@@ -18,6 +18,7 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
+#include "dkb/image/test_frame.h"
 #include "dkb/util/files.h"
 #include "frame_times.h"
 
@@ -73,7 +74,8 @@ struct Span {
 void run(const Arguments& arguments) {
   const std::vector<DatasetPair> once = open_tum_dataset(arguments.folder).pairs;
   const CameraModel camera = choose_camera("", arguments.folder).camera;
-  RgbdReader reader(laps_of(once, arguments), camera, {});
+  const std::vector<DatasetPair> pairs = laps_of(once, arguments);
+  RgbdReader reader(pairs, camera, {});
   Slam slam(camera, Options(), Detectors::none());
   const double start = once.front().timestamp;
   std::string csv = "seconds,keyframes,keyframes_inserted,points,loops,rss_mb,in_use_mb,tracking_p95_ms,cpu_p95_ms\n";
@@ -89,8 +91,8 @@ void run(const Arguments& arguments) {
     const FrameTime time = timed_frame(slam, frame_of(frame->image), &result);
     row.add(time, result);
     lap.add(time, result);
-    const bool last = frame->index + 1 == reader.size();
-    const double next = (last ? frame->timestamp : reader.pairs()[frame->index + 1].timestamp) - start;
+    const bool last = frame->index + 1 == pairs.size();
+    const double next = (last ? frame->timestamp : pairs[frame->index + 1].timestamp) - start;
     if (next < rows * kRowSeconds && !last) continue;
     const Statistics s = slam.statistics();
     const double mb = resident_mb(), in_use = in_use_mb();

@@ -19,5 +19,7 @@ install(FILES ${PROJECT_BINARY_DIR}/dkb_slamConfig.cmake ${PROJECT_BINARY_DIR}/d
 
 file(RELATIVE_PATH prefix_from_pc ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" prefix_from_pc ${prefix_from_pc})
+list(TRANSFORM DKB_CODEC_NAMES PREPEND -l OUTPUT_VARIABLE DKB_CODEC_FLAGS)
+string(REPLACE ";" " " DKB_CODEC_FLAGS "${DKB_CODEC_FLAGS}")
 configure_file(${CMAKE_CURRENT_LIST_DIR}/dkb_slam.pc.in ${PROJECT_BINARY_DIR}/dkb_slam.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/dkb_slam.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

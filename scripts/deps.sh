@@ -5,6 +5,7 @@
 #
 #   scripts/deps.sh          what `make demo`, `make test` and `make bench` need
 #   scripts/deps.sh check    installs nothing: fails with one line when something is missing that `make build` needs
+#   scripts/deps.sh python   what `make python` and `pip install .` need
 #   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
 #   scripts/deps.sh ros      what `make test` needs, and ROS 1 for the tests of its package
@@ -16,17 +17,22 @@ set -euo pipefail
 needed=(
   g++ cmake make ninja-build
   libeigen3-dev libpng-dev libjpeg-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libnanoflann-dev
+  libbz2-dev liblz4-dev libzstd-dev libsqlite3-dev  # recordings
 )
+python=(python3-dev pybind11-dev python3-numpy python3-pytest)
 packages=(
   "${needed[@]}" ccache pkg-config
   # Tests and benchmarks only: the frameworks, and the references that fast code is compared with.
   libgtest-dev libbenchmark-dev libceres-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
   libopencv-dnn-dev
+  python3-rosbag python3-sensor-msgs python3-nav-msgs python3-tf2-msgs  # bags as ROS itself writes and reads them
+  "${python[@]}" python3-pip python3-venv
 )
 case "${1:-}" in
   "") ;;
   check) packages=("${needed[@]}") ;;
+  python) packages=("${needed[@]}" "${python[@]}") ;;
   docs) packages=(doxygen) ;;
   ros)
     packages+=(
@@ -39,7 +45,11 @@ case "${1:-}" in
     ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
+<<<<<<< HEAD
   *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|docs|lint|ros|slurm]" >&2; exit 2 ;;
+=======
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|slurm]" >&2; exit 2 ;;
+>>>>>>> main
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "svg_drawing.h"
+#include "dkb/evaluation/svg_drawing.h"
 
 namespace dkb {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "bench/bench_cv_orb_module.h"
 #include "dkb/dataset/rgbd_reader.h"
+#include "dkb/image/rgbd_image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/module.h"
@@ -23,34 +24,55 @@ Measure load_module() {
   return reinterpret_cast<Measure>(module_symbol(module, "dkb_cv_orb_1", &reason));
 }
 
+constexpr size_t kImages = 60;
+
+class CvOrb {
+ public:
+  void add(const GreyImage& grey) {
+    if (measure_ == nullptr) return;
+    if (frames_ == 0) measure_(grey.data(), grey.width(), grey.height());  // first use sets up tables
+    const double ms = measure_(grey.data(), grey.width(), grey.height());
+    failed_ = failed_ || ms < 0;
+    sum_ += ms;
+    ++frames_;
+  }
+  std::optional<double> mean_ms() const {
+    return frames_ > 0 && !failed_ ? std::optional<double>(sum_ / frames_) : std::nullopt;
+  }
+
+ private:
+  const Measure measure_ = load_module();
+  double sum_ = 0;
+  int frames_ = 0;
+  bool failed_ = false;
+};
+
 }  // namespace
 
 std::optional<double> measure_cv_orb(const std::vector<DatasetPair>& pairs, const CameraModel& camera) try {
-  constexpr size_t kImages = 60;
-  const Measure measure = load_module();
-  if (measure == nullptr) return {};
   std::vector<DatasetPair> chosen;
   const size_t n = std::min(kImages, pairs.size());
   for (size_t i = 0; i < n; ++i) chosen.push_back(pairs[i * pairs.size() / n]);
-  RgbdReaderOptions options;
-  options.threaded = false;
-  RgbdReader reader(chosen, camera, options);
-  double sum = 0;
-  int frames = 0;
-  bool warm = false;
-  while (const auto frame = reader.next()) {
-    if (!frame->image) continue;
-    const GreyImage& grey = frame->image->grey;
-    if (!warm) measure(grey.data(), grey.width(), grey.height());  // first use sets up tables
-    warm = true;
-    const double ms = measure(grey.data(), grey.width(), grey.height());
-    if (ms < 0) return {};
-    sum += ms;
-    ++frames;
-  }
-  return frames > 0 ? std::optional<double>(sum / frames) : std::nullopt;
+  RgbdReader reader(chosen, camera, {.threaded = false});
+  CvOrb cv_orb;
+  while (const auto frame = reader.next())
+    if (frame->image) cv_orb.add(frame->image->grey);
+  return cv_orb.mean_ms();
 } catch (const InputError&) {  // none of the chosen images can be read
   return {};
+}
+
+std::optional<double> measure_cv_orb(Source& source, size_t pairs) {
+  const size_t n = std::min(kImages, pairs);
+  CvOrb cv_orb;
+  for (size_t i = 0; i < n;) {
+    const SourceFrame next = source.next();
+    if (next.state == SourceState::ended) break;
+    if (next.index < i * pairs / n) continue;
+    ++i;
+    if (next.state == SourceState::frame) cv_orb.add(next.frame.image()->grey);
+  }
+  return cv_orb.mean_ms();
 }
 
 void write_cv_orb(const fs::path& folder, const std::optional<double>& ms) {

@@ -12,7 +12,7 @@
 #include "bench/text_table.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/files.h"
-#include "svg_drawing.h"
+#include "dkb/evaluation/svg_drawing.h"
 
 namespace dkb::bench {
 namespace {

@@ -2,7 +2,7 @@
 #include "bench/text_table.h"
 
 #include "dkb/util/one_line.h"
-#include "svg_drawing.h"
+#include "dkb/evaluation/svg_drawing.h"
 
 namespace dkb {
 namespace {

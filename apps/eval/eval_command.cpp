@@ -5,11 +5,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "dkb/dataset/trajectory_file.h"
+#include "dkb/evaluation/evaluation_report.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
-#include "eval/evaluation_report.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -20,23 +19,11 @@ struct EvalArguments {
   EvaluationOptions options;
 };
 
-Trajectory read_poses(const std::string& path) {
-  Trajectory trajectory = read_trajectory(path);
-  if (trajectory.empty()) throw InputError(path + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
-  return trajectory;
-}
-
 Evaluation evaluate_files(const EvalArguments& arguments) {
   EvaluationOptions options = arguments.options;
   options.rpe_delta = parse_rpe_delta(arguments.rpe_delta);
-  const Trajectory truth = read_poses(arguments.truth), estimate = read_poses(arguments.estimate);
-  try {
-    return evaluate(truth, estimate, options);
-  } catch (const InvalidOption&) {
-    throw;
-  } catch (const InputError& e) {
-    throw InputError(arguments.estimate + ": " + e.what());
-  }
+  const Trajectory truth = read_poses(arguments.truth);
+  return evaluate(truth, read_poses(arguments.estimate), options, arguments.estimate);
 }
 
 void run_eval(const EvalArguments& arguments) {

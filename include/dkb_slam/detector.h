@@ -78,7 +78,7 @@ struct DetectorChoice {
   std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
   std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
-  std::vector<int64_t> stamps_ns;  ///< of the images to come: the masks' stamps are held against them
+  std::vector<int64_t> stamps_ns;  ///< of the images to come, where known: the masks' are held against them
   int every = 0, latency = 0;      ///< [frames] the network's DetectionSchedule; 0 = by the model's size
 };
 

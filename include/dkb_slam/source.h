@@ -53,7 +53,7 @@ class DKB_SLAM_API Source {
   virtual std::vector<std::string> take_warnings() { return {}; }
   /// What has been lost so far.
   virtual SourceCounts counts() const { return {}; }
-  /// How many pairs there are, where that is known.
+  /// How many pairs there are, where that is known. Of recordings about as many: not all of their images have partners.
   virtual std::optional<size_t> size() const { return std::nullopt; }
   /// For people: what is read, and by which list.
   virtual std::string description() const = 0;

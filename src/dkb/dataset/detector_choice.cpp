@@ -29,6 +29,16 @@ std::vector<std::string> detector_kinds(const std::string& detector, bool has_mo
   return kinds;
 }
 
+DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
+  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
+  if (options.dynamics.filter != FilterKind::none) return choice;
+  const bool asked_for = ("," + disabled + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
+  if (asked_for) choice.masks.clear();
+  choice.kinds = "none";
+  choice.boxes.clear();
+  return choice;
+}
+
 Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   Detectors made;
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !choice.model.empty());

@@ -5,11 +5,17 @@
 #include <vector>
 
 #include "dkb_slam/detector.h"
+#include "dkb_slam/options.h"
 
 namespace dkb {
 
 // The kinds that DetectorChoice::kinds names, `none` left out; `auto` is `yolo` where there is a model, else `motion`.
 // Throws InputError for one that does not exist.
 std::vector<std::string> detector_kinds(const std::string& kinds, bool has_model);
+
+// What of the choice holds beside the options: the model is that of $DKB_SLAM_MODEL where none is named, and without a
+// filter nothing is detected. `disabled`: the parts given to Options::disable(); without `dr` masks are not read
+// either.
+DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice);
 
 }  // namespace dkb

@@ -3,7 +3,6 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -24,12 +23,6 @@ CameraChoice camera_of(const std::filesystem::path& folder, const SourceOptions&
   }
 }
 
-double rate_of(const std::vector<DatasetPair>& pairs) {
-  std::vector<int64_t> stamps;
-  for (size_t i = 0; i < pairs.size() && i < 5; ++i) stamps.push_back(pairs[i].stamp_ns);
-  return frame_rate_of(stamps);
-}
-
 std::string described(const TumDataset& dataset, const CameraChoice& camera) {
   return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
 }
@@ -37,28 +30,17 @@ std::string described(const TumDataset& dataset, const CameraChoice& camera) {
 }  // namespace
 
 FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOptions& options)
-    : dataset_(selected_pairs(folder, options)),
-      reader_(dataset_.pairs,
-              [&] {
-                const CameraChoice choice = camera_of(folder, options);
-                description_ = described(dataset_, choice);
-                camera_ = choice.camera;
-                if (camera_.fps == 0) camera_.fps = rate_of(dataset_.pairs);
-                return camera_;
-              }(),
-              {.threaded = options.threaded}) {}
+    : dataset_(selected_pairs(folder, options)) {
+  const CameraChoice choice = camera_of(folder, options);
+  choice.camera.check();
+  description_ = described(dataset_, choice);
+  start(pairs_in_files(dataset_.pairs, choice.camera), choice.camera, options.threaded);
+}
 
-SourceFrame FolderSource::next() {
-  SourceFrame next;
-  auto read = reader_.next();
-  if (!read) return next;
-  next.index = read->index;
-  next.stamp = std::move(read->stamp);
-  next.note = std::move(read->skipped);
-  next.state = read->image == nullptr ? SourceState::skipped : SourceState::frame;
-  const DatasetPair& pair = dataset_.pairs[read->index];
-  if (read->image != nullptr) next.frame = Frame(std::move(read->image), pair.stamp_ns, pair.depth_stamp_ns);
-  return next;
+std::vector<int64_t> FolderSource::stamps_ns() const {
+  std::vector<int64_t> stamps;
+  for (const DatasetPair& pair : dataset_.pairs) stamps.push_back(pair.stamp_ns);
+  return stamps;
 }
 
 std::unique_ptr<Source> open_folder(const std::filesystem::path& folder, const SourceOptions& options) {

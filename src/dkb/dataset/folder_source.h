@@ -1,32 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "dkb/dataset/rgbd_reader.h"
-#include "dkb/util/timing.h"
-#include "dkb_slam/source.h"
+#include "dkb/dataset/reader_source.h"
 
 namespace dkb {
 
 // A folder in TUM layout as a source.
-class FolderSource final : public Source {
+class FolderSource final : public ReaderSource {
  public:
   FolderSource(const std::filesystem::path& folder, const SourceOptions& options);
 
-  const Camera& camera() const override { return camera_; }
-  SourceFrame next() override;
-  void stop() override { reader_.stop(); }
   std::optional<size_t> size() const override { return dataset_.pairs.size(); }
   std::string description() const override { return description_; }
+  std::vector<int64_t> stamps_ns() const override;
 
   const std::vector<DatasetPair>& pairs() const { return dataset_.pairs; }
-  // Stage "decoding", one sample per pair. Complete at the end.
-  StageTimes times() const { return reader_.times(); }
 
  private:
   TumDataset dataset_;
   std::string description_;
-  Camera camera_;
-  RgbdReader reader_;
 };
 
 }  // namespace dkb

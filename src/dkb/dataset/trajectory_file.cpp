@@ -8,6 +8,8 @@
 #include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
+#include "dkb_slam/slam.h"
 
 namespace dkb {
 
@@ -50,6 +52,20 @@ std::string trajectory_to_text(const Trajectory& trajectory) {
 
 void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory) {
   write_file_atomically(path, trajectory_to_text(trajectory));
+}
+
+std::vector<Trajectory> trajectories_by_map(const std::vector<TrajectoryFrame>& frames,
+                                            const std::vector<std::string>& stamps) {
+  std::vector<Trajectory> by_map(1);
+  for (const TrajectoryFrame& f : frames) {
+    const auto map = static_cast<size_t>(f.map);
+    if (by_map.size() <= map) by_map.resize(map + 1);
+    by_map[map].push_back(
+        {seconds_from_ns(f.stamp_ns), f.frame >= 0 ? stamps.at(static_cast<size_t>(f.frame)) : "", f.world_from_cam});
+  }
+  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; };
+  for (Trajectory& t : by_map) std::stable_sort(t.begin(), t.end(), earlier);
+  return by_map;
 }
 
 }  // namespace dkb

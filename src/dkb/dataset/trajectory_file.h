@@ -9,6 +9,8 @@
 
 namespace dkb {
 
+struct TrajectoryFrame;
+
 struct StampedPose {
   double timestamp = 0;   // [s]
   std::string stamp;      // as read, or as it shall be written; empty: written from `timestamp` with 6 decimals
@@ -27,5 +29,10 @@ Trajectory parse_trajectory(const std::string& text, const std::string& name);
 std::string trajectory_to_text(const Trajectory& trajectory);
 // Written atomically. Throws OutputError.
 void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory);
+
+// What Slam says of a trajectory, as files have it: one trajectory a map, the first in any case, rows by stamp.
+// `stamps`: the stamp of every frame, as it shall be written; keyframes of a loaded map are of no frame.
+std::vector<Trajectory> trajectories_by_map(const std::vector<TrajectoryFrame>& frames,
+                                            const std::vector<std::string>& stamps);
 
 }  // namespace dkb

@@ -7,15 +7,12 @@
 #include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
-#include "dkb/util/stamps.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
 namespace {
-
-// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
-constexpr double kStampRounding = 5e-7;
 
 void require_columns(const std::vector<std::string_view>& columns, size_t wanted, const char* form,
                      const std::string& place) {
@@ -157,24 +154,33 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   return dataset;
 }
 
+bool PairFilter::wants(double timestamp) {
+  if (seen_++ < selection_.skip_pairs) return false;
+  if (seen_ == selection_.skip_pairs + 1) origin_ = timestamp;
+  last_ = timestamp;
+  const double t = timestamp - origin_;
+  ended_ = ended_ || t > selection_.end + kStampRounding;
+  if (t < selection_.start - kStampRounding || done()) return false;
+  ++taken_;
+  return true;
+}
+
+void PairFilter::require_any(const std::string& name) const {
+  if (seen_ <= selection_.skip_pairs)
+    throw InputError(name + ": --skip-pairs " + std::to_string(selection_.skip_pairs) +
+                     " leaves nothing; the sequence has " + std::to_string(seen_) + " pairs");
+  if (taken_ == 0)
+    throw InputError(name + ": no pair lies between --start and --end; the sequence lasts " +
+                     std::to_string(last_ - origin_) + " s");
+}
+
 void select_pairs(const DatasetSelection& selection, TumDataset* dataset) {
-  selection.check();
-  auto& pairs = dataset->pairs;
-  if (pairs.empty()) return;
-  if (static_cast<uint64_t>(selection.skip_pairs) >= pairs.size())
-    throw InputError(dataset->folder.string() + ": --skip-pairs " + std::to_string(selection.skip_pairs) +
-                     " leaves nothing; the sequence has " + std::to_string(pairs.size()) + " pairs");
-  pairs.erase(pairs.begin(), pairs.begin() + static_cast<std::ptrdiff_t>(selection.skip_pairs));
-  const double origin = pairs.front().timestamp, length = pairs.back().timestamp - origin;
-  std::erase_if(pairs, [&](const DatasetPair& pair) {
-    const double t = pair.timestamp - origin;
-    return t < selection.start - kStampRounding || t > selection.end + kStampRounding;
-  });
-  if (pairs.empty())
-    throw InputError(dataset->folder.string() + ": no pair lies between --start and --end; the sequence lasts " +
-                     std::to_string(length) + " s");
-  if (selection.max_frames && static_cast<uint64_t>(*selection.max_frames) < pairs.size())
-    pairs.resize(static_cast<size_t>(*selection.max_frames));
+  PairFilter filter(selection);
+  std::vector<DatasetPair> kept;
+  for (DatasetPair& pair : dataset->pairs)
+    if (filter.wants(pair.timestamp)) kept.push_back(std::move(pair));
+  if (!dataset->pairs.empty()) filter.require_any(dataset->folder.string());
+  dataset->pairs = std::move(kept);
 }
 
 }  // namespace dkb

@@ -12,14 +12,17 @@ namespace dkb {
 
 // One colour image and the depth image that goes with it.
 struct DatasetPair {
-  double timestamp = 0;               // [s] of the colour image
-  double depth_timestamp = 0;         // [s] of the depth image
+  double timestamp = 0;                      // [s] of the colour image
+  double depth_timestamp = 0;                // [s] of the depth image
   int64_t stamp_ns = 0, depth_stamp_ns = 0;  // the same, exactly
-  std::string stamp;                  // the colour image's, as written in the list
-  std::string depth_stamp;            // the depth image's
-  std::filesystem::path colour_path;  // list's folder / name in the list
+  std::string stamp;                         // the colour image's, as written in the list
+  std::string depth_stamp;                   // the depth image's
+  std::filesystem::path colour_path;         // list's folder / name in the list
   std::filesystem::path depth_path;
 };
+
+// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
+inline constexpr double kStampRounding = 5e-7;
 
 struct AssociationOptions {
   double max_difference = 0.02;  // [s] between the stamps of a pair, > 0
@@ -60,6 +63,24 @@ struct DatasetSelection {
   double end = std::numeric_limits<double>::infinity();  // [s] likewise, inclusive, >= start
   std::optional<int64_t> max_frames;                     // pairs counted from start, >= 1
   void check() const;                                    // throws InvalidOption
+};
+
+// The same for pairs that come one by one, colour stamps rising.
+class PairFilter {
+ public:
+  explicit PairFilter(const DatasetSelection& selection) : selection_(selection) { selection_.check(); }
+  bool wants(double timestamp);
+  // No later pair is wanted.
+  bool done() const { return ended_ || (selection_.max_frames && taken_ >= *selection_.max_frames); }
+  int64_t seen() const { return seen_; }
+  // Throws InputError, which begins with `name`, when all pairs have been shown and none was wanted.
+  void require_any(const std::string& name) const;
+
+ private:
+  DatasetSelection selection_;
+  int64_t seen_ = 0, taken_ = 0;
+  double origin_ = 0, last_ = 0;
+  bool ended_ = false;
 };
 // Throws InputError when nothing is left.
 void select_pairs(const DatasetSelection& selection, TumDataset* dataset);

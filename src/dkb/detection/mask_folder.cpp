@@ -94,7 +94,7 @@ MaskFolder::MaskFolder(const fs::path& folder, Reader reader, const std::vector<
   std::sort(files_.begin(), files_.end());
   std::vector<double> sorted = stamps;
   std::sort(sorted.begin(), sorted.end());
-  const fs::path* first = nullptr;
+  const fs::path* first = sorted.empty() ? &files_.front().second : nullptr;
   for (size_t i = 0; i < sorted.size() && first == nullptr; ++i) first = find(sorted[i]);
   if (first == nullptr)
     throw InputError(folder.string() + ": none of its " + std::to_string(files_.size()) +

@@ -21,8 +21,9 @@ class MaskFolder final : public Detector {
   static constexpr int min_region = 64;  // [px] smaller regions stay in the mask, without a box
 
   // `stamps`: of the sequence's colour images [s], any order. The mask of the first stamp that has one is read at once
-  // and its size compared. Throws InputError when the folder is missing, when none of its files belongs to any of the
-  // stamps, or when that first mask is broken or not width x height [px].
+  // and its size compared. None = not known beforehand: the first mask of all is read then. Throws InputError when the
+  // folder is missing, when none of its files belongs to any of the stamps, or when that first mask is broken or not
+  // width x height [px].
   MaskFolder(const std::filesystem::path& folder, Reader reader, const std::vector<double>& stamps, int width,
              int height);
 

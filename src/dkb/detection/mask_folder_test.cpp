@@ -84,5 +84,11 @@ TEST_F(MaskFolderTest, FoldersThatCannotServeAreRefusedAtOnce) {
   EXPECT_NO_THROW(open(folder_, 12.5, 40));
 }
 
+TEST_F(MaskFolderTest, StampsNeedNotBeKnownBeforehand) {
+  touch("12.500000.png");
+  EXPECT_NO_THROW(MaskFolder(folder_, square, {}, 40, 30));
+  EXPECT_THROW(MaskFolder(folder_, square, {}, 41, 30), InputError);  // another size
+}
+
 }  // namespace
 }  // namespace dkb

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "dkb/detection/onnx_graph_test_util.h"
-#include "dkb/image/rgbd_image.h"
+#include "dkb/image/test_frame.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_data.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dkb/image/rgbd_image.h"
+#include "dkb/image/test_frame.h"
 
 namespace dkb {
 namespace {

@@ -123,7 +123,8 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
   return matches;
 }
 
-Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options) {
+Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options,
+                    const std::string& name) {
   options.check();
   Evaluation e;
   e.options = options;
@@ -132,6 +133,7 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
   const auto matches = match_stamps(truth, estimate, options.max_difference);
   if (matches.size() < 2)
     throw InputError(
+        (name.empty() ? name : name + ": ") +
         fmt::format("{} of {} estimated and {} true poses match within {} s; at least 2 must (are both of one "
                     "recording and one clock?)",
                     matches.size(), estimate.size(), truth.size(), options.max_difference));
@@ -162,6 +164,12 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
   }
   add_statistics(&e.rpe);
   return e;
+}
+
+Trajectory read_poses(const std::filesystem::path& path) {
+  Trajectory trajectory = read_trajectory(path);
+  if (trajectory.empty()) throw InputError(path.string() + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
+  return trajectory;
 }
 
 }  // namespace dkb

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,7 +65,11 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
 //   frames   poses 0, n, 2n, ...
 //   metres   cut where the path of the estimate since the last cut reaches delta (the first cut is the first such
 //   place) seconds  cut at the first pose and wherever delta has passed since the last cut
-// Deterministic. Throws InputError when fewer than 2 poses match.
-Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options = {});
+// Deterministic. Throws InputError when fewer than 2 poses match; `name`, the estimate's, opens its message.
+Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options = {},
+                    const std::string& name = {});
+
+// A trajectory file to be evaluated: read_trajectory(), and InputError when it holds no pose.
+Trajectory read_poses(const std::filesystem::path& path);
 
 }  // namespace dkb

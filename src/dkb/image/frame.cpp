@@ -2,10 +2,10 @@
 #include "dkb_slam/frame.h"
 
 #include <cmath>
-#include <cstring>
 #include <iterator>
 
 #include "dkb/image/image.h"
+#include "dkb/image/pixel_views.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
@@ -38,42 +38,6 @@ void check_prior(const MotionPrior& prior) {
     throw InputError("motion prior: one of its numbers is not finite; leave the prior out of this frame");
   if (std::abs(m.rotation.norm() - 1) > 1e-3)
     throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
-}
-
-ColourImage copy_colour(const ImageView& view) {
-  const bool blue_first = view.format == PixelFormat::bgr8 || view.format == PixelFormat::bgra8;
-  const int step = bytes_per_pixel(view.format);
-  ColourImage image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) {
-    const uint8_t* in = view.row(y);
-    Rgb* out = image.row(y);
-    for (int x = 0; x < view.width; ++x, in += step)
-      out[x] = blue_first ? Rgb{in[2], in[1], in[0]} : Rgb{in[0], in[1], in[2]};
-  }
-  return image;
-}
-
-GreyImage copy_grey(const ImageView& view) {
-  GreyImage image(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) std::memcpy(image.row(y), view.row(y), view.row_bytes());
-  return image;
-}
-
-DepthImage copy_depth(const ImageView& view, const Camera& camera) {
-  DepthImage image(view.width, view.height);
-  std::vector<uint16_t> units(view.format == PixelFormat::depth_u16 ? static_cast<size_t>(view.width) : 0);
-  const auto width = static_cast<size_t>(view.width);
-  for (int y = 0; y < view.height; ++y) {  // rows need not be aligned
-    float* out = image.row(y);
-    if (view.format == PixelFormat::depth_u16) {
-      std::memcpy(units.data(), view.row(y), view.row_bytes());
-      depth_from_units(units.data(), width, camera, out);
-    } else {
-      std::memcpy(out, view.row(y), view.row_bytes());
-      depth_from_metres(out, width, camera, out);
-    }
-  }
-  return image;
 }
 
 template <class T>
@@ -151,11 +115,6 @@ ImageView Frame::depth() const {
 
 DetectorInput detector_input(const Frame& frame) {
   return {frame.stamp_ns(), frame.colour(), frame.grey(), frame.depth()};
-}
-
-Frame frame_of(std::shared_ptr<const RgbdImage> image) {
-  const int64_t stamp = ns_from_seconds(image->timestamp), depth_stamp = ns_from_seconds(image->depth_timestamp);
-  return Frame(std::move(image), stamp, depth_stamp);
 }
 
 }  // namespace dkb

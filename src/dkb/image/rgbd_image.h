@@ -22,7 +22,4 @@ struct RgbdImage {
 // What a detector is shown of a frame, which must outlive it.
 DetectorInput detector_input(const Frame& frame);
 
-// The frame of an image whose stamps are known to the microsecond.
-Frame frame_of(std::shared_ptr<const RgbdImage> image);
-
 }  // namespace dkb

@@ -15,7 +15,8 @@ namespace dkb {
 // How the bytes of messages are laid out.
 enum class MessageEncoding { ros1, cdr };
 
-// A topic of a recording. `type` without a layer of packages that ROS 2 puts in between: sensor_msgs/Image in both.
+// A topic of a recording. `type` without a layer of packages that ROS 2 puts in between: sensor_msgs/Image in both;
+// tf/tfMessage goes by its newer name.
 struct RecordedTopic {
   std::string name, type;
   MessageEncoding encoding = MessageEncoding::ros1;

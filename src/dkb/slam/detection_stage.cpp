@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dkb/detection/detection.h"
+#include "dkb/util/thrown.h"
 
 namespace dkb {
 namespace {
@@ -55,12 +56,9 @@ DetectionStage::Answer DetectionStage::detect(const Task& task) {
     answer.due.detections = detector_.detect(detector_input(task.frame));
     const std::string wrong = make_fit(answer.due.detections, width_, height_);
     if (!wrong.empty()) answer.warning = "the detector: " + wrong;
-  } catch (const std::exception& e) {
-    answer.failed = threw_ = true;
-    answer.warning = std::string("the detector failed: ") + e.what() + "; it is not asked again";
   } catch (...) {
     answer.failed = threw_ = true;
-    answer.warning = "the detector failed: it threw something that is no exception; it is not asked again";
+    answer.warning = "the detector failed: " + what_was_thrown() + "; it is not asked again";
   }
   answer.ms = watch.ms();
   return answer;

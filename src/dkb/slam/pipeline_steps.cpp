@@ -336,20 +336,21 @@ void Pipeline::note_changes(const TrackedFrame& tracked) {
 
 // What runs beside tracking says how it is getting on.
 void Pipeline::collect_times() {
-  const MappingReport& report = mapping_.report();
-  Statistics s;
-  s.points_created = report.points_created;
-  s.points_culled = report.points_culled;
-  s.points_fused = report.points_fused;
-  s.points_retracted = report.points_retracted;
-  s.keyframes_culled = report.keyframes_culled;
-  s.detector = scenes_.detector_kind();
-  s.detector_rate_hz = scenes_.detector_rate_hz();
-  s.detector_latency_frames = scenes_.detector_latency();
   StageTimes times = mapping_.take_times();
   times.merge(loop_.take_times());
   times.merge(scenes_.take_times());
-  record_.set_stages(s, times);
+  const auto fill = [this](Statistics& s) {
+    const MappingReport& report = mapping_.report();
+    s.points_created = report.points_created;
+    s.points_culled = report.points_culled;
+    s.points_fused = report.points_fused;
+    s.points_retracted = report.points_retracted;
+    s.keyframes_culled = report.keyframes_culled;
+    s.detector = scenes_.detector_kind();
+    s.detector_rate_hz = scenes_.detector_rate_hz();
+    s.detector_latency_frames = scenes_.detector_latency();
+  };
+  record_.add_stages(fill, times);
 }
 
 std::vector<Event> Pipeline::take_events() {

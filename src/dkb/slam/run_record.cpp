@@ -55,9 +55,9 @@ void RunRecord::add_time(const std::string& stage, double ms) {
   times_.add(stage, ms);
 }
 
-void RunRecord::set_stages(const Statistics& of_stages, const StageTimes& times) {
+void RunRecord::add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times) {
   const std::lock_guard lock(mutex_);
-  of_stages_ = of_stages;
+  fill(counts_);
   times_.merge(times);
 }
 
@@ -92,14 +92,6 @@ Statistics RunRecord::statistics() const {
   s.keyframes = map_.view().live_keyframe_count();
   s.maps = static_cast<int>(map_.view().roots().size());
   s.map_points = map_.view().point_count();
-  s.points_created = of_stages_.points_created;
-  s.points_culled = of_stages_.points_culled;
-  s.points_fused = of_stages_.points_fused;
-  s.points_retracted = of_stages_.points_retracted;
-  s.keyframes_culled = of_stages_.keyframes_culled;
-  s.detector = of_stages_.detector;
-  s.detector_rate_hz = of_stages_.detector_rate_hz;
-  s.detector_latency_frames = of_stages_.detector_latency_frames;
   s.stages = times_.summaries();
   return s;
 }

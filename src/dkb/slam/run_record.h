@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <vector>
 
@@ -23,7 +24,7 @@ class RunRecord {
   void set_map(const TrackingMap& map);
   void add_time(const std::string& stage, double ms);
   // What the stages beside tracking have counted by now, and the durations since they were asked last.
-  void set_stages(const Statistics& of_stages, const StageTimes& times);
+  void add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times);
 
   MapSnapshot map() const;
   // A frame hangs on a keyframe, since the world may still move; or as it was published.
@@ -44,7 +45,6 @@ class RunRecord {
   TrackingMap map_;
   Statistics counts_;
   KeyframeTestCounts tests_;
-  Statistics of_stages_;
   StageTimes times_;
 };
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "dkb/detection/mask_folder.h"
-#include "dkb/util/errors.h"
+#include "dkb/util/thrown.h"
 
 namespace dkb {
 namespace {
@@ -23,7 +23,6 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
       slow_(detectors.slow),
       carried_(camera, options.carried) {
   options_.rivals.flow = options_.carried.flow;
-  schedule_.check();
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
   segments_motion_ = detectors.motion;
@@ -61,10 +60,8 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
     try {
       found = detector->detect(detector_input(frame));
       wrong = make_fit(found, camera_.width, camera_.height);
-    } catch (const std::exception& e) {
-      wrong = e.what();
     } catch (...) {
-      wrong = "it threw something that is no exception";
+      wrong = what_was_thrown();
     }
     if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
     boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/image/test_frame.h"
 #include "dkb/tracking/frame.h"
 
 namespace dkb {

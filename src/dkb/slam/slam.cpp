@@ -13,6 +13,7 @@
 #include "dkb/map/map_file.h"
 #include "dkb/slam/pipeline.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/thrown.h"
 
 namespace dkb {
 
@@ -98,12 +99,8 @@ class Slam::Impl {
     throw_failure();
     try {
       return work();
-    } catch (const InputError&) {
-      failure = std::current_exception();
-    } catch (const std::exception& e) {
-      failure = std::make_exception_ptr(InputError(std::string("tracking failed: ") + e.what()));
     } catch (...) {
-      failure = std::make_exception_ptr(InputError("tracking failed: something was thrown that is no exception"));
+      failure = as_input_error("tracking");
     }
     std::rethrow_exception(failure);
   }

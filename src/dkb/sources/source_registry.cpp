@@ -1,10 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/sources/source_registry.h"
 
+#include <filesystem>
+
+#include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
+namespace fs = std::filesystem;
 namespace {
+
+bool is_rosbag2(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return false;
+  if (fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error)) return false;
+  if (fs::exists(folder / "metadata.yaml", error)) return true;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    if (const std::string ending = it->path().extension(); ending == ".db3" || ending == ".mcap") return true;
+  return false;
+}
+
+std::unique_ptr<Source> open_recording(const std::string& where, const SourceOptions& options) {
+  return std::make_unique<RecordedSource>(where, options);
+}
+
+// What lies in a recording is told by its content; the kind by what is usual.
+SourceKind recording_kind(const std::string& name, const std::string& form) {
+  SourceKind kind;
+  kind.name = name, kind.form = form;
+  kind.fits = [ending = "." + name](const std::string& where) { return where.ends_with(ending); };
+  kind.open = open_recording;
+  return kind;
+}
+
+SourceKind rosbag2_kind() {
+  SourceKind kind = recording_kind("db3", "FILE.db3, or the folder of a rosbag2");
+  kind.fits = [](const std::string& where) { return where.ends_with(".db3") || is_rosbag2(where); };
+  return kind;
+}
 
 SourceKind folder_kind() {
   SourceKind kind;
@@ -17,7 +50,7 @@ SourceKind folder_kind() {
 }  // namespace
 
 std::vector<SourceKind> source_kinds() {
-  return {folder_kind()};
+  return {recording_kind("bag", "FILE.bag"), recording_kind("mcap", "FILE.mcap"), rosbag2_kind(), folder_kind()};
 }
 
 std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options) {

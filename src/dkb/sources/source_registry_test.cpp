@@ -2,6 +2,11 @@
 #include "dkb/sources/source_registry.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
 
 #include "dkb/util/errors.h"
 
@@ -20,6 +25,35 @@ TEST(SourceRegistry, WhatIsNotThereIsNamed) {
     FAIL() << "it was opened";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/no/such/folder: no such folder"), std::string::npos) << error.what();
+  }
+}
+
+const SourceKind& kind_of(const std::vector<SourceKind>& kinds, const std::string& where) {
+  for (const SourceKind& kind : kinds)
+    if (kind.fits(where)) return kind;
+  throw std::logic_error("folders take anything");
+}
+
+TEST(SourceRegistry, RecordingsAreToldByTheirEndingAndFoldersByWhatLiesInThem) {
+  namespace fs = std::filesystem;
+  const std::vector<SourceKind> kinds = source_kinds();
+  for (const char* name : {"bag", "mcap", "db3"}) EXPECT_EQ(kind_of(kinds, std::string("x.") + name).name, name);
+  const fs::path folder = fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_source_registry");
+  fs::create_directories(folder);
+  EXPECT_EQ(kind_of(kinds, folder).name, "folder");
+  std::ofstream(folder / "x_0.mcap") << "";
+  EXPECT_EQ(kind_of(kinds, folder).name, "db3");
+  std::ofstream(folder / "rgb.txt") << "";
+  EXPECT_EQ(kind_of(kinds, folder).name, "folder") << "a sequence that somebody keeps a recording in";
+  fs::remove_all(folder);
+}
+
+TEST(SourceRegistry, ARecordingThatIsNotThereIsNamed) {
+  try {
+    open_source("/no/such/file.bag");
+    FAIL() << "it was opened";
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()), "/no/such/file.bag: no such file or folder");
   }
 }
 

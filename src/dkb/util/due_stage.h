@@ -15,8 +15,8 @@
 #include <thread>
 #include <utility>
 
-#include "dkb/util/errors.h"
 #include "dkb/util/thread_priority.h"
+#include "dkb/util/thrown.h"
 
 namespace dkb {
 
@@ -104,12 +104,8 @@ class DueStage {
     done.due = pending.due;
     try {
       done.result = work_(pending.task);
-    } catch (const InputError&) {
-      done.error = std::current_exception();
-    } catch (const std::exception& e) {
-      done.error = std::make_exception_ptr(InputError(options_.name + " failed: " + e.what()));
     } catch (...) {
-      done.error = std::make_exception_ptr(InputError(options_.name + " failed: it threw something that is no exception"));
+      done.error = as_input_error(options_.name);
     }
     return done;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "svg_drawing.h"
+#include "dkb/evaluation/svg_drawing.h"
 
 #include <fmt/format.h>
 

@@ -23,4 +23,7 @@ struct PlotNames {
 // Both paths in their two widest projections, and the APE over time, as one SVG picture without outside references.
 std::string evaluation_svg(const Evaluation& evaluation, const PlotNames& names = {});
 
+// A path alone, in its two widest projections, likewise. Throws InputError when it has no pose.
+std::string trajectory_svg(const Trajectory& trajectory, const std::string& title = "Trajectory");
+
 }  // namespace dkb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eval/evaluation_report.h"
+#include "dkb/evaluation/evaluation_report.h"
 
 #include <fmt/format.h>
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eval/evaluation_report.h"
+#include "dkb/evaluation/evaluation_report.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
@@ -78,6 +80,24 @@ TEST(EvaluationReport, AStillCameraCanBeDrawn) {
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
   EXPECT_LT(svg.size(), 50000u);
+}
+
+TEST(EvaluationReport, APathAloneIsDrawnTwice) {
+  Trajectory path;
+  for (int i = 0; i < 20; ++i) {
+    StampedPose p;
+    p.timestamp = i;
+    p.world_from_cam.translation = {0.5 * i, 0, std::sin(i)};
+    path.push_back(p);
+  }
+  const std::string svg = trajectory_svg(path, "a & b");
+  EXPECT_EQ(svg.substr(svg.size() - 7), "</svg>\n");
+  EXPECT_NE(svg.find("a &amp; b"), std::string::npos);
+  EXPECT_EQ(occurrences(svg, "<polyline"), 2u);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_THROW(trajectory_svg({}), InputError);
+  path.resize(1);
+  EXPECT_EQ(trajectory_svg(path).find("inf"), std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "convert_command.h"
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dkb/recordings/convert.h"
+#include "dkb/recordings/recording_writer.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+struct ConvertArguments {
+  std::string in, out, compression;
+  ConvertOptions options;
+};
+
+// Fast ones of those that the format knows and this build has.
+Compression default_compression(const std::filesystem::path& out) {
+  for (const char* name : {"zstd", "lz4"}) {
+    if (out.extension() != ".mcap" && std::string(name) == "zstd") continue;
+    try {
+      return compression_named(name);
+    } catch (const InputError&) {
+    }
+  }
+  return Compression::none;
+}
+
+void run_convert(const ConvertArguments& arguments) {
+  ConvertOptions options = arguments.options;
+  options.warn = [](const std::string& line) { std::fprintf(stderr, "warning: %s\n", line.c_str()); };
+  try {
+    options.compression =
+        arguments.compression.empty() ? default_compression(arguments.out) : compression_named(arguments.compression);
+  } catch (const InputError& e) {
+    throw InputError(std::string("--compression: ") + e.what());
+  }
+  const Converted converted = convert(arguments.in, arguments.out, options);
+  std::printf("%s: %zu %s\n", arguments.out.c_str(), converted.count, converted.unit.c_str());
+}
+
+}  // namespace
+
+void register_convert(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<ConvertArguments>();
+  CLI::App* command = app.add_subcommand("convert", "Turn folders and recordings into each other, without loss");
+  command->add_option("input", arguments->in, "folder in TUM layout, .bag, .mcap, .db3 or the folder of a rosbag2")
+      ->required();
+  command->add_option("--out", arguments->out, "FILE.bag, FILE.mcap, or a new folder")->required();
+  SourceOptions& source = arguments->options.source;
+  command->add_option("--camera", source.camera, "camera file or name, where the input does not tell it");
+  command->add_option("--compression", arguments->compression,
+                      "of a recording: none, lz4, bz2 (bag) or zstd (mcap); default: zstd in mcap files, else lz4");
+  command->add_option("--colour-topic", source.colour_topic,
+                      "recording to folder: colour images, where there are several");
+  command->add_option("--depth-topic", source.depth_topic, "recording to folder: depth images");
+  command->add_option("--info-topic", source.info_topic, "recording to folder: camera info");
+  command->add_flag("--raw", arguments->options.raw,
+                    "folder to recording: colour as pixels instead of the image files as they are");
+  command->callback([arguments, &exit_code] {
+    run_convert(*arguments);
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

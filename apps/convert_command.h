@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace dkb {
+
+// Adds `dkb-slam convert`; the callback leaves the process's exit code in `exit_code`.
+void register_convert(CLI::App& app, int& exit_code);
+
+}  // namespace dkb

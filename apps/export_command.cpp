@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "export_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "dkb/dataset/trajectory_formats.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb_slam/source.h"
+#include "export/results_recording.h"
+
+namespace dkb {
+namespace {
+
+struct ExportArguments {
+  std::string results, format, out, images;
+  SourceOptions source;
+};
+
+void run_export(const ExportArguments& arguments) {
+  namespace fs = std::filesystem;
+  const fs::path results = arguments.results, out = arguments.out;
+  const bool recording = out.extension() == ".mcap" || out.extension() == ".bag";
+  if (arguments.format.empty() != recording)
+    throw InputError(arguments.out + ": " +
+                     (recording ? "a recording has no --format; leave it out"
+                                : "give --format tum, kitti or euroc, or a name that ends in .mcap or .bag"));
+  if (recording) {
+    if (!fs::is_directory(results))
+      throw InputError(arguments.results + ": is no folder; give the folder that `dkb-slam run --out` wrote");
+    const auto pictures = arguments.images.empty() ? nullptr : open_source(arguments.images, arguments.source);
+    const size_t poses = write_results_recording(results, pictures.get(), out);
+    fmt::print("{}: {} poses\n", arguments.out, poses);
+    return;
+  }
+  const Trajectory trajectory = read_trajectory(fs::is_directory(results) ? results / "trajectory.txt" : results);
+  write_file_atomically(out, arguments.format == "tum"     ? trajectory_to_text(trajectory)
+                             : arguments.format == "kitti" ? trajectory_to_kitti(trajectory)
+                                                           : trajectory_to_euroc(trajectory));
+  fmt::print("{}: {} poses\n", arguments.out, trajectory.size());
+}
+
+}  // namespace
+
+void register_export(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* command = app.add_subcommand("export", "Write a run's results in the formats of other tools");
+  command->add_option("results", arguments->results, "folder of a run, or a trajectory in TUM format")->required();
+  command->add_option("--format", arguments->format, "of the trajectory: tum, kitti or euroc (csv)")
+      ->check(CLI::IsMember({"tum", "kitti", "euroc"}));
+  command->add_option("--out", arguments->out, "file; .mcap or .bag: poses, path, cloud and images as a recording")
+      ->required();
+  command->add_option("--images", arguments->images, "source of the run: its pictures with features go along");
+  command->add_option("--camera", arguments->source.camera, "camera file or name of that source");
+  command->callback([arguments, &exit_code] {
+    run_export(*arguments);
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+# What recordings are compressed with or stored in. A build without one of them refuses such recordings by name.
+# dkb_codecs links what was found; DKB_CODEC_NAMES are the libraries' names, for the package's files.
+add_library(dkb_codecs INTERFACE)
+set(DKB_CODEC_NAMES "")
+function(dkb_find_codec name header library package)
+  find_path(DKB_${name}_INCLUDE ${header})
+  find_library(DKB_${name}_LIBRARY ${library})
+  mark_as_advanced(DKB_${name}_INCLUDE DKB_${name}_LIBRARY)
+  if(DKB_${name}_INCLUDE AND DKB_${name}_LIBRARY)
+    target_compile_definitions(dkb_codecs INTERFACE DKB_HAS_${name}=1)
+    target_include_directories(dkb_codecs SYSTEM INTERFACE ${DKB_${name}_INCLUDE})
+    target_link_libraries(dkb_codecs INTERFACE ${DKB_${name}_LIBRARY})
+    set(DKB_CODEC_NAMES ${DKB_CODEC_NAMES} ${library} PARENT_SCOPE)
+  else()
+    message(STATUS "recordings: ${library} is not there (${package}); this build cannot read what needs it")
+    target_compile_definitions(dkb_codecs INTERFACE DKB_HAS_${name}=0)
+  endif()
+endfunction()
+dkb_find_codec(BZ2 bzlib.h bz2 libbz2-dev)
+dkb_find_codec(LZ4 lz4frame.h lz4 liblz4-dev)
+dkb_find_codec(ZSTD zstd.h zstd libzstd-dev)
+dkb_find_codec(SQLITE3 sqlite3.h sqlite3 libsqlite3-dev)

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bindings.h"
+#include "dkb/util/settings.h"
+
+namespace dkb::python {
+namespace {
+
+struct Field {
+  const char* name;
+  double Camera::*real;
+  int Camera::*whole;
+  bool required;
+};
+constexpr Field kFields[] = {
+    {"width", nullptr, &Camera::width, true},
+    {"height", nullptr, &Camera::height, true},
+    {"fx", &Camera::fx, nullptr, true},
+    {"fy", &Camera::fy, nullptr, true},
+    {"cx", &Camera::cx, nullptr, true},
+    {"cy", &Camera::cy, nullptr, true},
+    {"depth_factor", &Camera::depth_factor, nullptr, true},
+    {"k1", &Camera::k1, nullptr, false},
+    {"k2", &Camera::k2, nullptr, false},
+    {"p1", &Camera::p1, nullptr, false},
+    {"p2", &Camera::p2, nullptr, false},
+    {"k3", &Camera::k3, nullptr, false},
+    {"fps", &Camera::fps, nullptr, false},
+    {"readout", &Camera::readout, nullptr, false},
+    {"depth_min", &Camera::depth_min, nullptr, false},
+    {"depth_max", &Camera::depth_max, nullptr, false},
+};
+
+Camera camera_from_fields(const py::kwargs& given) {
+  std::vector<std::string> names;
+  for (const Field& field : kFields) names.emplace_back(field.name);
+  for (const auto& item : given) {
+    const auto name = item.first.cast<std::string>();
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw InputError("Camera: there is no field \"" + name + "\"" + did_you_mean(name, names));
+  }
+  Camera camera;
+  std::string missing;
+  for (const Field& field : kFields) {
+    if (!given.contains(field.name)) {
+      if (field.required) missing += (missing.empty() ? "" : ", ") + std::string(field.name);
+      continue;
+    }
+    const py::object value = given[field.name];
+    if (field.real != nullptr)
+      camera.*field.real = argument<double>(value, field.name, "a number");
+    else
+      camera.*field.whole = argument<int>(value, field.name, "a whole number");
+  }
+  if (!missing.empty()) throw InputError("Camera: missing: " + missing);
+  camera.check();
+  return camera;
+}
+
+std::string camera_repr(const Camera& camera) {
+  const Camera usual;
+  std::string text = "Camera(";
+  for (const Field& field : kFields) {
+    if (!field.required && camera.*field.real == usual.*field.real) continue;
+    if (text.back() != '(') text += ", ";
+    text += field.real != nullptr ? fmt::format("{}={}", field.name, camera.*field.real)
+                                  : fmt::format("{}={}", field.name, camera.*field.whole);
+  }
+  return text + ")";
+}
+
+}  // namespace
+
+void bind_camera(py::module_& module) {
+  py::class_<Camera> camera(module, "Camera", R"(Camera(*, width, height, fx, fy, cx, cy, depth_factor, **optional)
+
+Pinhole camera with Brown-Conrady distortion, and the depth format that comes with it. Immutable.
+
+Axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the colour camera.
+
+width, height: [px]; fx, fy, cx, cy: [px]; depth_factor: [units per metre] of integer depth images.
+Optional: k1, k2, p1, p2, k3 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
+readout [s] of a rolling shutter (0 = unknown or none), depth_min, depth_max [m] (depth outside is taken for missing).
+
+Raises InputError naming the field that is missing, unknown or out of range.)");
+  camera.def(py::init(&camera_from_fields))
+      .def_static("named", &Camera::named, py::arg("name"),
+                  "named(name: str) -> Camera\n\nA camera that is known by name: fr1, fr2, fr3 (TUM RGB-D), bonn. "
+                  "Raises InputError naming the nearest one.")
+      .def_static(
+          "load", [](const py::object& path) { return Camera::load(path_of(path, "path")); }, py::arg("path"),
+          "load(path) -> Camera\n\nReads a camera file (YAML). Raises InputError with file and line.")
+      .def("to_yaml", &Camera::to_yaml, "to_yaml() -> str\n\nThe camera file's text, every field with its unit.")
+      .def("__repr__", &camera_repr)
+      .def("__eq__", [](const Camera& a, const py::object& other) {
+        return py::isinstance<Camera>(other) && a.to_yaml() == other.cast<const Camera&>().to_yaml();
+      });
+  camera.attr("__hash__") = py::none();
+  for (const Field& field : kFields)
+    camera.def_property_readonly(field.name, [field](const Camera& c) {
+      return field.real != nullptr ? py::object(py::float_(c.*field.real)) : py::object(py::int_(c.*field.whole));
+    });
+}
+
+}  // namespace dkb::python

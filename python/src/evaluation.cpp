@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/evaluation/evaluation_report.h"
+
+#include "bindings.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb::python {
+namespace {
+
+struct NamedTrajectory {
+  Trajectory poses;
+  std::string name;  // of its file
+};
+
+// Of a file in TUM format, or of (stamps_ns, poses) as Slam.trajectory() gives them.
+NamedTrajectory trajectory_of(const py::object& object, const char* name) {
+  if (!py::isinstance<py::tuple>(object)) {
+    const std::string path = path_of(object, name);
+    const py::gil_scoped_release released;
+    return {read_poses(path), path};
+  }
+  if (py::len(object) != 2) throw InputError(std::string(name) + ": give a file, or the pair (stamps_ns, poses)");
+  const auto stamps = py::array_t<int64_t, py::array::c_style>::ensure(object[py::int_(0)]);
+  const auto poses = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object[py::int_(1)]);
+  PyErr_Clear();
+  if (!stamps || !poses || stamps.ndim() != 1 || poses.ndim() != 3 || poses.shape(0) != stamps.shape(0))
+    throw InputError(std::string(name) + ": give stamps_ns as int64 [N] and poses as float64 [N, 4, 4]");
+  NamedTrajectory trajectory;
+  for (py::ssize_t i = 0; i < stamps.shape(0); ++i)
+    trajectory.poses.push_back(
+        {seconds_from_ns(stamps.at(i)), "", pose_of(py::object(poses[py::int_(i)]), name + (" " + std::to_string(i)))});
+  return trajectory;
+}
+
+Evaluation evaluated(const py::object& truth, const py::object& estimate, double max_diff, const std::string& rpe_delta,
+                     bool scale) {
+  const NamedTrajectory t = trajectory_of(truth, "truth"), e = trajectory_of(estimate, "estimate");
+  EvaluationOptions options;
+  options.max_difference = max_diff;
+  options.rpe_delta = parse_rpe_delta(rpe_delta);
+  options.with_scale = scale;
+  const py::gil_scoped_release released;
+  return evaluate(t.poses, e.poses, options, e.name);
+}
+
+}  // namespace
+
+void bind_evaluation(py::module_& module) {
+  module.def("_evaluate_json",
+             [](const py::object& truth, const py::object& estimate, double max_diff, const std::string& rpe_delta,
+                bool scale) { return evaluation_json(evaluated(truth, estimate, max_diff, rpe_delta, scale)); });
+  module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
+    if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);
+    PlotNames names;
+    names.title = title;
+    return evaluation_svg(evaluated(truth, estimate, EvaluationOptions().max_difference, "1f", false), names);
+  });
+}
+
+}  // namespace dkb::python

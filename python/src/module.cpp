@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <set>
+
+#include "bindings.h"
+
+namespace dkb::python {
+namespace {
+
+std::set<Closable*>& open_ones() {  // in no order that anything depends on; touched with the GIL held
+  static std::set<Closable*> all;
+  return all;
+}
+
+PyObject* slam_warning = nullptr;
+
+}  // namespace
+
+Closable::Closable() {
+  open_ones().insert(this);
+}
+Closable::~Closable() {
+  open_ones().erase(this);
+}
+void Closable::close_all() {
+  const std::set<Closable*> all = open_ones();
+  for (Closable* one : all)
+    if (open_ones().contains(one)) one->close();
+}
+
+void warn(const std::string& text) {
+  if (PyErr_WarnEx(slam_warning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
+std::string path_of(const py::handle& value, const char* name) {
+  if (!py::isinstance<py::str>(value) && !py::hasattr(value, "__fspath__"))
+    throw py::type_error(std::string(name) + ": must be a str or a path, not " + Py_TYPE(value.ptr())->tp_name);
+  return py::str(py::module_::import("os").attr("fspath")(value));
+}
+
+int64_t stamp_of(const py::handle& value) {
+  const py::object index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+  if (!index) {
+    PyErr_Clear();
+    throw py::type_error(std::string("stamp_ns: must be an int, in nanoseconds, not ") + Py_TYPE(value.ptr())->tp_name);
+  }
+  const int64_t stamp = PyLong_AsLongLong(index.ptr());
+  if (PyErr_Occurred() == nullptr) return stamp;
+  PyErr_Clear();
+  throw InputError("stamp_ns: " + py::str(index).cast<std::string>() + " does not fit 64 bits of nanoseconds");
+}
+
+}  // namespace dkb::python
+
+PYBIND11_MODULE(_core, module) {
+  using namespace dkb::python;
+  py::options options;
+  options.disable_function_signatures();  // the docstrings have them
+  options.disable_enum_members_docstring();
+
+  // Later ones are asked first.
+  const auto& input_error = py::register_exception<dkb::InputError>(module, "InputError", PyExc_ValueError);
+  input_error.doc() = "Bad input, bad usage, or an output that cannot be written. One line: where, what, the remedy.";
+  const auto& invalid = py::register_exception<dkb::InvalidOption>(module, "InvalidOption", input_error);
+  invalid.doc() = "An option outside its range: its key, its value and its range, in one line.";
+  slam_warning = PyErr_NewExceptionWithDoc("dkb_slam._core.SlamWarning",
+                                           "Something a person should know: a frame that was skipped, a detector "
+                                           "that failed. One line.",
+                                           PyExc_UserWarning, nullptr);
+  module.add_object("SlamWarning", py::reinterpret_borrow<py::object>(slam_warning));
+  module.attr("__version__") = dkb::version();
+
+  bind_camera(module);
+  bind_results(module);
+  bind_detector(module);
+  bind_frames(module);
+  bind_map(module);
+  bind_slam(module);
+  bind_evaluation(module);
+  py::module_::import("atexit").attr("register")(py::cpp_function(&Closable::close_all));
+}

@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb_slam/slam.h"
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <deque>
+#include <mutex>
+
+#include "bindings.h"
+#include "dkb/dataset/detector_choice.h"
+#include "dkb/dataset/trajectory_file.h"
+
+namespace dkb::python {
+namespace {
+
+std::string setting_text(const py::handle& value) {
+  if (py::isinstance<py::bool_>(value)) return value.cast<bool>() ? "true" : "false";
+  return py::str(value);
+}
+
+std::string text_or_empty(const py::kwargs& a, const char* name) {
+  const py::object value = a[name];
+  return value.is_none() ? "" : path_of(value, name);
+}
+
+// As the command line's options say it, in its order.
+Options options_of(const py::kwargs& a) {
+  Options options(argument<std::string>(a["preset"], "preset", "a str"));
+  if (!a["config"].is_none()) options.load(path_of(a["config"], "config"));
+  if (!a["settings"].is_none())
+    for (const auto& [key, value] : argument<py::dict>(a["settings"], "settings", "a dict"))
+      options.set(py::str(key), setting_text(value), "settings");
+  if (!a["filter"].is_none()) options.set("dynamics.filter", py::str(a["filter"]), "filter");
+  options.disable(argument<std::string>(a["disable"], "disable", "a str, parts by comma"));
+  if (!a["seed"].is_none()) options.set("seed", py::str(a["seed"]), "seed");
+  if (argument<bool>(a["final_ba"], "final_ba", "a bool")) options.set("global_ba.final", "true", "final_ba");
+  options.threaded = argument<int>(a["threads"], "threads", "an int") != 1;
+  options.realtime = argument<bool>(a["realtime"], "realtime", "a bool");
+  options.dense_map = argument<bool>(a["dense"], "dense", "a bool");
+  if (!a["base_from_cam"].is_none()) options.base_from_cam = pose_of(a["base_from_cam"], "base_from_cam");
+  options.check();
+  return options;
+}
+
+// The kinds by name, joined by +, and the functions of `detector`: a str, a callable, or several of them.
+std::pair<std::string, std::vector<py::object>> split_detector(const py::object& detector) {
+  const bool several = py::isinstance<py::list>(detector) || py::isinstance<py::tuple>(detector);
+  const py::list items = several ? py::list(detector) : py::list(py::make_tuple(detector));
+  std::string kinds;
+  std::vector<py::object> functions;
+  for (const py::handle& item : items) {
+    if (py::isinstance<py::str>(item))
+      kinds += (kinds.empty() ? "" : "+") + item.cast<std::string>();
+    else if (PyCallable_Check(item.ptr()) != 0)
+      functions.push_back(py::reinterpret_borrow<py::object>(item));
+    else
+      throw py::type_error(std::string("detector: must be a str, a callable or a list of them, not ") +
+                           Py_TYPE(item.ptr())->tp_name);
+  }
+  return {kinds.empty() ? "none" : kinds, std::move(functions)};
+}
+
+Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera& camera,
+                       const std::shared_ptr<Interruption>& interruption) {
+  auto [kinds, functions] = split_detector(a["detector"]);
+  DetectorChoice choice;
+  choice.kinds = kinds;
+  choice.model = text_or_empty(a, "model");
+  choice.labels = text_or_empty(a, "labels");
+  choice.boxes = text_or_empty(a, "boxes");
+  choice.masks = text_or_empty(a, "masks");
+  choice.every = argument<int>(a["detect_every"], "detect_every", "an int");
+  choice.latency = argument<int>(a["detect_latency"], "detect_latency", "an int");
+  choice = choice_beside(options, a["disable"].cast<std::string>(), std::move(choice));
+  Detectors made;
+  {
+    const py::gil_scoped_release released;
+    made = make_detectors(choice, camera);
+  }
+  if (options.dynamics.filter == FilterKind::none) return made;
+  const bool slow = made.slow == nullptr && choice.every > 0;
+  if (slow && functions.size() > 1)
+    throw InputError("detect_every: one detector may be slow, and there are " + std::to_string(functions.size()) +
+                     "; leave it out, or join them in one function");
+  for (py::object& function : functions) {
+    auto detector = python_detector(std::move(function), interruption);
+    if (!slow) {
+      made.prompt.push_back(std::move(detector));
+      continue;
+    }
+    made.slow = std::move(detector);
+    made.schedule = {choice.every, choice.latency > 0 ? choice.latency : choice.every};
+  }
+  return made;
+}
+
+// Slam with what Python adds: at rest before the interpreter goes, never two feeding threads, events kept for polling.
+class PySlam final : public Closable {
+ public:
+  PySlam(const Camera& camera, const py::kwargs& a) : camera_(camera) {
+    const Options options = options_of(a);
+    Detectors detectors = detectors_of(a, options, camera, interruption_);
+    const py::gil_scoped_release released;
+    slam_ = std::make_shared<Slam>(camera, options, std::move(detectors));
+    slam_->on_event([this](const Event& event) { keep(event); });
+  }
+  ~PySlam() override { close(); }
+
+  void close() override {
+    std::shared_ptr<Slam> ended = std::move(slam_);
+    const py::gil_scoped_release released;  // its threads may wait for the GIL, and it waits for them
+    ended.reset();
+  }
+  const Camera& camera() const { return camera_; }
+  bool closed() const { return slam_ == nullptr; }
+
+  // Work of the feeding thread, without the GIL.
+  template <class Work>
+  void feed(const Work& work) {
+    run([&](Slam& slam) {
+      const std::unique_lock lock(feeding_, std::try_to_lock);
+      if (!lock.owns_lock()) throw InputError("slam: another thread is in a call of it; one thread at a time feeds it");
+      work(slam);
+    });
+    if (const std::exception_ptr what = std::exchange(interruption_->what, nullptr)) std::rethrow_exception(what);
+    for (const std::string& text : std::exchange(warnings_, {})) warn(text);
+  }
+  // Work that any thread may do meanwhile, without the GIL.
+  template <class Work>
+  void run(const Work& work) const {
+    if (!slam_) throw InputError("slam: it is closed");
+    std::shared_ptr<Slam> slam = slam_;
+    const py::gil_scoped_release released;
+    const std::shared_ptr<Slam> mine = std::move(slam);  // given back before the GIL is taken, see close()
+    work(*mine);
+  }
+
+  PyResult process(const py::object& frame_or_stamp, const py::object& rgb, const py::object& depth,
+                   const py::object& prior, const py::object& depth_stamp_ns, bool bgr) {
+    if (!slam_) throw InputError("slam: it is closed");
+    PyFrame given;
+    if (py::isinstance<PyFrame>(frame_or_stamp)) {
+      if (!rgb.is_none() || !depth.is_none() || !depth_stamp_ns.is_none())
+        throw py::type_error("process: give a frame, or stamp_ns, rgb and depth");
+      given = frame_or_stamp.cast<const PyFrame&>();
+      if (!prior.is_none()) given.frame.set_prior(prior_of(prior));
+    } else {
+      given = frame_from_arguments(camera_, frame_or_stamp, rgb, depth, prior, depth_stamp_ns, bgr);
+    }
+    PyResult result;
+    feed([&](Slam& slam) {
+      result = {slam.process(given.frame), camera_.width, camera_.height};
+      if (result.r.state == TrackingState::paused) return;
+      stamps_.resize(static_cast<size_t>(result.r.frame));
+      stamps_.push_back(std::move(given.stamp));
+    });
+    return result;
+  }
+  void reset() {
+    feed([&](Slam& slam) {
+      slam.reset();
+      stamps_.clear();
+    });
+  }
+  void load_map(const std::string& path) {
+    feed([&](Slam& slam) {
+      slam.load_map(path);
+      stamps_.clear();
+    });
+  }
+  void save_trajectory(const std::string& path, int map, bool online) {
+    feed([&](Slam& slam) {
+      const auto by_map = trajectories_by_map(online ? slam.online_trajectory() : slam.trajectory(), stamps_);
+      const bool there = map >= 0 && static_cast<size_t>(map) < by_map.size();
+      write_trajectory(path, there ? by_map[static_cast<size_t>(map)] : Trajectory());
+    });
+  }
+  std::vector<Event> take_events() {
+    const std::lock_guard lock(events_mutex_);
+    std::vector<Event> events(std::make_move_iterator(events_.begin()), std::make_move_iterator(events_.end()));
+    events_.clear();
+    return events;
+  }
+
+ private:
+  void keep(const Event& event) {  // on the feeding thread, within feed()
+    if (event.kind == Event::Kind::warning) warnings_.push_back(fmt::format("frame {}: {}", event.frame, event.text));
+    const std::lock_guard lock(events_mutex_);
+    events_.push_back(event);
+    if (events_.size() > 10000) events_.pop_front();
+  }
+
+  const Camera camera_;
+  std::shared_ptr<Slam> slam_;  // null when closed
+  std::mutex feeding_;
+  std::shared_ptr<Interruption> interruption_ = std::make_shared<Interruption>();
+  std::vector<std::string> stamps_;    // of each frame, as it shall be written
+  std::vector<std::string> warnings_;  // not yet shown
+  std::mutex events_mutex_;
+  std::deque<Event> events_;
+};
+
+// Stamps and poses of the frames of one map, by stamp.
+py::tuple trajectory_arrays(std::vector<TrajectoryFrame> frames, int map) {
+  std::erase_if(frames, [&](const TrajectoryFrame& f) { return f.map != map; });
+  std::stable_sort(frames.begin(), frames.end(), [](const auto& a, const auto& b) { return a.stamp_ns < b.stamp_ns; });
+  const auto n = static_cast<py::ssize_t>(frames.size());
+  py::array_t<int64_t> stamps(n);
+  py::array_t<double> poses({n, py::ssize_t{4}, py::ssize_t{4}});
+  double* out = poses.mutable_data();
+  for (py::ssize_t i = 0; i < n; ++i) {
+    const TrajectoryFrame& frame = frames[static_cast<size_t>(i)];
+    stamps.mutable_at(i) = frame.stamp_ns;
+    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> pose(out + 16 * i);
+    pose.setIdentity();
+    pose.topLeftCorner<3, 3>() = frame.world_from_cam.matrix3();
+    pose.topRightCorner<3, 1>() = frame.world_from_cam.translation;
+  }
+  return py::make_tuple(stamps, poses);
+}
+
+py::tuple trajectory(const PySlam& slam, int map, bool online) {
+  std::vector<TrajectoryFrame> frames;
+  slam.run([&](Slam& s) { frames = online ? s.online_trajectory() : s.trajectory(); });
+  return trajectory_arrays(std::move(frames), map);
+}
+
+py::tuple keyframes(const PySlam& slam, int map) {
+  std::vector<TrajectoryFrame> frames;
+  slam.run([&](Slam& s) { frames = s.keyframes(); });
+  return trajectory_arrays(std::move(frames), map);
+}
+
+MapSnapshot snapshot(const PySlam& slam) {
+  MapSnapshot map;
+  slam.run([&](Slam& s) { map = s.map(); });
+  return map;
+}
+
+Statistics statistics_of(const PySlam& slam) {
+  Statistics s;
+  slam.run([&](Slam& inner) { s = inner.statistics(); });
+  return s;
+}
+
+py::dict statistics(const PySlam& slam) {
+  const Statistics s = statistics_of(slam);
+  py::dict d;
+  for (const auto& [name, value] :
+       std::initializer_list<std::pair<const char*, int>>{{"frames", s.frames},
+                                                          {"tracked", s.tracked},
+                                                          {"lost", s.lost},
+                                                          {"relocalisations", s.relocalisations},
+                                                          {"keyframes", s.keyframes},
+                                                          {"keyframes_inserted", s.keyframes_inserted},
+                                                          {"maps", s.maps},
+                                                          {"loops", s.loops},
+                                                          {"merges", s.merges},
+                                                          {"points_created", s.points_created},
+                                                          {"points_culled", s.points_culled},
+                                                          {"points_fused", s.points_fused},
+                                                          {"points_retracted", s.points_retracted},
+                                                          {"keyframes_culled", s.keyframes_culled},
+                                                          {"detector_latency_frames", s.detector_latency_frames}})
+    d[name] = value;
+  d["map_points"] = s.map_points;
+  d["features_removed"] = s.features_removed;
+  d["keyframe_rules"] = s.keyframe_rules;
+  d["keyframe_tests"] = s.keyframe_tests;
+  d["detector"] = s.detector;
+  d["detector_rate_hz"] = s.detector_rate_hz;
+  py::dict stages;
+  for (const auto& [name, stage] : s.stages) {
+    py::dict times;
+    times["mean_ms"] = stage.mean_ms;
+    times["median_ms"] = stage.median_ms;
+    times["p95_ms"] = stage.p95_ms;
+    times["max_ms"] = stage.max_ms;
+    times["count"] = stage.count;
+    stages[py::str(name)] = times;
+  }
+  d["stages"] = stages;
+  return d;
+}
+
+std::string repr_of(const PySlam& slam) {
+  if (slam.closed()) return "Slam(closed)";
+  const Statistics s = statistics_of(slam);
+  return fmt::format("Slam({} x {} px, {} of {} frames tracked, {} keyframes, {} map points)", slam.camera().width,
+                     slam.camera().height, s.tracked, s.frames, s.keyframes, s.map_points);
+}
+
+DenseMap dense_map(PySlam& slam) {
+  DenseMap map;
+  slam.feed([&](Slam& s) { map = s.dense_map(); });
+  return map;
+}
+
+}  // namespace
+
+void bind_slam(py::module_& module) {
+  py::class_<PySlam>(module, "Slam")
+      .def(py::init<const Camera&, const py::kwargs&>())
+      .def("process", &PySlam::process, py::arg("frame"), py::arg("rgb") = py::none(), py::arg("depth") = py::none(),
+           py::arg("prior") = py::none(), py::kw_only(), py::arg("depth_stamp_ns") = py::none(), py::arg("bgr") = false,
+           R"(process(frame, *, prior=None) -> FrameResult
+process(stamp_ns, rgb, depth, prior=None, *, depth_stamp_ns=None, bgr=False) -> FrameResult
+
+Tracks the next frame: one of open(), or images as numpy arrays, which are read during the call without being copied
+first. Only their rows need to be contiguous.
+
+stamp_ns: int, [ns] of the colour image, middle of the exposure; rises from frame to frame.
+rgb: uint8 [H, W, 3], [H, W, 4] (the last channel is not looked at) or [H, W] (grey); bgr=True: in OpenCV's order.
+depth: uint16 [H, W] in units of 1 / depth_factor m, or float32 [H, W] in m; 0 and not finite = no data; registered to
+    the colour image.
+prior: MotionPrior, or float64 [4, 4] previous_from_current, where something else knows of the motion.
+depth_stamp_ns: int, [ns] of the depth image; None = the colour image's.
+
+Other threads run meanwhile. Raises InputError for images that do not fit the camera and stamps that do not rise; the
+frame is not counted then and the next one goes on. Shows a SlamWarning when a detector fails.)")
+      .def(
+          "finish", [](PySlam& s) { s.feed([](Slam& slam) { slam.finish(); }); },
+          "finish()\n\nWaits for all outstanding work: trajectory and map are complete then. process() may go on.")
+      .def("reset", &PySlam::reset, "reset()\n\nForgets the world, its frames and its clock.")
+      .def(
+          "pause", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.pause(on); }); }, py::arg("on") = true,
+          "pause(on=True)\n\nWhile paused, frames are answered with state \"paused\" and change nothing.")
+      .def(
+          "localize_only", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.localize_only(on); }); },
+          py::arg("on") = true, "localize_only(on=True)\n\nWhile on, the map is not changed.")
+      .def(
+          "explain_keyframes", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.explain_keyframes(on); }); },
+          py::arg("on") = true,
+          "explain_keyframes(on=True)\n\nEvery result's keyframe_explanation then says which test said what.")
+      .def("close", &PySlam::close,
+           "close()\n\nEnds its threads; nothing can be asked of it then. Also at the end of a `with` block.")
+      .def("__enter__", [](const py::object& self) { return self; })
+      .def("__exit__", [](PySlam& slam, const py::args&) { slam.close(); })
+      .def(
+          "save_map",
+          [](PySlam& s, const py::object& path) {
+            s.feed([to = path_of(path, "path")](Slam& slam) { slam.save_map(to); });
+          },
+          py::arg("path"), "save_map(path)\n\nWrites the map as it is now. Raises InputError when it cannot.")
+      .def(
+          "load_map", [](PySlam& s, const py::object& path) { s.load_map(path_of(path, "path")); }, py::arg("path"),
+          "load_map(path)\n\nForgets everything and goes on in that map: frames are lost until one is found in it.\n"
+          "Raises InputError, and leaves all as it is, when the file is broken or of another camera.")
+      .def(
+          "save_trajectory",
+          [](PySlam& s, const py::object& path, int map, bool online) {
+            s.save_trajectory(path_of(path, "path"), map, online);
+          },
+          py::arg("path"), py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
+          "save_trajectory(path, *, map=0, online=False)\n\nWrites what trajectory() gives in TUM format, as "
+          "`dkb-slam run` does:\nstamp [s], position [m], quaternion xyzw.")
+      .def("trajectory", &trajectory, py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
+           R"(trajectory(*, map=0, online=False) -> (stamps_ns, poses)
+
+Every tracked frame by the map as it is now; complete after finish(). From any thread.
+
+stamps_ns: int64 [N]; poses: float64 [N, 4, 4], world_from_cam, [m]. map: 0 = the first one; maps that were never joined
+have worlds of their own. online: as each frame was published.)")
+      .def("keyframes", &keyframes, py::kw_only(), py::arg("map") = 0,
+           "keyframes(*, map=0) -> (stamps_ns, poses)\n\nKeyframes of the map, as trajectory() has them.")
+      .def("map", &snapshot, "map() -> MapSnapshot\n\nThe map as tracking knows it; cheap, from any thread.")
+      .def(
+          "map_points",
+          [](const PySlam& slam) {
+            const py::object points = py::cast(snapshot(slam)).attr("points")();
+            return py::make_tuple(points.attr("xyz"), points.attr("rgb"));
+          },
+          "map_points() -> (xyz, rgb)\n\nxyz: float64 [M, 3], [m] in the world; rgb: uint8 [M, 3]. From any thread.")
+      .def("dense_map", &dense_map,
+           "dense_map() -> DenseMap\n\nThe still world from the keyframes so far; takes seconds. Raises InputError "
+           "without Slam(dense=True).")
+      .def("events", &PySlam::take_events,
+           "events() -> list[Event]\n\nWhat happened since the last call, oldest first; at most the newest 10,000.")
+      .def("statistics", &statistics, "statistics() -> dict\n\nWhat has happened since the world began; times in [ms].")
+      .def_property_readonly(
+          "camera", [](const PySlam& slam) { return Camera(slam.camera()); }, "Camera: as given.")
+      .def(
+          "config_yaml",
+          [](const PySlam& slam) {
+            std::string text;
+            slam.run([&](Slam& s) { text = s.options().to_yaml(); });
+            return text;
+          },
+          "config_yaml() -> str\n\nThe preset and every setting, a line each with its unit and meaning.")
+      .def("__repr__", &repr_of);
+}
+
+}  // namespace dkb::python

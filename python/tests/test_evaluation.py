@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scores and pictures are those of the command line."""
+import json
+import xml.dom.minidom
+
+import dkb_slam
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def slam(sequence):
+    source = dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera)
+    for frame in source:
+        slam.process(frame)
+    slam.finish()
+    return slam
+
+
+def test_the_score_is_that_of_eval_json(slam, sequence, command_line, tmp_path):
+    truth, estimate = sequence / "groundtruth.txt", tmp_path / "trajectory.txt"
+    slam.save_trajectory(estimate)
+    command_line("eval", truth, estimate, "--json", tmp_path / "score.json", "--rpe-delta", "2f")
+    score = dkb_slam.evaluate(truth, estimate, rpe_delta="2f")
+    assert score == json.loads((tmp_path / "score.json").read_text())
+    assert score["ape"]["translation_m"]["rmse"] < 0.02
+    by_slam = dkb_slam.evaluate(truth, slam, rpe_delta="2f")  # nine decimals are in the file
+    assert by_slam["matched"] == 40
+    assert by_slam["ape"]["translation_m"]["rmse"] == pytest.approx(score["ape"]["translation_m"]["rmse"], abs=1e-8)
+
+
+def test_what_cannot_be_scored_is_one_line(slam, sequence):
+    stamps, poses = slam.trajectory()
+    with pytest.raises(dkb_slam.InputError, match="^0 of 40 estimated"):
+        dkb_slam.evaluate(sequence / "groundtruth.txt", (stamps + 10**15, poses))
+    with pytest.raises(dkb_slam.InputError, match="rpe-delta"):
+        dkb_slam.evaluate(sequence / "groundtruth.txt", slam, rpe_delta="1x")
+    with pytest.raises(dkb_slam.InputError, match="estimate 0: it is no rigid motion"):
+        dkb_slam.evaluate(sequence / "groundtruth.txt", (stamps, np.zeros_like(poses)))
+
+
+def test_a_plot_is_a_picture_for_notebooks(slam, sequence, tmp_path):
+    alone, beside = slam.plot(title="mine & yours"), slam.plot(sequence / "groundtruth.txt")
+    for plot in (alone, beside, dkb_slam.plot_trajectory(sequence / "groundtruth.txt")):
+        xml.dom.minidom.parseString(plot._repr_svg_())
+    assert "mine &amp; yours" in alone.svg and "APE" in beside.svg and "APE" not in alone.svg
+    alone.save(tmp_path / "path.svg")
+    assert (tmp_path / "path.svg").read_text() == alone.svg

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever goes in wrong comes back as one line."""
+import ast
+import inspect
+import re
+from pathlib import Path
+
+import dkb_slam
+import numpy as np
+import pytest
+from dkb_slam import _core
+
+RGB, DEPTH = np.zeros((480, 640, 3), np.uint8), np.ones((480, 640), np.float32)
+
+
+@pytest.fixture
+def slam(camera):
+    return dkb_slam.Slam(camera, threads=1)
+
+
+@pytest.mark.parametrize("rgb, depth, says", [
+    (RGB.astype(np.float32), DEPTH, "rgb: it is float32 [480, 640, 3]"),
+    (RGB[..., :2], DEPTH, "rgb: it is uint8 [480, 640, 2]"),
+    (RGB[..., ::-1], DEPTH, "rgb: its rows are not contiguous; give numpy.ascontiguousarray(rgb)"),
+    (RGB[:, ::-1], DEPTH, "rgb: its rows are not contiguous"),
+    (RGB[::-1], DEPTH, "rgb: its rows are not contiguous"),
+    (np.broadcast_to(RGB[:1], RGB.shape), DEPTH, "rgb: its rows are not contiguous"),
+    (np.zeros((640, 480, 3), np.uint8).transpose(1, 0, 2), DEPTH, "rgb: its rows are not contiguous"),
+    (RGB[:, :320], DEPTH, "320 x 480 px, the camera of 640 x 480"),
+    (np.zeros((0, 640, 3), np.uint8), DEPTH, "640 x 0 px"),
+    (RGB, DEPTH.astype(np.float64), "depth: it is float64 [480, 640]"),
+    (RGB, DEPTH.astype(">f4"), "depth: it is >f4 [480, 640]"),
+    (RGB, DEPTH[..., None], "depth: it is float32 [480, 640, 1]"),
+    (RGB, DEPTH[:, ::2], "depth: its rows are not contiguous"),
+    (RGB, None, "depth: it is of type NoneType; give a numpy array"),
+    (RGB.tolist(), DEPTH, "rgb: it is of type list"),
+])
+def test_images_that_do_not_fit_are_named(slam, rgb, depth, says):
+    with pytest.raises(dkb_slam.InputError) as error:
+        slam.process(1, rgb, depth)
+    assert says in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("call, kind, says", [
+    (lambda c: dkb_slam.Slam(c, settings={"features.cuont": 3}), dkb_slam.InputError, 'did you mean "features.count"?'),
+    (lambda c: dkb_slam.Slam(c, settings={"features.count": 0}), dkb_slam.InvalidOption, "features.count"),
+    (lambda c: dkb_slam.Slam(c, "papr"), dkb_slam.InputError, "paper"),
+    (lambda c: dkb_slam.Slam(c, detector="yol"), dkb_slam.InputError, "yolo"),
+    (lambda c: dkb_slam.Slam(c, detector="yolo"), dkb_slam.InputError, "no model"),
+    (lambda c: dkb_slam.Slam(c, detector=5), TypeError, "detector: must be"),
+    (lambda c: dkb_slam.Slam("fr1"), TypeError, "camera: must be a dkb_slam.Camera, not str"),
+    (lambda c: dkb_slam.Slam(c, seed="x"), dkb_slam.InputError, "seed"),
+    (lambda c: dkb_slam.Slam(c, base_from_cam=np.ones((4, 4))), dkb_slam.InputError, "no rigid motion"),
+    (lambda c: dkb_slam.Slam(c, base_from_cam=np.eye(3)), dkb_slam.InputError, "[3, 3]"),
+    (lambda c: dkb_slam.MotionPrior("x"), dkb_slam.InputError, "no matrix"),
+    (lambda c: dkb_slam.Camera.named("fr4"), dkb_slam.InputError, "fr"),
+    (lambda c: dkb_slam.Camera.load("/nothing.yaml"), dkb_slam.InputError, "/nothing.yaml"),
+    (lambda c: dkb_slam.Camera(fx=1, fxx=2), dkb_slam.InputError, '"fxx" (did you mean "fx"?)'),
+    (lambda c: dkb_slam.Camera(fx=1), dkb_slam.InputError, "missing: width"),
+    (lambda c: dkb_slam.open("/no/such/folder"), dkb_slam.InputError, "/no/such/folder"),
+    (lambda c: dkb_slam.open(5), TypeError, "source: must be a str or a path"),
+    (lambda c: dkb_slam.evaluate("/nothing.txt", "/nothing.txt"), dkb_slam.InputError, "/nothing.txt"),
+    (lambda c: dkb_slam.plot_trajectory((np.zeros(2, np.int64), np.zeros((3, 4, 4)))), dkb_slam.InputError, "[N, 4, 4]"),
+    (lambda c: dkb_slam.plot_trajectory(dkb_slam.Slam(c)), dkb_slam.InputError, "no pose"),
+])
+def test_a_wrong_argument_is_one_line(camera, call, kind, says):
+    with pytest.raises(kind) as error:
+        call(camera)
+    assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def test_stamps_are_whole_and_rise(slam):
+    with pytest.raises(TypeError, match="stamp_ns: must be an int"):
+        slam.process(1.5, RGB, DEPTH)
+    with pytest.raises(dkb_slam.InputError, match="64 bits"):
+        slam.process(2**70, RGB, DEPTH)
+    slam.process(10, RGB, DEPTH)
+    with pytest.raises(dkb_slam.InputError) as error:
+        slam.process(10, RGB, DEPTH)
+    assert "\n" not in str(error.value)
+    assert slam.process(11, RGB, DEPTH).frame == 1
+
+
+def test_errors_are_of_pythons_kinds():
+    assert issubclass(dkb_slam.InputError, ValueError) and issubclass(dkb_slam.InvalidOption, dkb_slam.InputError)
+    assert issubclass(dkb_slam.SlamWarning, UserWarning)
+
+
+def test_cameras_keep_their_fields():
+    fields = dict(fx=525.5, fy=526.25, cx=319.5, cy=239.5, width=640, height=480, depth_factor=1000.0, k1=0.1)
+    camera = dkb_slam.Camera(**fields)
+    assert {name: getattr(camera, name) for name in fields} == fields
+    assert camera == dkb_slam.Camera(**fields) and camera != dkb_slam.Camera.named("fr1")
+    assert eval(repr(camera), {"Camera": dkb_slam.Camera}) == camera
+    with pytest.raises(AttributeError):
+        camera.fx = 1
+
+
+def test_the_stubs_name_what_there_is():
+    stub = ast.parse(Path(_core.__file__).with_name("_core.pyi").read_text())
+
+    def names(body):
+        found = {n.name for n in body if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+        found |= {n.target.id for n in body if isinstance(n, ast.AnnAssign)}
+        return {n for n in found if not re.fullmatch("__(init|iter|next|enter|exit)__", n)}
+
+    public = {n for n in dir(_core) if not re.fullmatch("__(?!version).*__", n)}
+    assert names(stub.body) == public
+    for declared in stub.body:
+        if isinstance(declared, ast.ClassDef) and not issubclass(getattr(_core, declared.name), Exception):
+            here = {n for n in vars(getattr(_core, declared.name)) if not n.startswith("_")}
+            assert names(declared.body) == here, declared.name
+
+
+def test_everything_public_says_what_it_is():
+    for name in dkb_slam.__all__:
+        thing = getattr(dkb_slam, name)
+        if name.startswith("FEATURE") or name == "__version__":
+            continue
+        assert inspect.getdoc(thing), name
+        if inspect.isclass(thing):
+            assert thing.__module__ == "dkb_slam"
+    for name, method in vars(_core.Slam).items():
+        assert name.startswith("_") or inspect.getdoc(method), name

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/dataset/tum_dataset.h"
+#include "dkb/geometry/camera.h"
+#include "dkb/image/rgbd_image.h"
+
+namespace dkb {
+
+// One colour and one depth image as they are stored. The functions may be called on any thread, one at a time.
+struct StoredPair {
+  double timestamp = 0;                      // [s] colour
+  int64_t stamp_ns = 0, depth_stamp_ns = 0;  // exactly
+  std::string stamp;                         // colour, as the recording writes it
+  std::optional<MotionPrior> prior;          // of the motion since the pair before
+  // What is wrong with the type or the size of images that are sound in themselves, by their headers: the recording is
+  // of another kind than the camera. Empty when nothing is. Throws InputError when an image is broken.
+  std::function<std::string()> mismatch;
+  // Throws InputError when one of the images is broken or does not fit.
+  std::function<std::shared_ptr<RgbdImage>()> decode;
+};
+
+// Answers pair by pair, colour stamps rising; nothing at the end. Called by one thread at a time.
+using PairStream = std::function<std::optional<StoredPair>()>;
+
+// The pairs of files that the lists of a folder name.
+PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera);
+
+// Empty when an image has the camera's size; else what is wrong, for people.
+std::string size_mismatch(const std::string& name, int width, int height, const CameraModel& camera);
+
+}  // namespace dkb

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/convert.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/tum_dataset.h"
+#include "dkb/recordings/depth_registration.h"
+#include "dkb/recordings/message_stream.h"
+#include "dkb/recordings/pair_writer.h"
+#include "dkb/recordings/recorded_image.h"
+#include "dkb/recordings/recording_contents.h"
+#include "dkb/recordings/recording_writer.h"
+#include "dkb/recordings/ros_messages.h"
+#include "dkb/recordings/stamp_pairing.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+
+namespace dkb {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The camera file itself where there is one, comments and all.
+std::string camera_text(const Camera& camera, const std::string& option, const fs::path& folder) {
+  std::error_code error;
+  const fs::path file = option.empty() ? folder / "camera.yaml" : fs::path(option);
+  return fs::is_regular_file(file, error) ? read_file(file) : camera.to_yaml();
+}
+
+// Whether a reader that pairs by stamps finds these pairs again.
+bool pairs_by_stamps(const std::vector<DatasetPair>& pairs) {
+  std::vector<double> colour, depth;
+  for (const DatasetPair& pair : pairs) {
+    if (!depth.empty() && pair.depth_timestamp <= depth.back()) return false;
+    colour.push_back(pair.timestamp), depth.push_back(pair.depth_timestamp);
+  }
+  const std::vector<std::pair<size_t, size_t>> found = associate(colour, depth, {});
+  if (found.size() != pairs.size()) return false;
+  return std::all_of(found.begin(), found.end(), [](const auto& pair) { return pair.first == pair.second; });
+}
+
+Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
+  const TumDataset dataset = open_tum_dataset(in);
+  const Camera camera = choose_camera(options.source.camera, in).camera;
+  const std::string text = camera_text(camera, options.source.camera, in);
+  const bool own_stamps = !is_recording_name(out) || pairs_by_stamps(dataset.pairs);
+  if (!own_stamps)
+    options.warn((in / dataset.list).string() +
+                 ": by their stamps alone these images would be paired otherwise; depth images get the stamps of their "
+                 "colour images");
+  const auto writer = write_pairs(out, camera, text, {.compression = options.compression});
+  Converted converted{0, "pairs"};
+  for (const DatasetPair& pair : dataset.pairs) {
+    try {
+      const std::string colour = read_file(pair.colour_path);
+      const Picture picture = decode_picture(colour, pair.colour_path.string());
+      const DepthImage depth = read_depth(pair.depth_path, without_limits(camera));
+      PairToWrite write{pair.stamp_ns, own_stamps ? pair.depth_stamp_ns : pair.stamp_ns, colour, &picture, &depth};
+      if (options.raw) write.colour_file = {};
+      writer->add(write);
+      ++converted.count;
+    } catch (const OutputError&) {
+      throw;
+    } catch (const InputError& e) {
+      options.warn(std::string(e.what()) + "; this pair is left out");
+    }
+  }
+  if (converted.count == 0) throw InputError(in.string() + ": none of its pairs can be read");
+  writer->close();
+  return converted;
+}
+
+// A message in the ROS 1 encoding; nothing for types that are not known here.
+std::optional<std::string> as_ros1(const std::string& type, MessageEncoding encoding, std::string_view bytes) {
+  if (!has_definition(type)) return std::nullopt;
+  if (encoding == MessageEncoding::ros1) return std::string(bytes);
+  if (type == "sensor_msgs/Image") return encode(decode_image(bytes, encoding));
+  if (type == "sensor_msgs/CompressedImage") return encode(decode_compressed_image(bytes, encoding));
+  if (type == "sensor_msgs/CameraInfo") return encode(decode_camera_info(bytes, encoding));
+  if (type == "sensor_msgs/Imu") return encode(decode_imu(bytes, encoding));
+  if (type == "nav_msgs/Odometry") return encode(decode_odometry(bytes, encoding));
+  if (type == "tf2_msgs/TFMessage") return encode(decode_transforms(bytes, encoding));
+  if (type == "std_msgs/String") return encode_string(decode_string(bytes, encoding));
+  return std::nullopt;
+}
+
+// The camera file that goes along: the user's, else the recording's own; empty when there is none.
+std::string camera_text_of(const fs::path& in, const ConvertOptions& options) {
+  if (!options.source.camera.empty())
+    return camera_text(choose_camera(options.source.camera, {}).camera, options.source.camera, {});
+  const auto stream = open_messages(in);
+  const auto texts = stream->metadata();
+  if (const auto found = texts.find(kCameraText); found != texts.end()) return found->second;
+  stream->select({kCameraTopic});
+  std::string text;
+  if (const auto message = stream->next()) {
+    const RecordedTopic& topic = stream->topics()[message->topic];
+    if (topic.type == "std_msgs/String") text = decode_string(message->bytes, topic.encoding);
+  }
+  return text;
+}
+
+Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::path& out,
+                           const ConvertOptions& options) {
+  const std::string camera = camera_text_of(in, options);
+  const auto writer = write_recording(out, options.compression);
+  std::vector<std::optional<size_t>> topics;  // by the stream's
+  const auto add_topics = [&] {
+    std::vector<std::string> names;
+    for (size_t i = topics.size(); i < stream.topics().size(); ++i) {
+      const RecordedTopic& topic = stream.topics()[i];
+      const bool latched = topic.name == "/tf_static";
+      const bool replaced = topic.name == kCameraTopic && !camera.empty();
+      topics.emplace_back();
+      if (replaced) continue;
+      if (has_definition(topic.type))
+        topics.back() = writer->add_topic(topic.name, topic.type, latched);
+      else
+        options.warn(in.string() + ": topic " + topic.name + " of type " + topic.type +
+                     " is left out; its type is not known");
+    }
+  };
+  if (!camera.empty()) writer->add_text(kCameraText, camera);
+  std::optional<size_t> camera_topic;
+  if (!camera.empty()) camera_topic = writer->add_topic(kCameraTopic, "std_msgs/String", true);
+
+  Converted converted{0, "messages"};
+  while (const auto message = stream.next()) {
+    if (camera_topic) writer->write(*camera_topic, message->recorded_ns, encode_string(camera));
+    camera_topic.reset();
+    add_topics();
+    if (!topics[message->topic]) continue;
+    const RecordedTopic& topic = stream.topics()[message->topic];
+    try {
+      const auto bytes = as_ros1(topic.type, topic.encoding, message->bytes);
+      if (!bytes) continue;
+      writer->write(*topics[message->topic], message->recorded_ns, *bytes);
+      ++converted.count;
+    } catch (const OutputError&) {
+      throw;
+    } catch (const InputError& e) {
+      options.warn(in.string() + ": a message of " + topic.name + " is broken (" + e.what() + ") and left out");
+    }
+  }
+  for (const std::string& line : stream.take_warnings()) options.warn(line);
+  if (converted.count == 0) throw InputError(in.string() + ": holds no message of a type that is known here");
+  writer->close();
+  return converted;
+}
+
+// The pairs of a recording, on their way into a folder.
+class PairsToFolder {
+ public:
+  PairsToFolder(const MessageStream& stream, const RecordingContents& contents, PairWriter& writer,
+                const ConvertOptions& options)
+      : contents_(contents), writer_(writer), options_(options) {
+    for (const RecordedTopic& topic : stream.topics()) {
+      if (topic.name == contents.colour.name) encoding_[StampPairing::colour] = topic.encoding;
+      if (topic.name == contents.depth.name) encoding_[StampPairing::depth] = topic.encoding;
+    }
+    if (contents.depth_camera)
+      registration_.emplace(contents.depth_camera->camera, contents.camera, contents.depth_camera->colour_from_depth);
+  }
+
+  void add(StampPairing::Kind kind, const RecordedMessage& message) {
+    try {
+      const int64_t stamp = contents_.stamped ? read(kind, message.bytes).header.stamp_ns : message.recorded_ns;
+      if (!pairing_.add(kind, {stamp, std::string(message.bytes)}))
+        leave_out(topic(kind).name + ": a stamp is not after the one before it");
+    } catch (const InputError& e) {
+      leave_out(e.what());
+    }
+    write();
+  }
+  size_t close() {
+    pairing_.close();
+    write();
+    if (pairing_.unpaired() > 0)
+      options_.warn(std::to_string(pairing_.unpaired()) + " images without a partner of their time are left out");
+    return written_;
+  }
+
+ private:
+  const RecordedImageTopic& topic(StampPairing::Kind kind) const {
+    return kind == StampPairing::colour ? contents_.colour : contents_.depth;
+  }
+  RecordedImage read(StampPairing::Kind kind, std::string_view bytes) const {
+    return read_recorded_image(bytes, topic(kind).type, encoding_[kind], topic(kind).name);
+  }
+  void leave_out(const std::string& why) const { options_.warn(why + "; it is left out"); }
+
+  void write() {
+    while (const auto pair = pairing_.take()) {
+      try {
+        const RecordedImage colour = read(StampPairing::colour, pair->colour.bytes);
+        const Picture picture = picture_of(colour);
+        DepthImage depth = depth_of(read(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
+        if (registration_) depth = registration_->registered(depth);
+        const std::string_view file = colour.compressed ? colour.stored : std::string_view();
+        writer_.add({pair->colour.stamp_ns, pair->depth.stamp_ns, file, &picture, &depth});
+        ++written_;
+      } catch (const OutputError&) {
+        throw;
+      } catch (const InputError& e) {
+        leave_out(e.what());
+      }
+    }
+  }
+
+  const RecordingContents& contents_;
+  PairWriter& writer_;
+  const ConvertOptions& options_;
+  std::array<MessageEncoding, 2> encoding_{};
+  std::optional<DepthRegistration> registration_;
+  StampPairing pairing_;
+  size_t written_ = 0;
+};
+
+Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs::path& out,
+                            const ConvertOptions& options) {
+  std::string text = camera_text_of(in, options);
+  RecordingContents contents = look_into(stream, options.source, in.string());
+  for (const std::string& line : contents.warnings) options.warn(line);
+  if (text.empty()) {
+    if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = 1000;  // as the integers are stored
+    text = contents.camera.to_yaml();
+  }
+  const auto writer = write_pairs(out, contents.camera, text);
+  PairsToFolder pairs(stream, contents, *writer, options);
+  while (const auto message = stream.next()) {
+    const std::string& topic = stream.topics()[message->topic].name;
+    if (topic == contents.colour.name) pairs.add(StampPairing::colour, *message);
+    if (topic == contents.depth.name) pairs.add(StampPairing::depth, *message);
+  }
+  for (const std::string& line : stream.take_warnings()) options.warn(line);
+  const Converted converted{pairs.close(), "pairs"};
+  if (converted.count == 0) throw InputError(in.string() + ": none of its images can be paired and read");
+  writer->close();
+  return converted;
+}
+
+}  // namespace
+
+Converted convert(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
+  std::error_code error;
+  if (!fs::exists(in, error)) throw InputError(in.string() + ": no such file or folder");
+  const bool folder =
+      fs::is_directory(in, error) && (fs::exists(in / "associations.txt", error) || fs::exists(in / "rgb.txt", error));
+  if (folder) return convert_folder(in, out, options);
+  const auto stream = open_messages(in);
+  return is_recording_name(out) ? convert_messages(*stream, in, out, options)
+                                : convert_to_folder(*stream, in, out, options);
+}
+
+}  // namespace dkb

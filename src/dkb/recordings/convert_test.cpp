@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/convert.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "dkb/dataset/folder_source.h"
+#include "dkb/recordings/message_list_test_tools.h"
+#include "dkb/recordings/recorded_source.h"
+#include "dkb/recordings/recording_test_tools.h"
+#include "dkb/util/stamps.h"
+#include "dkb/util/test_errors.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Six pairs: PNG, JPEG and grey pictures; 16-bit depth, and one image of floats.
+class ConvertTest : public testing::Test {
+ protected:
+  ConvertTest() {
+    options.warn = [this](const std::string& line) { warnings.push_back(line); };
+  }
+
+  void write_folder(double depth_factor, int64_t depth_delay_ns = 4'000'001) {
+    Camera camera = small_camera();
+    camera.depth_factor = depth_factor, camera.readout = 0.01, camera.k3 = 0.1;
+    fs::create_directories(scratch / "in");
+    camera_text = "# measured on a Monday\n" + camera.to_yaml();
+    write_bytes(scratch / "in/camera.yaml", camera_text);
+    std::string list;
+    for (int n = 0; n < 6; ++n) {
+      const std::string colour = "c" + std::to_string(n), depth = "d" + std::to_string(n);
+      const ColourImage picture = noise_picture(static_cast<uint64_t>(n));
+      write_bytes(scratch / "in" / colour, n == 1   ? encode_jpeg(picture)
+                                           : n == 2 ? encode_png(grey_from_colour(picture))
+                                                    : encode_png(picture));
+      if (n == 3) {
+        Image<float> metres(32, 24, 1.23456789F);
+        metres(0, 0) = 1e9F, metres(1, 0) = std::numeric_limits<float>::quiet_NaN(), metres(2, 0) = 20;
+        write_bytes(scratch / "in" / depth, encode_tiff(metres));
+      } else {
+        write_bytes(scratch / "in" / depth, encode_png(noise_depth(static_cast<uint64_t>(n))));
+      }
+      const int64_t stamp = kFirst + n * kInterval;
+      list += stamp_text(stamp) + " " + colour + " " + stamp_text(stamp + depth_delay_ns) + " " + depth + "\n";
+    }
+    write_bytes(scratch / "in/associations.txt", list);
+  }
+
+  std::vector<SourceFrame> frames(const std::string& name) const {
+    std::unique_ptr<Source> source;
+    if (fs::is_directory(scratch / name))
+      source = std::make_unique<FolderSource>(scratch / name, SourceOptions{});
+    else
+      source = std::make_unique<RecordedSource>(scratch / name, SourceOptions{});
+    std::vector<SourceFrame> all;
+    for (SourceFrame next = source->next(); next.state != SourceState::ended; next = source->next())
+      all.push_back(std::move(next));
+    return all;
+  }
+
+  void expect_same(const std::string& name) const {
+    SCOPED_TRACE(name);
+    const std::vector<SourceFrame> a = frames("in"), b = frames(name);
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(b[i].state, SourceState::frame) << b[i].note;
+      EXPECT_EQ(a[i].stamp, b[i].stamp);
+      EXPECT_EQ(a[i].frame.depth_stamp_ns(), b[i].frame.depth_stamp_ns());
+      EXPECT_EQ(a[i].frame.image()->grey, b[i].frame.image()->grey);
+      EXPECT_EQ(a[i].frame.image()->colour, b[i].frame.image()->colour);
+      EXPECT_EQ(a[i].frame.image()->depth, b[i].frame.image()->depth);
+    }
+  }
+
+  void convert_and_compare(const std::string& in, const std::string& out) {
+    convert(scratch / in, scratch / out, options);
+    expect_same(out);
+  }
+
+  Scratch scratch;
+  ConvertOptions options;
+  std::vector<std::string> warnings;
+  std::string camera_text;
+};
+
+TEST_F(ConvertTest, TheSameFramesAreReadWhateverTheyAreConvertedTo) {
+  for (const double factor : {1000.0, 5000.0, 1234.5}) {
+    SCOPED_TRACE(factor);
+    write_folder(factor);
+    convert_and_compare("in", "a.bag");
+    convert_and_compare("in", "a.mcap");
+    convert_and_compare("in", "out");
+    convert_and_compare("a.bag", "b.mcap");
+    convert_and_compare("b.mcap", "b.bag");
+    convert_and_compare("b.bag", "back");
+    EXPECT_EQ(read_file(scratch / "back/camera.yaml"), camera_text);
+    EXPECT_EQ(read_file(scratch / "back" / ("rgb/" + stamp_text(kFirst + kInterval) + ".jpg")),
+              read_file(scratch / "in/c1"));
+    EXPECT_TRUE(fs::exists(scratch / "back" / ("depth/" + stamp_text(kFirst + 4'000'001) + ".png")));
+    for (const char* name : {"out", "back"}) fs::remove_all(scratch / name);
+  }
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+}
+
+TEST_F(ConvertTest, ColourMayGoAsPixels) {
+  write_folder(5000);
+  options.raw = true;
+  convert(scratch / "in", scratch / "raw.mcap", options);
+  const auto stream = open_messages(scratch / "raw.mcap");
+  for (const RecordedTopic& topic : stream->topics()) EXPECT_NE(topic.type, "sensor_msgs/CompressedImage");
+  EXPECT_EQ(stream->metadata().at("dkb_slam_camera"), camera_text);
+  while (const auto message = stream->next()) {
+    if (stream->topics()[message->topic].name == "/dkb_slam/camera") {
+      EXPECT_EQ(decode_string(message->bytes, MessageEncoding::ros1), camera_text);
+    }
+  }
+}
+
+TEST_F(ConvertTest, PairsThatStampsDoNotTellGetOneStamp) {
+  write_folder(5000, 30'000'000);  // farther apart than readers look
+  convert(scratch / "in", scratch / "a.bag", options);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("depth images get the stamps of their colour images"), std::string::npos);
+  const std::vector<SourceFrame> read = frames("a.bag");
+  ASSERT_EQ(read.size(), 6U);
+  EXPECT_EQ(read[2].frame.depth_stamp_ns(), read[2].frame.stamp_ns());
+}
+
+TEST_F(ConvertTest, PairsThatCannotBeReadAreLeftOutAndTold) {
+  write_folder(5000);
+  write_bytes(scratch / "in/d4", "broken");
+  EXPECT_EQ(convert(scratch / "in", scratch / "a.bag", options).count, 5U);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("d4: is not an image"), std::string::npos) << warnings[0];
+}
+
+TEST_F(ConvertTest, NothingIsLeftBehindWhenItFails) {
+  write_folder(5000);
+  write_bytes(scratch / "a.bag", "kept");
+  for (int n = 0; n < 6; ++n) write_bytes(scratch / ("in/d" + std::to_string(n)), "broken");
+  EXPECT_THROW(convert(scratch / "in", scratch / "a.bag", options), InputError);
+  EXPECT_THROW(convert(scratch / "in", scratch / "new", options), InputError);
+  EXPECT_EQ(read_file(scratch / "a.bag"), "kept");
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch / "."), {}), 2);  // in and a.bag
+  EXPECT_NE(input_error_of([&] { convert(scratch / "in", scratch / "in", options); }).find("not empty"),
+            std::string::npos);
+  EXPECT_NE(input_error_of([&] { convert(scratch / "none", scratch / "x.bag", options); }).find("no such file"),
+            std::string::npos);
+}
+
+TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {
+  const auto writer = write_recording(scratch / "a.bag");
+  ImuMessage imu;
+  imu.header.stamp_ns = kFirst, imu.angular_velocity = {1, 2, 3};
+  writer->write(writer->add_topic("/imu", "sensor_msgs/Imu"), kFirst, encode(imu));
+  writer->close();
+  EXPECT_EQ(convert(scratch / "a.bag", scratch / "b.mcap", options).count, 1U);
+  const auto stream = open_messages(scratch / "b.mcap");
+  const auto message = stream->next();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(decode_imu(message->bytes, MessageEncoding::ros1).angular_velocity, imu.angular_velocity);
+}
+
+}  // namespace
+}  // namespace dkb::test

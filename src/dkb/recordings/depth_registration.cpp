@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/depth_registration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dkb/image/image.h"
+
+namespace dkb {
+
+DepthRegistration::DepthRegistration(const Camera& depth_camera, const Camera& colour_camera,
+                                     const Rigid3& colour_from_depth)
+    : colour_(colour_camera),
+      colour_from_depth_(colour_from_depth),
+      scale_(std::max(colour_camera.fx / depth_camera.fx, colour_camera.fy / depth_camera.fy)) {
+  rays_.reserve(static_cast<size_t>(depth_camera.width) * static_cast<size_t>(depth_camera.height));
+  for (int y = 0; y < depth_camera.height; ++y)
+    for (int x = 0; x < depth_camera.width; ++x) {
+      const Eigen::Vector2d ideal = depth_camera.undistort({x, y});
+      rays_.push_back(depth_camera.unproject(ideal, 1).head<2>().cast<float>());
+    }
+}
+
+DepthImage DepthRegistration::registered(const DepthImage& depth) const {
+  // Wider than the pixel's size, so that rounding leaves no gaps on slanted surfaces; narrower than two pixels where
+  // both cameras see equally fine.
+  constexpr double kMargin = 0.1, kMaxReach = 8;  // [px]
+  constexpr double kFarOutside = 1.0;             // [image sides] beyond the border distortion is not to be trusted
+  DepthImage out(colour_.width, colour_.height);
+  const Eigen::Matrix3d rotation = colour_from_depth_.matrix3();
+  for (size_t i = 0; i < depth.size(); ++i) {
+    const double z = depth.data()[i];
+    if (!(z > 0) || !std::isfinite(z)) continue;
+    const Eigen::Vector3d seen(z * rays_[i].x(), z * rays_[i].y(), z);
+    const Eigen::Vector3d point = rotation * seen + colour_from_depth_.translation;
+    if (!(point.z() > 0)) continue;
+    Eigen::Vector2d pixel = colour_.project(point);
+    if (!(pixel.x() > -kFarOutside * colour_.width && pixel.x() < (1 + kFarOutside) * colour_.width &&
+          pixel.y() > -kFarOutside * colour_.height && pixel.y() < (1 + kFarOutside) * colour_.height))
+      continue;
+    if (colour_.distorted()) pixel = colour_.distort(pixel);
+    const double reach = std::min(0.5 * scale_ * z / point.z() + kMargin, kMaxReach);
+    const auto metres = static_cast<float>(point.z());
+    const int left = std::max(0, static_cast<int>(std::ceil(pixel.x() - reach)));
+    const int right = std::min(colour_.width - 1, static_cast<int>(std::floor(pixel.x() + reach)));
+    const int top = std::max(0, static_cast<int>(std::ceil(pixel.y() - reach)));
+    const int bottom = std::min(colour_.height - 1, static_cast<int>(std::floor(pixel.y() + reach)));
+    for (int y = top; y <= bottom; ++y)
+      for (int x = left; x <= right; ++x) {
+        float& there = out(x, y);
+        if (there == 0 || metres < there) there = metres;
+      }
+  }
+  depth_from_metres(out.data(), out.size(), colour_, out.data());
+  return out;
+}
+
+}  // namespace dkb

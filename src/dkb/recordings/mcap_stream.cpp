@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/mcap_stream.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+
+#include "dkb/recordings/mcap_format.h"
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+using namespace mcap;
+
+constexpr uint64_t kMaxSmall = 1 << 24;        // [bytes] of a record that is no chunk and no message
+constexpr size_t kMaxTexts = size_t{1} << 26;  // [bytes] of all metadata
+
+uint16_t u16(ByteReader& in) {
+  const uint8_t low = in.u8();
+  return static_cast<uint16_t>(low | in.u8() << 8);
+}
+
+std::string_view text(ByteReader& in) {
+  return in.raw(in.u32());
+}
+
+}  // namespace
+
+// A record in the file. Its content may reach beyond the file's end.
+struct McapStream::Record {
+  uint8_t op = 0;
+  uint64_t at = 0, size = 0;  // of the content
+  uint64_t end() const { return at + size; }
+};
+
+bool McapStream::fits(RecordingFile& file) {
+  const std::string_view begin = file.peek(0, kMagic.size());
+  if (begin.substr(0, 5) != kMagic.substr(0, 5)) return false;
+  if (begin != kMagic) throw InputError(file.name() + ": is an mcap file of another version than 0, which is read");
+  return true;
+}
+
+McapStream::McapStream(std::unique_ptr<RecordingFile> file) : file_(std::move(file)) {
+  at_ = start_ = kMagic.size();
+  end_ = file_->size();
+  if (!read_summary()) {
+    schemas_.clear(), chunks_.clear();
+    // What stands before the first messages.
+    for (uint64_t at = start_; at < end_;) {
+      const std::optional<Record> record = record_at(at);
+      if (!record || record->op == kChunk || record->op == kMessage || record->op == kDataEnd) break;
+      take_small(*record);
+      at = record->end();
+    }
+  }
+}
+
+std::optional<McapStream::Record> McapStream::record_at(uint64_t at) {
+  const std::string_view start = file_->peek(at, kRecordStart);
+  if (start.size() < kRecordStart) return std::nullopt;
+  ByteReader in(start, "");
+  Record record;
+  record.op = in.u8();
+  record.size = in.u64();
+  record.at = at + kRecordStart;
+  if (record.size > UINT64_MAX / 2) return std::nullopt;
+  return record;
+}
+
+// False when there is none that can be used.
+bool McapStream::read_summary() {
+  const auto read_through = [&](const std::string& why) {
+    warnings_.add(file_->name() + ": " + why);
+    return false;
+  };
+  const std::string cut =
+      "has no end: it is cut off, or its recorder was stopped. It is read up to where it ends; "
+      "`mcap recover` repairs it";
+  constexpr uint64_t kTail = kRecordStart + kFooterSize + kMagic.size();
+  if (file_->size() < kMagic.size() + kTail) return told_cut_ = true, read_through(cut);
+  const uint64_t footer_at = file_->size() - kTail;
+  const std::string tail(file_->peek(footer_at, kTail));
+  ByteReader in(tail, "footer");
+  const bool footer = in.u8() == kFooter && in.u64() == kFooterSize;
+  if (!footer || std::string_view(tail).substr(tail.size() - kMagic.size()) != kMagic)
+    return told_cut_ = true, read_through(cut);
+  const uint64_t summary = in.u64();
+  in.u64();
+  const uint32_t crc = in.u32();
+  end_ = footer_at;
+  if (summary == 0) return false;
+  const std::string broken = "its summary is broken; it is read from front to back";
+  if (summary < start_ || summary > footer_at) return read_through(broken);
+  if (crc != 0 && !summary_sound(summary, footer_at + kRecordStart + 16, crc)) return read_through(broken);
+  for (uint64_t at = summary; at < footer_at;) {
+    const std::optional<Record> record = record_at(at);
+    if (!record || record->op == 0 || record->end() > footer_at) return read_through(broken);
+    take_small(*record);
+    at = record->end();
+  }
+  end_ = summary;
+  tell_foreign();
+  return true;
+}
+
+bool McapStream::summary_sound(uint64_t from, uint64_t to, uint32_t crc) {
+  uLong sum = 0;
+  while (from < to) {
+    const std::string_view piece = file_->peek(from, static_cast<size_t>(std::min<uint64_t>(to - from, 16384)));
+    if (piece.empty()) return false;
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(piece.data()), static_cast<uInt>(piece.size()));
+    from += piece.size();
+  }
+  return sum == crc;
+}
+
+// A record that is neither a chunk nor a message.
+void McapStream::take_small(const Record& record) {
+  const bool known = record.op == kSchema || record.op == kChannel || record.op == kMetadata ||
+                     record.op == kMetadataIndex || record.op == kChunkIndex || record.op == kStatistics;
+  if (!known || record.end() > file_->size()) return;
+  if (record.size > kMaxSmall) return warn_of_record(record.at, "is too large and left out");
+  const std::string bytes(file_->peek(record.at, static_cast<size_t>(record.size)));
+  try {
+    take(record.op, bytes);
+  } catch (const InputError&) {
+    warn_of_record(record.at, "is broken and left out");
+  }
+}
+
+void McapStream::take(uint8_t op, std::string_view bytes) {
+  ByteReader in(bytes, "record");
+  if (op == kSchema) {
+    const uint16_t id = u16(in);
+    schemas_[id] = text(in);
+  } else if (op == kChannel) {
+    const uint16_t id = u16(in), schema = u16(in);
+    const std::string topic(text(in)), encoding(text(in));
+    if (topic_of_.count(id)) return;
+    if (encoding == "ros1" || encoding == "cdr") {
+      const auto type = schemas_.find(schema);
+      topic_of_[id] = topics_.add(topic, type == schemas_.end() ? "" : type->second,
+                                  encoding == "ros1" ? MessageEncoding::ros1 : MessageEncoding::cdr);
+    } else {
+      topic_of_[id] = std::nullopt;
+      if (foreign_.size() < 5) foreign_.insert(encoding.empty() ? "no name" : encoding);
+    }
+  } else if (op == kMetadata) {
+    add_metadata(in);
+  } else if (op == kMetadataIndex) {
+    const uint64_t at = in.u64();
+    const std::optional<Record> record = record_at(at);
+    if (record && record->op == kMetadata) take_small(*record);
+  } else if (op == kChunkIndex) {
+    add_chunk_index(in);
+  } else if (op == kStatistics) {
+    in.raw(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);
+    for (ByteReader counts(text(in), "counts"); counts.left() > 0;) {
+      const uint16_t channel = u16(counts);
+      const uint64_t count = counts.u64();
+      const auto topic = topic_of_.find(channel);
+      if (topic != topic_of_.end() && topic->second && count < UINT32_MAX)
+        topics_.add_count(*topic->second, static_cast<int64_t>(count));
+    }
+  }
+}
+
+// A record of one text goes by its name, one of several by NAME/KEY.
+void McapStream::add_metadata(ByteReader in) {
+  const std::string name(text(in));
+  std::map<std::string, std::string> pairs;
+  for (ByteReader map(text(in), "metadata"); map.left() > 0;) {
+    const std::string key(text(map));
+    pairs[key] = text(map);
+  }
+  for (const auto& [key, value] : pairs) {
+    if (texts_size_ + name.size() + key.size() + value.size() > kMaxTexts) return;
+    texts_size_ += name.size() + key.size() + value.size();
+    texts_[pairs.size() == 1 ? name : name + "/" + key] = value;
+  }
+}
+
+void McapStream::add_chunk_index(ByteReader in) {
+  in.raw(8 + 8);
+  std::vector<uint16_t>& channels = chunks_[in.u64()];
+  in.u64();
+  for (ByteReader offsets(text(in), "offsets"); offsets.left() > 0; offsets.u64()) channels.push_back(u16(offsets));
+}
+
+bool McapStream::chunk_wanted(uint64_t at) const {
+  const auto chunk = chunks_.find(at);
+  if (chunk == chunks_.end() || chunk->second.empty()) return true;
+  return std::any_of(chunk->second.begin(), chunk->second.end(), [&](uint16_t channel) {
+    size_t topic = 0;
+    return topic_of_.count(channel) == 0 || wanted(channel, &topic);
+  });
+}
+
+bool McapStream::wanted(uint16_t channel, size_t* topic) const {
+  const auto found = topic_of_.find(channel);
+  if (found == topic_of_.end() || !found->second || !topics_.wanted(*found->second)) return false;
+  *topic = *found->second;
+  return true;
+}
+
+void McapStream::rewind() {
+  at_ = start_;
+  rest_ = {};
+}
+
+void McapStream::warn_of_record(uint64_t at, const std::string& what) {
+  warnings_.add(file_->name() + ": the record at byte " + std::to_string(at - kRecordStart) + " " + what);
+}
+
+void McapStream::tell_cut(uint64_t at) {
+  if (!told_cut_)
+    warnings_.add(file_->name() + ": is cut off in the record at byte " + std::to_string(at) +
+                  "; it is read up to there");
+  told_cut_ = true;
+}
+
+void McapStream::tell_foreign() {
+  if (told_foreign_ || foreign_.empty() || !topics_.all().empty()) return;
+  std::string names;
+  for (const std::string& name : foreign_) names += (names.empty() ? "" : ", ") + name.substr(0, 40);
+  warnings_.add(file_->name() + ": its messages are encoded as " + names + "; ros1 and cdr are read");
+  told_foreign_ = true;
+}
+
+// Opens the next chunk or message that may be wanted. False at the end.
+bool McapStream::next_record() {
+  while (at_ < end_) {
+    const uint64_t at = at_;
+    const std::optional<Record> record = record_at(at);
+    if (record && record->op == 0) {
+      const auto later = chunks_.upper_bound(at);
+      const bool goes_on = later != chunks_.end() && later->first < end_;
+      warn_of_record(record->at, goes_on ? "is broken; what follows is read from the next chunk"
+                                         : "is broken; what follows is not read");
+      if (!goes_on) break;
+      at_ = later->first;
+      continue;
+    }
+    if (!record || (record->end() > file_->size() && record->op != kChunk)) {
+      tell_cut(at);
+      break;
+    }
+    at_ = record->end();
+    if (record->op == kDataEnd || record->op == kFooter) break;
+    chunk_at_ = at;
+    if (record->op == kChunk) {
+      if (chunk_wanted(at)) open_chunk(*record);
+    } else if (record->op == kMessage) {
+      const std::string_view id = file_->peek(record->at, 2);
+      ByteReader in(id, "channel");
+      size_t topic = 0;
+      if (id.size() < 2 || !wanted(u16(in), &topic)) continue;
+      // As a chunk that holds this record alone.
+      const ChunkState loaded = load_chunk(*file_, Compression::none, at, kRecordStart + record->size, 0, &chunk_);
+      if (loaded.state == ChunkState::whole)
+        rest_ = chunk_.view();
+      else
+        warn_of_record(record->at, "is broken (" + loaded.why + ") and left out");
+    } else {
+      take_small(*record);
+    }
+    if (!rest_.empty()) return true;
+  }
+  at_ = end_;
+  return false;
+}
+
+void McapStream::open_chunk(const Record& record) {
+  constexpr size_t kMaxStart = 200;  // [bytes] before the chunk's records: numbers and a name
+  const std::string start(file_->peek(record.at, static_cast<size_t>(std::min<uint64_t>(record.size, kMaxStart))));
+  ByteReader in(start, "chunk");
+  uint64_t size = 0, packed = 0;
+  uint32_t crc = 0;
+  std::string compression;
+  try {
+    in.raw(16);
+    size = in.u64();
+    crc = in.u32();
+    compression = text(in);
+    packed = in.u64();
+  } catch (const InputError&) {
+    if (record.end() > file_->size()) return tell_cut(chunk_at_);
+    return warn_of_record(record.at, "is broken and left out");
+  }
+  const uint64_t taken = 16 + 8 + 4 + 4 + compression.size() + 8;
+  if (packed > record.size - taken) return warn_of_record(record.at, "is broken and left out");
+  Compression kind = Compression::none;
+  try {
+    kind = compression_named(compression);
+  } catch (const InputError& e) {
+    throw InputError(file_->name() + ": " + e.what());
+  }
+  const ChunkState loaded = load_chunk(*file_, kind, record.at + taken, packed, size, &chunk_);
+  cut_in_chunk_ = loaded.state == ChunkState::cut;
+  if (cut_in_chunk_) tell_cut(chunk_at_);
+  if (loaded.state == ChunkState::broken)
+    return warn_of_record(record.at, "is broken (" + loaded.why + ") and left out");
+  const std::string_view bytes = chunk_.view();
+  if (!cut_in_chunk_ && crc != 0 && crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()) != crc)
+    return warn_of_record(record.at, "is broken (its checksum is another) and left out");
+  rest_ = bytes;
+}
+
+std::optional<RecordedMessage> McapStream::next_in_chunk() {
+  try {
+    while (!rest_.empty()) {
+      ByteReader in(rest_, "record");
+      const uint8_t op = in.u8();
+      const uint64_t size = in.u64();
+      if (size > rest_.size() - kRecordStart) throw InputError("");
+      const std::string_view content = rest_.substr(kRecordStart, static_cast<size_t>(size));
+      rest_.remove_prefix(kRecordStart + content.size());
+      if (op == kSchema || op == kChannel) take(op, content);
+      if (op != kMessage) continue;
+      ByteReader message(content, "message");
+      size_t topic = 0;
+      const bool asked_for = wanted(u16(message), &topic);
+      message.u32();
+      const uint64_t logged = message.u64();
+      message.u64();
+      if (asked_for) return RecordedMessage{topic, static_cast<int64_t>(logged), content.substr(kMessageStart)};
+    }
+  } catch (const InputError&) {
+    if (!cut_in_chunk_) warn_of_record(chunk_at_ + kRecordStart, "is broken; the rest of it is left out");
+    rest_ = {};
+  }
+  return std::nullopt;
+}
+
+std::optional<RecordedMessage> McapStream::next() {
+  do {
+    if (auto message = next_in_chunk()) return message;
+  } while (next_record());
+  tell_foreign();
+  return std::nullopt;
+}
+
+}  // namespace dkb

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/message_stream.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+
+#include "dkb/dataset/mutation_test_tools.h"
+#include "dkb/map/byte_stream.h"
+#include "dkb/recordings/mcap_format.h"
+#include "dkb/recordings/recording_test_tools.h"
+#include "dkb/util/test_errors.h"
+
+namespace dkb::test {
+namespace {
+
+using namespace std::string_literals;
+
+struct Kind {
+  const char* name;
+  Compression compression;
+};
+
+// Those of this build.
+std::vector<Kind> kinds() {
+  std::vector<Kind> all = {{"a.bag", Compression::none}, {"a.mcap", Compression::none}};
+  const auto add = [&](const char* name, const char* compression) {
+    try {
+      all.push_back({name, compression_named(compression)});
+    } catch (const InputError&) {
+      std::printf("skipped: this build has no %s\n", compression);
+    }
+  };
+  add("a.bag", "bz2"), add("a.bag", "lz4"), add("a.mcap", "lz4"), add("a.mcap", "zstd");
+  return all;
+}
+
+std::string label(const Kind& kind) {
+  return std::string(kind.name) + " " + std::to_string(static_cast<int>(kind.compression));
+}
+
+long resident_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss / 1024;
+}
+
+TEST(MessageStream, WhatIsWrittenIsReadBackInOrder) {
+  const Scratch scratch;
+  const std::vector<Kept> messages = sample(5);
+  for (const Kind& kind : kinds()) {
+    SCOPED_TRACE(label(kind));
+    write_sample(scratch / kind.name, messages, kind.compression);
+    const auto stream = open_messages(scratch / kind.name);
+    ASSERT_EQ(stream->topics().size(), 2U);
+    EXPECT_EQ(stream->topics()[0].name, "/image");
+    EXPECT_EQ(stream->topics()[0].type, "sensor_msgs/Image");
+    EXPECT_EQ(stream->topics()[1].count, 5);
+    EXPECT_EQ(read_all(*stream), messages);
+    EXPECT_FALSE(stream->next());
+    stream->rewind();
+    EXPECT_EQ(read_all(*stream), messages);
+    EXPECT_TRUE(stream->take_warnings().empty());
+    if (kind.name == "a.mcap"s) {
+      EXPECT_EQ(stream->metadata().at("note"), "a text\n");
+    }
+  }
+}
+
+TEST(MessageStream, OtherTopicsThanTheSelectedArePassedOver) {
+  const Scratch scratch;
+  const std::vector<Kept> messages = sample(5);
+  for (const Kind& kind : kinds()) {
+    SCOPED_TRACE(label(kind));
+    write_sample(scratch / kind.name, messages, kind.compression);
+    const auto stream = open_messages(scratch / kind.name);
+    stream->select({"/text"});
+    EXPECT_EQ(read_all(*stream).size(), 5U);
+    stream->select({"/image", "/nothing"});
+    stream->rewind();
+    EXPECT_EQ(read_all(*stream).size(), 5U);
+  }
+}
+
+// One warning, and what was read is the beginning of what was written, as far as the bytes reach.
+TEST(MessageStream, RecordingsThatAreCutOffAreReadUpToTheCut) {
+  const Scratch scratch;
+  const std::vector<Kept> messages = sample(6, 40'000);
+  for (const Kind& kind : kinds()) {
+    SCOPED_TRACE(label(kind));
+    write_sample(scratch / kind.name, messages, kind.compression);
+    const std::string whole = read_file(scratch / kind.name);
+    size_t before = 0;
+    for (size_t size = 5000; size < whole.size(); size += whole.size() / 23) {
+      write_bytes(scratch / "cut", whole.substr(0, size));
+      const auto stream = open_messages(scratch / "cut");
+      const std::vector<Kept> read = read_all(*stream);
+      ASSERT_LE(read.size(), messages.size());
+      EXPECT_TRUE(std::equal(read.begin(), read.end(), messages.begin())) << size;
+      EXPECT_GE(read.size(), before);
+      before = read.size();
+      const std::vector<std::string> warnings = stream->take_warnings();
+      EXPECT_EQ(warnings.size(), 1U) << size;
+      if (!warnings.empty()) {
+        EXPECT_NE(warnings[0].find("is cut off"), std::string::npos) << warnings[0];
+      }
+    }
+    if (kind.compression == Compression::none) {
+      EXPECT_GE(before, 10U);
+    }
+  }
+}
+
+TEST(MessageStream, ABrokenChunkIsLeftOutAndTold) {
+  const Scratch scratch;
+  const std::vector<Kept> messages = sample(5);
+  for (const Kind& kind : kinds()) {
+    if (kind.compression == Compression::none && kind.name == "a.bag"s) continue;  // no checksum tells
+    SCOPED_TRACE(label(kind));
+    write_sample(scratch / kind.name, messages, kind.compression);
+    std::string bytes = read_file(scratch / kind.name);
+    bytes[bytes.size() / 3] = static_cast<char>(bytes[bytes.size() / 3] ^ 0x55);
+    write_bytes(scratch / "broken", bytes);
+    const auto stream = open_messages(scratch / "broken");
+    const std::vector<Kept> read = read_all(*stream);
+    EXPECT_GE(read.size(), 7U);
+    EXPECT_LT(read.size(), 10U);
+    for (const Kept& message : read) EXPECT_EQ(std::count(messages.begin(), messages.end(), message), 1);
+    EXPECT_EQ(stream->take_warnings().size(), 1U);
+  }
+}
+
+std::string bag_record(const std::string& fields, uint32_t data_size, const std::string& data) {
+  ByteWriter out;
+  out.u32(static_cast<uint32_t>(fields.size()));
+  out.raw(fields);
+  out.u32(data_size);
+  out.raw(data);
+  return out.take();
+}
+
+std::string bag_field(const std::string& name, const std::string& value) {
+  ByteWriter out;
+  out.u32(static_cast<uint32_t>(name.size() + 1 + value.size()));
+  out.raw(name + "=" + value);
+  return out.take();
+}
+
+TEST(MessageStream, WhatAFileClaimsSetsNoMemoryAside) {
+  const Scratch scratch;
+  const std::string begin =
+      "#ROSBAG V2.0\n" + bag_record(bag_field("op", "\x03") + bag_field("index_pos", "\0\0\0\0\0\0\0\0"s), 0, "");
+  const std::string most = "\xFF\xFF\xFF\xFF";
+  std::vector<std::string> files;
+  for (const std::string compression : {"none", "bz2", "lz4"}) {
+    for (const std::string& size : {most, "\x00\x00\x00\x40"s})
+      files.push_back(
+          begin + bag_record(bag_field("op", "\x05") + bag_field("compression", compression) + bag_field("size", size),
+                             0xFFFFFFF0, "BZh9"));
+  }
+  files.push_back(begin + most);
+  for (const std::string compression : {"", "lz4", "zstd"}) {
+    ByteWriter out;
+    out.raw(mcap::kMagic);
+    out.u8(mcap::kChunk), out.u64(uint64_t{1} << 40);
+    out.u64(0), out.u64(0), out.u64(uint64_t{1} << 30), out.u32(0);
+    out.u32(static_cast<uint32_t>(compression.size()));
+    out.raw(compression);
+    out.u64((uint64_t{1} << 40) - 1000);
+    out.raw("\x28\xB5\x2F\xFD");
+    files.push_back(out.take());
+  }
+  const long before = resident_mb();
+  for (const std::string& bytes : files) {
+    ASSERT_LE(bytes.size(), 200U);
+    write_bytes(scratch / "claims", bytes);
+    try {
+      EXPECT_TRUE(read_all(*open_messages(scratch / "claims")).empty());
+    } catch (const InputError& e) {  // of a build without this compression
+      EXPECT_NE(std::string(e.what()).find("this build"), std::string::npos) << e.what();
+    }
+  }
+  EXPECT_LT(resident_mb() - before, 40);
+}
+
+// A channel, a message and no chunk, no summary, byte by byte as the format's specification has it.
+std::string plain_mcap(const std::string& encoding) {
+  const auto text = [](const std::string& v) {
+    ByteWriter out;
+    out.u32(static_cast<uint32_t>(v.size()));
+    out.raw(v);
+    return out.take();
+  };
+  const auto record = [](uint8_t op, const std::string& content) {
+    ByteWriter out;
+    out.u8(op), out.u64(content.size());
+    out.raw(content);
+    return out.take();
+  };
+  const std::string magic = "\x89MCAP0\r\n";
+  return magic + record(1, text("ros2") + text("somebody")) +
+         record(3, "\x01\x00"s + text("std_msgs/msg/String") + text("ros2msg") + text("string data")) +
+         record(4, "\x05\x00\x01\x00"s + text("/chatter") + text(encoding) + text("")) +
+         record(5, "\x05\x00\x00\x00\x00\x00"s + "\x02\x00\x00\x00\x00\x00\x00\x00"s + std::string(8, '\0') +
+                       "\x00\x01\x00\x00\x03\x00\x00\x00hi\x00"s) +
+         record(15, std::string(4, '\0')) + record(2, std::string(20, '\0')) + magic;
+}
+
+TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
+  const Scratch scratch;
+  write_bytes(scratch / "plain", plain_mcap("cdr"));
+  const auto stream = open_messages(scratch / "plain");
+  ASSERT_EQ(stream->topics().size(), 1U);
+  EXPECT_EQ(stream->topics()[0].type, "std_msgs/String");
+  const auto message = stream->next();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->recorded_ns, 2);
+  EXPECT_EQ(decode_string(message->bytes, stream->topics()[0].encoding), "hi");
+  EXPECT_FALSE(stream->next());
+  EXPECT_TRUE(stream->take_warnings().empty());
+}
+
+TEST(MessageStream, EncodingsOfOthersAreToldWhenThereIsNothingElse) {
+  const Scratch scratch;
+  write_bytes(scratch / "plain", plain_mcap("protobuf"));
+  const auto stream = open_messages(scratch / "plain");
+  EXPECT_FALSE(stream->next());
+  const std::vector<std::string> warnings = stream->take_warnings();
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("encoded as protobuf; ros1 and cdr are read"), std::string::npos) << warnings[0];
+}
+
+TEST(MessageStream, WhatIsNoRecordingIsNamed) {
+  const Scratch scratch;
+  const auto error = [&](const std::string& bytes) {
+    write_bytes(scratch / "x.bag", bytes);
+    return input_error_of([&] { open_messages(scratch / "x.bag"); });
+  };
+  EXPECT_NE(error("").find("x.bag: is empty"), std::string::npos);
+  EXPECT_NE(error("hello").find("is no recording of a known kind"), std::string::npos);
+  EXPECT_NE(error("#ROSBAG V1.2\n").find("version 1.2; version 2.0 is read"), std::string::npos);
+  EXPECT_NE(error("#ROSBAG V2.0\n").find("without its header"), std::string::npos);
+  EXPECT_NE(error("\x28\xB5\x2F\xFDxxxx").find("zstd -d"), std::string::npos);
+  EXPECT_NE(input_error_of([&] { open_messages(scratch / "none"); }).find("no such file"), std::string::npos);
+  EXPECT_NE(input_error_of([&] { open_messages(scratch / "."); }).find("is no folder of rosbag2"), std::string::npos);
+}
+
+TEST(MessageStream, UnknownCompressionIsNamed) {
+  const Scratch scratch;
+  write_bytes(scratch / "x.bag", "#ROSBAG V2.0\n" + bag_record(bag_field("op", "\x03"), 0, "") +
+                                     bag_record(bag_field("op", "\x05") + bag_field("compression", "rar"), 3, "abc"));
+  const auto stream = open_messages(scratch / "x.bag");
+  EXPECT_NE(input_error_of([&] { stream->next(); }).find("x.bag: is compressed with \"rar\""), std::string::npos);
+}
+
+TEST(MessageStream, FolderNamesItsFilesInOrder) {
+  const Scratch scratch;
+  std::filesystem::create_directories(scratch / "trip");
+  const std::vector<Kept> messages = sample(4, 1000);
+  write_sample(scratch / "trip/b.mcap", {messages.begin(), messages.begin() + 3});
+  write_sample(scratch / "trip/a.mcap", {messages.begin() + 3, messages.end()});
+  const std::string info = "rosbag2_bagfile_information:\n  relative_file_paths: [trip/b.mcap, a.mcap]\n";
+  write_bytes(scratch / "trip/metadata.yaml", info);
+  const auto stream = open_messages(scratch / "trip");
+  EXPECT_EQ(stream->topics()[0].count, 4);
+  EXPECT_EQ(read_all(*stream), messages);
+  stream->rewind();
+  stream->select({"/text"});
+  EXPECT_EQ(read_all(*stream).size(), 4U);
+  EXPECT_EQ(stream->metadata().count("note"), 1U);
+
+  // A recorder that was killed leaves no list.
+  std::filesystem::remove(scratch / "trip/metadata.yaml");
+  EXPECT_EQ(read_all(*open_messages(scratch / "trip")).size(), 8U);
+
+  const auto error = [&](const std::string& yaml) {
+    write_bytes(scratch / "trip/metadata.yaml", "rosbag2_bagfile_information:\n" + yaml);
+    return input_error_of([&] { open_messages(scratch / "trip"); });
+  };
+  EXPECT_NE(error("  relative_file_paths: [a.db3.zstd]\n").find("a.db3.zstd: is compressed"), std::string::npos);
+  EXPECT_NE(error("  compression_mode: MESSAGE\n  relative_file_paths: [a.mcap]\n").find("ros2 bag convert"),
+            std::string::npos);
+  EXPECT_NE(error("  relative_file_paths: []\n").find("names no files"), std::string::npos);
+  EXPECT_NE(error("  relative_file_paths: [}\n").find("cannot be understood"), std::string::npos);
+}
+
+TEST(MessageStream, DamagedRecordingsDoNothingWorseThanEnd) {
+  const Scratch scratch;
+  const std::vector<Kept> messages = sample(12, 300);
+  const long before = resident_mb();
+  Random random(11);
+  int opened = 0, tried = 0;
+  for (const Kind& kind : kinds()) {
+    write_sample(scratch / kind.name, messages, kind.compression);
+    const std::string whole = read_file(scratch / kind.name);
+    for (int i = 0; i < 500; ++i) {
+      std::string bytes = mutated(whole, random);
+      if (i % 2 == 0 && !bytes.empty()) bytes[random.below(static_cast<uint32_t>(bytes.size()))] ^= 4;
+      write_bytes(scratch / "damaged", bytes);
+      ++tried;
+      try {
+        const auto stream = open_messages(scratch / "damaged");
+        stream->select({"/image", "/text"});
+        EXPECT_LT(read_all(*stream).size(), 1000U);
+        EXPECT_LE(stream->take_warnings().size(), 10U);
+        ++opened;
+      } catch (const InputError&) {
+      }
+    }
+  }
+  EXPECT_GT(opened, tried / 4);
+  EXPECT_LT(resident_mb() - before, 100);
+}
+
+}  // namespace
+}  // namespace dkb::test

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/output_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+
+OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  temporary_ = folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()));
+  fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd_ < 0) fail("open");
+}
+
+OutputFile::~OutputFile() {
+  if (fd_ < 0) return;
+  ::close(fd_);
+  ::unlink(temporary_.c_str());
+}
+
+void OutputFile::fail(const char* what) const {
+  throw OutputError(path_.string() + ": cannot be written (" + what + ": " + std::strerror(errno) + ")");
+}
+
+void OutputFile::write_at(uint64_t at, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(at));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail("write");
+    bytes.remove_prefix(static_cast<size_t>(n));
+    at += static_cast<uint64_t>(n);
+  }
+}
+
+void OutputFile::append(std::string_view bytes) {
+  write_at(size_, bytes);
+  size_ += bytes.size();
+}
+
+void OutputFile::overwrite(uint64_t at, std::string_view bytes) {
+  write_at(at, bytes);
+}
+
+void OutputFile::commit() {
+  if (::fsync(fd_) != 0 && errno != EINVAL && errno != EROFS) fail("fsync");
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail("rename");
+  ::close(fd_);
+  fd_ = -1;
+}
+
+}  // namespace dkb

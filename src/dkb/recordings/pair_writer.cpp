@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/pair_writer.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <system_error>
+
+#include "dkb/image/image.h"
+#include "dkb/recordings/recording_writer.h"
+#include "dkb/recordings/ros_messages.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The whole units of which the reader makes exactly these depths; nothing where there are none.
+std::optional<Image<uint16_t>> exact_units(const DepthImage& depth, const Camera& camera) {
+  Image<uint16_t> units(depth.width(), depth.height());
+  for (size_t i = 0; i < depth.size(); ++i) {
+    const double unit = std::round(depth.data()[i] * camera.depth_factor);
+    if (!(unit >= 0 && unit <= 65535)) return std::nullopt;
+    units.data()[i] = static_cast<uint16_t>(unit);
+  }
+  DepthImage back(depth.width(), depth.height());
+  depth_from_units(units.data(), units.size(), without_limits(camera), back.data());
+  if (!std::equal(back.data(), back.data() + back.size(), depth.data())) return std::nullopt;
+  return units;
+}
+
+template <class T>
+std::string_view pixels_of(const Image<T>& image) {
+  return {reinterpret_cast<const char*>(image.data()), image.size() * sizeof(T)};
+}
+
+bool is_jpeg(std::string_view file) {
+  return file.substr(0, 2) == "\xFF\xD8";
+}
+
+class FolderPairWriter final : public PairWriter {
+ public:
+  FolderPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text, int png_level)
+      : path_(path.has_filename() ? path : path.parent_path()), camera_(camera), png_level_(png_level) {
+    std::error_code error;
+    if (fs::exists(path_, error) && !(fs::is_directory(path_, error) && fs::is_empty(path_, error)))
+      throw OutputError(path_.string() + ": is there already and not empty; choose another folder with --out");
+    const fs::path above = path_.has_parent_path() ? path_.parent_path() : ".";
+    temporary_ = above / ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()));
+    make_output_folder(temporary_ / "rgb");
+    make_output_folder(temporary_ / "depth");
+    write_image_file(temporary_ / "camera.yaml", camera_text);
+  }
+  ~FolderPairWriter() override {
+    std::error_code error;
+    if (!temporary_.empty()) fs::remove_all(temporary_, error);
+  }
+
+  void add(const PairToWrite& pair) override {
+    const std::string stamp = stamp_text(pair.stamp_ns), depth_stamp = stamp_text(pair.depth_stamp_ns);
+    const bool jpeg = is_jpeg(pair.colour_file);
+    const std::string colour_name = "rgb/" + stamp + (jpeg ? ".jpg" : ".png");
+    if (!pair.colour_file.empty())
+      write_image_file(temporary_ / colour_name, pair.colour_file);
+    else if (pair.picture->colour.empty())
+      write_image_file(temporary_ / colour_name, encode_png(pair.picture->grey, png_level_));
+    else
+      write_image_file(temporary_ / colour_name, encode_png(pair.picture->colour, png_level_));
+
+    const std::optional<Image<uint16_t>> units = exact_units(*pair.depth, camera_);
+    const std::string depth_name = "depth/" + depth_stamp + (units ? ".png" : ".tiff");
+    write_image_file(temporary_ / depth_name, units ? encode_png(*units, png_level_) : encode_tiff(*pair.depth));
+
+    colour_list_ += stamp + " " + colour_name + "\n";
+    if (depth_stamp != last_depth_stamp_) depth_list_ += depth_stamp + " " + depth_name + "\n";
+    last_depth_stamp_ = depth_stamp;
+    associations_ += stamp + " " + colour_name + " " + depth_stamp + " " + depth_name + "\n";
+  }
+
+  void close() override {
+    write_image_file(temporary_ / "rgb.txt", colour_list_);
+    write_image_file(temporary_ / "depth.txt", depth_list_);
+    write_image_file(temporary_ / "associations.txt", associations_);
+    std::error_code error;
+    fs::rename(temporary_, path_, error);  // also over an empty folder
+    if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
+    temporary_.clear();
+  }
+
+ private:
+  const fs::path path_;
+  fs::path temporary_;
+  const Camera camera_;
+  const int png_level_;
+  std::string colour_list_ = "# timestamp filename\n", depth_list_ = colour_list_, last_depth_stamp_;
+  std::string associations_ = "# rgb_timestamp rgb_file depth_timestamp depth_file\n";
+};
+
+class RecordingPairWriter final : public PairWriter {
+ public:
+  RecordingPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text,
+                      Compression compression)
+      : name_(path.string()), camera_(camera), camera_text_(camera_text), writer_(write_recording(path, compression)) {
+    writer_->add_text(kCameraText, camera_text_);
+  }
+
+  void add(const PairToWrite& pair) override {
+    for (const int64_t ns : {pair.stamp_ns, pair.depth_stamp_ns})
+      if (ns < 0 || ns >= int64_t{UINT32_MAX} * kNsPerSecond)
+        throw OutputError(name_ + ": the stamp " + stamp_text(ns) + " cannot be written; ROS counts from 1970 to 2106");
+    if (!began_)
+      writer_->write(topic(kCameraTopic, "std_msgs/String", true), std::min(pair.stamp_ns, pair.depth_stamp_ns),
+                     encode_string(camera_text_));
+    began_ = true;
+    const bool depth_first = pair.depth_stamp_ns < pair.stamp_ns;
+    if (depth_first) add_depth(pair);
+    add_camera_info(pair.stamp_ns);
+    add_colour(pair);
+    if (!depth_first) add_depth(pair);
+  }
+
+  void close() override { writer_->close(); }
+
+ private:
+  size_t topic(const std::string& name, const std::string& type, bool latched = false) {
+    const auto [known, is_new] = topics_.try_emplace(name, 0);
+    if (is_new) known->second = writer_->add_topic(name, type, latched);
+    return known->second;
+  }
+
+  static HeaderMessage header(int64_t stamp_ns) { return {stamp_ns, "camera_rgb_optical_frame"}; }
+
+  void add_camera_info(int64_t stamp_ns) {
+    const Camera& c = camera_;
+    CameraInfoMessage info;
+    info.header = header(stamp_ns);
+    info.height = static_cast<uint32_t>(c.height), info.width = static_cast<uint32_t>(c.width);
+    info.distortion_model = "plumb_bob";
+    info.d = {c.k1, c.k2, c.p1, c.p2, c.k3};
+    info.k = {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
+    info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    info.p = {c.fx, 0, c.cx, 0, 0, c.fy, c.cy, 0, 0, 0, 1, 0};
+    writer_->write(topic("/camera/rgb/camera_info", "sensor_msgs/CameraInfo"), stamp_ns, encode(info));
+  }
+
+  void add_colour(const PairToWrite& pair) {
+    if (!pair.colour_file.empty()) {
+      CompressedImageMessage message;
+      message.header = header(pair.stamp_ns);
+      message.format = is_jpeg(pair.colour_file) ? "jpeg" : "png";
+      message.data = pair.colour_file;
+      writer_->write(topic("/camera/rgb/image_raw/compressed", "sensor_msgs/CompressedImage"), pair.stamp_ns,
+                     encode(message));
+    } else if (pair.picture->colour.empty()) {
+      add_image("/camera/rgb/image_raw", "mono8", pair.stamp_ns, pair.picture->grey);
+    } else {
+      add_image("/camera/rgb/image_raw", "rgb8", pair.stamp_ns, pair.picture->colour);
+    }
+  }
+
+  void add_depth(const PairToWrite& pair) {
+    constexpr const char* kTopic = "/camera/depth/image_raw";
+    std::optional<Image<uint16_t>> millimetres;
+    if (camera_.depth_factor == 1000) millimetres = exact_units(*pair.depth, camera_);
+    if (millimetres)
+      add_image(kTopic, "16UC1", pair.depth_stamp_ns, *millimetres);
+    else
+      add_image(kTopic, "32FC1", pair.depth_stamp_ns, *pair.depth);
+  }
+
+  template <class T>
+  void add_image(const std::string& name, const char* encoding, int64_t stamp_ns, const Image<T>& image) {
+    ImageMessage message;
+    message.header = header(stamp_ns);
+    message.height = static_cast<uint32_t>(image.height()), message.width = static_cast<uint32_t>(image.width());
+    message.encoding = encoding;
+    message.is_bigendian = std::endian::native == std::endian::big;
+    message.step = static_cast<uint32_t>(message.width * sizeof(T));
+    message.data = pixels_of(image);
+    writer_->write(topic(name, "sensor_msgs/Image"), stamp_ns, encode(message));
+  }
+
+  const std::string name_;
+  const Camera camera_;
+  const std::string camera_text_;
+  const std::unique_ptr<RecordingWriter> writer_;
+  std::map<std::string, size_t> topics_;
+  bool began_ = false;
+};
+
+}  // namespace
+
+Camera without_limits(Camera camera) {
+  camera.depth_min = 0, camera.depth_max = std::numeric_limits<float>::max();
+  return camera;
+}
+
+std::unique_ptr<PairWriter> write_pairs(const fs::path& path, const Camera& camera, const std::string& camera_text,
+                                        const PairWriterOptions& options) {
+  if (is_recording_name(path))
+    return std::make_unique<RecordingPairWriter>(path, camera, camera_text, options.compression);
+  return std::make_unique<FolderPairWriter>(path, camera, camera_text, options.png_level);
+}
+
+}  // namespace dkb

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "dkb/dataset/image_codecs.h"
+#include "dkb/recordings/recording_file.h"
+
+namespace dkb {
+
+// A pair of images on its way into a folder or a recording.
+struct PairToWrite {
+  int64_t stamp_ns = 0, depth_stamp_ns = 0;
+  std::string_view colour_file;       // a PNG or JPEG that is kept as it is; else empty, and
+  const Picture* picture = nullptr;   // the pixels
+  const DepthImage* depth = nullptr;  // [m], of any size above 0
+};
+
+struct PairWriterOptions {
+  Compression compression = Compression::none;  // of a recording's chunks
+  int png_level = 6;                            // of PNG files that are made for a folder, 0 ... 9
+};
+
+// Keeps pairs of images so that nothing is lost: the same frames are read from it, bit for bit. Throws OutputError.
+class PairWriter {
+ public:
+  // Without close() nothing is left behind, and what has this name stays what it was.
+  virtual ~PairWriter() = default;
+  virtual void add(const PairToWrite& pair) = 0;
+  virtual void close() = 0;
+};
+
+// FILE.bag and FILE.mcap: the topics /camera/rgb/image_raw (or image_raw/compressed), /camera/depth/image_raw and
+// /camera/rgb/camera_info of ROS, and /dkb_slam/camera with the camera file, which an mcap file also holds as a
+// metadata record. Another name is that of a folder, which must be new or empty, in the layout of the TUM RGB-D
+// benchmark. `camera_text`: the camera file, of which `camera` was read.
+std::unique_ptr<PairWriter> write_pairs(const std::filesystem::path& path, const Camera& camera,
+                                        const std::string& camera_text, const PairWriterOptions& options = {});
+
+// A camera without limits of depth: what is read by it loses nothing.
+Camera without_limits(Camera camera);
+
+constexpr const char* kCameraTopic = "/dkb_slam/camera";
+constexpr const char* kCameraText = "dkb_slam_camera";
+
+}  // namespace dkb

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/recorded_pairs.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+// Without limits, for depth that is yet to be registered.
+Camera unlimited(Camera camera) {
+  camera.depth_min = 0, camera.depth_max = std::numeric_limits<double>::infinity();
+  return camera;
+}
+
+// Of the header, which images begin with.
+int64_t read_stamp(std::string_view bytes, MessageEncoding encoding) {
+  MessageReader in(bytes, encoding);
+  if (encoding == MessageEncoding::ros1) in.u32();  // seq
+  return in.stamp_ns();
+}
+
+}  // namespace
+
+RecordedImage RecordedPairs::Channel::read(const StampPairing::Stored& message) const {
+  RecordedImage image = read_recorded_image(message.bytes, topic.type, encoding, topic.name);
+  // Where headers carry no stamps, messages are told by the time that stands in.
+  image.name = topic.name + " at " + stamp_text(message.stamp_ns);
+  return image;
+}
+
+std::string RecordedPairs::Channel::mismatch(const StampPairing::Stored& message) const {
+  const RecordedImage image = read(message);
+  if (image.content != topic.content)
+    return image.name + ": is " + image.encoding + ", other images there are " + topic.encoding;
+  const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
+  // Whether it is sound in itself tells a wrong camera from a broken message.
+  if (!wrong.empty()) topic.content == ImageContent::depth ? void(depth_of(image, camera)) : void(picture_of(image));
+  return wrong;
+}
+
+// As with files: a wrong depth image counts for more than a broken colour image.
+std::string RecordedPairs::Decoder::mismatch(const StampPairing::Pair& pair) const {
+  std::optional<InputError> broken;
+  for (const bool is_depth : {false, true}) {
+    try {
+      const std::string wrong = is_depth ? depth.mismatch(pair.depth) : colour.mismatch(pair.colour);
+      if (!wrong.empty()) return wrong;
+    } catch (const InputError& e) {
+      if (!broken) broken = e;
+    }
+  }
+  if (broken) throw InputError(*broken);
+  return "";
+}
+
+std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pair& pair) const {
+  const auto checked = [](const Channel& channel, const StampPairing::Stored& message) {
+    RecordedImage image = channel.read(message);
+    const std::string wrong = size_mismatch(image.name, image.width, image.height, channel.camera);
+    if (image.content == channel.topic.content && !wrong.empty()) throw InputError(wrong);
+    return image;
+  };
+  const RecordedImage colours = checked(colour, pair.colour), depths = checked(depth, pair.depth);
+  auto made = std::make_shared<RgbdImage>();
+  made->timestamp = seconds_from_ns(pair.colour.stamp_ns);
+  made->depth_timestamp = seconds_from_ns(pair.depth.stamp_ns);
+  Picture picture = picture_of(colours);
+  made->grey = std::move(picture.grey), made->colour = std::move(picture.colour);
+  made->depth = depth_of(depths, depth.camera);
+  if (registration) made->depth = registration->registered(made->depth);
+  return made;
+}
+
+RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const RecordingContents& contents,
+                             const DatasetSelection& selection, std::string name)
+    : name_(std::move(name)),
+      stream_(std::move(stream)),
+      stamped_(contents.stamped),
+      motion_topic_(contents.motion),
+      decoder_(std::make_shared<Decoder>()),
+      filter_(selection),
+      warnings_(contents.warnings) {
+  decoder_->colour = {contents.colour, MessageEncoding::ros1, contents.camera};
+  decoder_->depth = {contents.depth, MessageEncoding::ros1, contents.camera};
+  if (contents.depth_camera) {
+    decoder_->depth.camera = unlimited(contents.depth_camera->camera);
+    decoder_->registration.emplace(contents.depth_camera->camera, contents.camera,
+                                   contents.depth_camera->colour_from_depth);
+  }
+  for (const RecordedTopic& topic : stream_->topics()) {
+    if (topic.name == contents.colour.name) decoder_->colour.encoding = topic.encoding;
+    if (topic.name == contents.depth.name) decoder_->depth.encoding = topic.encoding;
+  }
+  if (contents.motion) motion_.emplace(contents.motion->body_from_cam);
+}
+
+std::optional<StoredPair> RecordedPairs::next() {
+  while (!stopped_) {
+    if (!ready_.empty() && motion_is_known(ready_.front())) {
+      StampPairing::Pair pair = std::move(ready_.front());
+      ready_.pop_front();
+      return stored(std::move(pair));
+    }
+    if (ended_) {
+      if (filter_.seen() == 0)
+        throw InputError(name_ + ": no colour image of " + decoder_->colour.topic.name + " has a depth image of " +
+                         decoder_->depth.topic.name + " within 0.02 s; both must be of one clock");
+      filter_.require_any(name_);
+      return std::nullopt;
+    }
+    read_message();
+  }
+  return std::nullopt;
+}
+
+void RecordedPairs::read_message() {
+  const std::optional<RecordedMessage> message = filter_.done() ? std::nullopt : stream_->next();
+  if (!message) {
+    ended_ = true;
+    if (!filter_.done()) pairing_.close();
+  } else {
+    const RecordedTopic& topic = stream_->topics()[message->topic];
+    if (topic.name == decoder_->colour.topic.name)
+      add_image(StampPairing::colour, topic, *message);
+    else if (topic.name == decoder_->depth.topic.name)
+      add_image(StampPairing::depth, topic, *message);
+    else if (motion_topic_ && topic.name == motion_topic_->name)
+      add_motion(topic, *message);
+  }
+  collect();
+  std::vector<std::string> lines = stream_->take_warnings();
+  const std::lock_guard lock(mutex_);
+  for (std::string& line : lines) warnings_.push_back(std::move(line));
+  counts_.unpaired = pairing_.unpaired() + broken_;
+}
+
+void RecordedPairs::add_image(StampPairing::Kind kind, const RecordedTopic& topic, const RecordedMessage& message) {
+  int64_t stamp = message.recorded_ns;
+  try {
+    if (stamped_) stamp = read_stamp(message.bytes, topic.encoding);
+  } catch (const InputError& e) {
+    ++broken_;
+    warn_once("broken", name_ + ": " + topic.name + ": a message is broken (" + e.what() + "); it is left out");
+    return;
+  }
+  if (!pairing_.add(kind, {stamp, std::string(message.bytes)})) {
+    warn_once("late", name_ + ": " + topic.name + ": the stamp " + stamp_text(stamp) +
+                          " is not after the one before it; such images are left out");
+    const std::lock_guard lock(mutex_);
+    ++counts_.late;
+  } else if (kind == StampPairing::colour) {
+    newest_colour_ns_ = stamp;
+  }
+}
+
+void RecordedPairs::add_motion(const RecordedTopic& topic, const RecordedMessage& message) {
+  try {
+    if (motion_topic_->inertial) {
+      ImuMessage imu = decode_imu(message.bytes, topic.encoding);
+      if (!stamped_) imu.header.stamp_ns = message.recorded_ns;
+      motion_->add(imu);
+    } else {
+      OdometryMessage odometry = decode_odometry(message.bytes, topic.encoding);
+      if (!stamped_) odometry.header.stamp_ns = message.recorded_ns;
+      motion_->add(odometry);
+    }
+  } catch (const InputError& e) {
+    warn_once("motion", name_ + ": " + topic.name + ": a message is broken (" + e.what() + "); it is left out");
+  }
+}
+
+void RecordedPairs::collect() {
+  while (std::optional<StampPairing::Pair> pair = pairing_.take())
+    if (filter_.wants(seconds_from_ns(pair->colour.stamp_ns))) ready_.push_back(std::move(*pair));
+}
+
+// What tells of the motion may be recorded a little later than the images; not for long are these held back.
+bool RecordedPairs::motion_is_known(const StampPairing::Pair& pair) const {
+  constexpr int64_t kPatience = kNsPerSecond / 2;
+  constexpr size_t kMostReady = 30;
+  return !motion_ || ended_ || motion_->reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
+         *newest_colour_ns_ > pair.colour.stamp_ns + kPatience;
+}
+
+StoredPair RecordedPairs::stored(StampPairing::Pair pair) {
+  StoredPair made;
+  made.stamp_ns = pair.colour.stamp_ns, made.depth_stamp_ns = pair.depth.stamp_ns;
+  made.timestamp = seconds_from_ns(made.stamp_ns);
+  made.stamp = stamp_text(made.stamp_ns);
+  if (motion_) {
+    if (before_ns_) made.prior = motion_->between(*before_ns_, made.stamp_ns);
+    motion_->forget_before(made.stamp_ns);
+  }
+  before_ns_ = made.stamp_ns;
+  const auto images = std::make_shared<const StampPairing::Pair>(std::move(pair));
+  made.mismatch = [images, decoder = decoder_] { return decoder->mismatch(*images); };
+  made.decode = [images, decoder = decoder_] { return decoder->decode(*images); };
+  return made;
+}
+
+void RecordedPairs::warn_once(const std::string& kind, const std::string& line) {
+  if (std::find(warned_.begin(), warned_.end(), kind) != warned_.end()) return;
+  warned_.push_back(kind);
+  const std::lock_guard lock(mutex_);
+  warnings_.push_back(line);
+}
+
+SourceCounts RecordedPairs::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+std::vector<std::string> RecordedPairs::take_warnings() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(warnings_, {});
+}
+
+}  // namespace dkb

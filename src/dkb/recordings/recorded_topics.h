@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dkb/recordings/message_stream.h"
+
+namespace dkb {
+
+// What every kind of recording keeps of its topics: which there are, and which are wanted.
+class RecordedTopics {
+ public:
+  static constexpr size_t kMost = 65536;
+
+  const std::vector<RecordedTopic>& all() const { return topics_; }
+  // The same name, type and encoding is the same topic, however many wrote to it. Nothing when there are too many.
+  std::optional<size_t> add(std::string name, std::string type, MessageEncoding encoding);
+  void add_count(size_t topic, int64_t count);
+  void forget_counts();
+  void select(const std::vector<std::string>& names);
+  bool wanted(size_t topic) const { return wanted_[topic]; }
+
+ private:
+  std::vector<RecordedTopic> topics_;
+  std::vector<bool> wanted_;
+  std::map<std::pair<std::string, std::string>, std::vector<size_t>> by_name_;
+  std::optional<std::set<std::string>> selected_;
+};
+
+// A line each, the first few of them: a file that is broken all over says so briefly.
+class RecordingWarnings {
+ public:
+  void add(std::string line);
+  std::vector<std::string> take() { return std::exchange(lines_, {}); }
+
+ private:
+  std::vector<std::string> lines_;
+  int told_ = 0;
+};
+
+}  // namespace dkb

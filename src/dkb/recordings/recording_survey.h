@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/recordings/recording_contents.h"
+#include "dkb/recordings/static_transforms.h"
+
+namespace dkb {
+
+// What the first messages of a recording show, before anything is chosen.
+class RecordingSurvey {
+ public:
+  // Reads from where the stream stands.
+  void read(MessageStream& stream, const SourceOptions& options);
+
+  std::vector<RecordedImageTopic> images;          // in the order of their first messages
+  std::map<std::string, CameraInfoMessage> infos;  // by topic
+  std::map<std::string, std::string> odometries;   // child frame by topic
+  std::map<std::string, std::string> inertial;     // frame by topic
+  StaticTransforms transforms;
+  std::optional<std::string> camera_file;  // the text of a camera file that the recording holds
+  std::string camera_file_origin;
+  std::string first_failure;  // of an image message
+
+ private:
+  void take(const RecordedTopic& topic, const RecordedMessage& message);
+  bool complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options) const;
+  bool shown(const RecordedTopic& topic) const;
+  const RecordedImageTopic* image(const std::string& name) const;
+
+  int64_t transform_messages_ = 0;
+};
+
+}  // namespace dkb

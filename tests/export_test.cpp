@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// Results in the formats of other tools: `map export` and `export`, as their users start them.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "dkb/dataset/image_codecs.h"
+#include "dkb/recordings/message_stream.h"
+#include "dkb/recordings/ros_messages.h"
+#include "e2e_support.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Export : public ::testing::Test {
+ protected:
+  Export() : run(sequence(), folder / "run", {"--dump-features"}) {}
+  Finished export_map(const std::string& format, const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"map",  "export", (run.out / "map.dkb").string(), "--format",
+                                          format, "--out",  (folder / format).string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_program(arguments);
+  }
+  TempFolder folder;
+  SlamRun run;
+};
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::vector<std::string> lines;
+  std::istringstream in(read_text(file));
+  for (std::string line; std::getline(in, line);)
+    if (!line.starts_with('#')) lines.push_back(line);
+  return lines;
+}
+
+TEST_F(Export, ColmapsModelPutsItsPointsWhereItsImagesSeeThem) {
+  const Finished done = export_map("colmap", {"--images", sequence().string(), "--detector", "none"});
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const fs::path sparse = folder / "colmap" / "sparse" / "0";
+  const auto camera = rows_of(sparse / "cameras.txt").at(0);
+  ASSERT_EQ(camera.at(1), "PINHOLE");
+  const double fx = std::stod(camera.at(4)), fy = std::stod(camera.at(5)), cx = std::stod(camera.at(6)),
+               cy = std::stod(camera.at(7));
+  EXPECT_DOUBLE_EQ(cx, 320);  // the corner of the top-left pixel is the origin there
+
+  struct SeenAt {
+    Eigen::Vector3d in_cam;
+    Eigen::Vector2d pixel;
+  };
+  std::map<std::string, Eigen::Vector3d> points;
+  std::map<std::string, std::set<std::pair<int, int>>> tracks;
+  for (const auto& row : rows_of(sparse / "points3D.txt")) {
+    points[row[0]] = {std::stod(row[1]), std::stod(row[2]), std::stod(row[3])};
+    for (size_t i = 8; i + 1 < row.size(); i += 2) tracks[row[0]].insert({std::stoi(row[i]), std::stoi(row[i + 1])});
+  }
+  ASSERT_GT(points.size(), 200U);
+  const auto images = lines_of(sparse / "images.txt");
+  ASSERT_EQ(images.size(), 2 * run.stats["keyframes"].get<size_t>());
+  std::vector<double> errors;
+  std::map<std::string, std::set<std::pair<int, int>>> seen;
+  for (size_t i = 0; i < images.size(); i += 2) {
+    std::istringstream head(images[i]), features(images[i + 1]);
+    int id = 0, camera_id = 0;
+    double w, x, y, z, tx, ty, tz;
+    std::string name;
+    ASSERT_TRUE(head >> id >> w >> x >> y >> z >> tx >> ty >> tz >> camera_id >> name) << images[i];
+    EXPECT_TRUE(fs::exists(folder / "colmap" / "images" / name));
+    EXPECT_TRUE(fs::exists(folder / "colmap" / "masks" / (name + ".png")));
+    const Eigen::Quaterniond rotation(w, x, y, z);
+    double u = 0, v = 0;
+    std::string point;
+    for (int f = 0; features >> u >> v >> point; ++f) {
+      if (point == "-1") continue;
+      ASSERT_TRUE(points.contains(point));
+      seen[point].insert({id, f});
+      const Eigen::Vector3d p = rotation * points[point] + Eigen::Vector3d(tx, ty, tz);
+      errors.push_back(std::hypot(fx * p.x() / p.z() + cx - u, fy * p.y() / p.z() + cy - v));
+    }
+  }
+  EXPECT_EQ(seen, tracks) << "both files tell the same tracks";
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 1.0) << "[px]";
+  EXPECT_LT(errors[errors.size() * 95 / 100], 4.0) << "[px]";
+}
+
+TEST_F(Export, NerfstudiosPosesAreTheKeyframesWithTheAxesOfOpengl) {
+  ASSERT_EQ(export_map("nerfstudio", {"--images", sequence().string()}).exit_code, 0);
+  const auto model = nlohmann::json::parse(read_text(folder / "nerfstudio" / "transforms.json"));
+  std::map<std::string, std::vector<double>> keyframes;
+  for (const auto& row : rows_of(run.out / "keyframes.txt")) {
+    for (int i = 1; i < 8; ++i) keyframes[row[0]].push_back(std::stod(row[static_cast<size_t>(i)]));
+  }
+  ASSERT_EQ(model["frames"].size(), keyframes.size());
+  for (const auto& frame : model["frames"]) {
+    const fs::path picture = frame["file_path"].get<std::string>();
+    const auto& k = keyframes.at(picture.stem().string());
+    const auto& m = frame["transform_matrix"];
+    const Eigen::Vector3d forward = Eigen::Quaterniond(k[6], k[3], k[4], k[5]) * Eigen::Vector3d::UnitZ();
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(m[i][3].get<double>(), k[static_cast<size_t>(i)], 1e-6);
+      EXPECT_NEAR(m[i][2].get<double>(), -forward[i], 1e-6) << "z looks backward";
+    }
+    EXPECT_EQ(read_picture(folder / "nerfstudio" / picture).grey.width(), 640);
+    EXPECT_EQ(read_grey(folder / "nerfstudio" / frame["mask_path"].get<std::string>()).height(), 480);
+  }
+}
+
+TEST_F(Export, AModelWithoutPicturesSaysSoAndAForeignRecordingIsRefused) {
+  const Finished bare = export_map("nerfstudio");
+  EXPECT_EQ(bare.exit_code, 0);
+  EXPECT_NE(bare.out.find("no images"), std::string::npos) << bare.out;
+  EXPECT_FALSE(
+      nlohmann::json::parse(read_text(folder / "nerfstudio" / "transforms.json"))["frames"][0].contains("mask_path"));
+
+  const TempFolder other;
+  copy_sequence(other.path(), 5, false);
+  std::string text = read_text(other / "associations.txt");
+  for (size_t at = 0; (at = text.find("\n17", at)) != std::string::npos; at += 2) text.replace(at, 3, "\n18");
+  if (text.starts_with("17")) text.replace(0, 2, "18");
+  write_text(other / "associations.txt", text);
+  const Finished foreign = export_map("colmap", {"--images", other.path().string()});
+  EXPECT_EQ(foreign.exit_code, 2) << foreign.out;
+  EXPECT_NE(foreign.err.find("keyframes; give the recording that the map was made from"), std::string::npos)
+      << foreign.err;
+}
+
+TEST_F(Export, TrajectoriesHaveARowForEachPose) {
+  const size_t poses = rows_of(run.out / "trajectory.txt").size();
+  for (const char* format : {"tum", "kitti", "euroc"}) {
+    const fs::path file = folder / format;
+    const Finished done = run_program({"export", run.out.string(), "--format", format, "--out", file.string()});
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_EQ(lines_of(file).size(), poses) << format;
+  }
+  EXPECT_EQ(read_text(folder / "tum"), read_text(run.out / "trajectory.txt"));
+  EXPECT_EQ(run_program({"export", run.out.string(), "--out", (folder / "x.txt").string()}).exit_code, 2);
+}
+
+TEST_F(Export, ResultsBecomeARecordingWithPosesCloudAndPictures) {
+  const fs::path file = folder / "results.mcap";
+  const Finished done =
+      run_program({"export", run.out.string(), "--out", file.string(), "--images", sequence().string()});
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const auto stream = open_messages(file);
+  std::map<std::string, int> counts;
+  int64_t last = 0;
+  size_t transforms = 0;
+  while (const auto message = stream->next()) {
+    const RecordedTopic& topic = stream->topics()[message->topic];
+    ++counts[topic.name];
+    EXPECT_GE(message->recorded_ns, last) << topic.name;
+    last = message->recorded_ns;
+    if (topic.name == "/tf") transforms += decode_transforms(message->bytes, topic.encoding).size();
+    if (topic.name == "/features_image/compressed") {
+      const auto image = decode_compressed_image(message->bytes, topic.encoding);
+      EXPECT_EQ(decode_picture(image.data, "picture").grey.width(), 640);
+    }
+  }
+  const int poses = run.stats["tracked"];
+  EXPECT_EQ(transforms, static_cast<size_t>(poses));
+  EXPECT_EQ(counts["/pose"], poses);
+  EXPECT_EQ(counts["/features_image/compressed"], kSequenceFrames);
+  EXPECT_EQ(counts["/map_points"], 1);
+  EXPECT_EQ(counts["/path"], 1);
+}
+
+}  // namespace
+}  // namespace dkb::test

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// What motion priors are for: stretches without vision, and places that somebody names.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "library_support.h"
+
+namespace dkb::test {
+namespace {
+
+class LibraryPriors : public ::testing::Test {
+ protected:
+  // A frame with what wheels say that are off by `error` of the way, and know it.
+  Frame driven(int index, const WallWorld::Look& look, int step = 1, double error = 0) const {
+    Frame frame = world.frame(index, look);
+    MotionPrior prior;
+    prior.previous_from_current.translation.x() = (1 + error) * world.camera_x(step);
+    prior.covariance = Matrix6d::Identity() * 1e-6;
+    frame.set_prior(prior);
+    return frame;
+  }
+  static double sd(const FrameResult& r) { return std::sqrt((*r.covariance)(0, 0)); }
+
+  WallWorld world{320, 240};
+};
+
+TEST_F(LibraryPriors, InTheDarkThePoseGoesOnAndItsCovarianceGrows) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  double last_sd = 0;
+  int keyframes = 0;
+  for (int i = 0; i < 60; ++i) {
+    const bool dark = i >= 20 && i < 35;
+    const FrameResult r = slam.process(driven(i, {.shift = i, .dark = dark}, i > 0, 0.01));
+    ASSERT_TRUE(r.tracked()) << i;
+    ASSERT_TRUE(r.world_from_cam && r.odom_from_cam && r.covariance) << i;
+    EXPECT_EQ(r.state == TrackingState::predicted, dark) << i << " " << name_of(r.state);
+    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), world.camera_x(1)) << i;
+    if (dark) {
+      EXPECT_GT(sd(r), last_sd) << i;
+      EXPECT_FALSE(r.keyframe) << "nothing lasting is made of what nobody saw";
+      EXPECT_EQ(r.inliers, 0);
+    }
+    if (i == 36) {
+      EXPECT_LT(sd(r), last_sd);
+    }
+    last_sd = sd(r);
+    keyframes += r.keyframe;
+  }
+  slam.finish();
+  const Statistics s = slam.statistics();
+  EXPECT_EQ(s.tracked, 60);
+  EXPECT_EQ(s.predicted, 15);
+  EXPECT_EQ(s.lost, 0);
+  EXPECT_EQ(s.maps, 1);
+  EXPECT_GT(keyframes, 0);
+  EXPECT_EQ(slam.trajectory().size(), 60U);
+  EXPECT_EQ(slam.online_trajectory().size(), 60U);
+}
+
+TEST_F(LibraryPriors, WhatAPriorWasOffByIsTheMapsBusinessAndNotOdometrys) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  double last_x = 0, last_map_x = 0, largest_step = 0, largest_map_step = 0;
+  for (int i = 0; i < 60; ++i) {
+    const bool dark = i >= 20 && i < 35;
+    const FrameResult r = slam.process(driven(i, {.shift = i, .dark = dark}, i > 0, dark ? 0.5 : 0));
+    ASSERT_TRUE(r.tracked()) << i;
+    if (i > 0) {
+      largest_step = std::max(largest_step, std::abs(r.odom_from_cam->translation.x() - last_x));
+      largest_map_step = std::max(largest_map_step, std::abs(r.world_from_cam->translation.x() - last_map_x));
+    }
+    last_x = r.odom_from_cam->translation.x(), last_map_x = r.world_from_cam->translation.x();
+  }
+  EXPECT_NEAR(last_map_x, world.camera_x(59), world.camera_x(1));
+  EXPECT_GT(largest_map_step, 5 * world.camera_x(1)) << "it was half of 15 steps off";
+  EXPECT_LT(largest_step, 2 * world.camera_x(1));
+}
+
+TEST_F(LibraryPriors, WhereTheMapWasLeftInTheDarkItGoesOnFromThere) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(slam.process(driven(i, {.shift = i}, i > 0)).tracked());
+  for (int i = 20; i < 40; ++i) slam.process(driven(i, {.dark = true}, 20));
+  for (int i = 40; i < 90; ++i) {  // nothing here was ever seen
+    const FrameResult r = slam.process(driven(i, {.shift = i + 380}, 1));
+    ASSERT_TRUE(r.tracked()) << i;
+    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i + 380), 0.01) << i;
+    if (i > 75) {
+      EXPECT_EQ(r.state, TrackingState::tracking) << i;
+    }
+  }
+  slam.finish();
+  EXPECT_EQ(slam.statistics().maps, 1) << "the prior joins what lies before and after";
+}
+
+TEST_F(LibraryPriors, AWrongOneInTheDarkIsCorrectedByTheImages) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 20; ++i) slam.process(driven(i, {.shift = i}, i > 0));
+  for (int i = 20; i < 40; ++i) slam.process(driven(i, {.dark = true}, 4));  // the wheels slip: the camera stands still
+  FrameResult r;
+  for (int i = 40; i < 46; ++i) r = slam.process(driven(i, {.shift = 20}, 0));
+  ASSERT_TRUE(r.tracked());
+  EXPECT_NE(r.state, TrackingState::predicted);
+  EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(20), 3e-3);
+}
+
+TEST_F(LibraryPriors, WithoutOneTheDarkIsALoss) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 20; ++i) slam.process(driven(i, {.shift = i}, i > 0));
+  EXPECT_EQ(slam.process(driven(20, {.dark = true})).state, TrackingState::predicted);
+  EXPECT_EQ(slam.process(world.frame(21, {.dark = true})).state, TrackingState::lost);
+  EXPECT_EQ(slam.process(driven(22, {.dark = true})).state, TrackingState::lost) << "where it begins is not known";
+}
+
+TEST_F(LibraryPriors, ARotationBridgesAsLongAsTheVelocityCanBeTakenToLast) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  int predicted = 0, lost = 0;
+  for (int i = 0; i < 80; ++i) {
+    Frame frame = world.frame(i, {.shift = i, .dark = i >= 20});
+    MotionPrior prior;
+    prior.rotation_only = true;
+    prior.covariance = Matrix6d::Identity() * 1e-6;
+    frame.set_prior(prior);
+    const FrameResult r = slam.process(frame);
+    predicted += r.state == TrackingState::predicted;
+    lost += r.state == TrackingState::lost;
+    if (r.tracked()) {
+      EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 0.02) << i;
+    }
+  }
+  // Half of 1 m/s^2 over t seconds is 0.25 m after 0.7 s, 21 frames.
+  EXPECT_NEAR(predicted, 21, 1);
+  EXPECT_EQ(lost, 60 - predicted);
+}
+
+TEST_F(LibraryPriors, FramesThatWereNotLookedAtLeaveTheirMotionToTheNext) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 20; ++i) slam.process(driven(i, {.shift = i}, i > 0));
+  slam.pause(true);
+  for (int i = 20; i < 30; ++i) slam.process(driven(i, {.shift = i}));
+  slam.pause(false);
+  const FrameResult r = slam.process(driven(30, {.dark = true}));
+  ASSERT_EQ(r.state, TrackingState::predicted);
+  EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(30), 3e-3);
+}
+
+TEST_F(LibraryPriors, ASuggestedPlaceTellsTwinsApart) {
+  // The wall's picture repeats itself: many places explain the view.
+  const int period = 144;
+  const WallWorld twins(320, 240, period);
+  const auto found_at = [&](std::optional<int> suggested) -> std::optional<double> {
+    Slam slam(twins.camera(), Options(), Detectors::none());
+    for (int i = 0; i < 220; ++i) slam.process(twins.frame(i, {.shift = 2 * i}));
+    slam.localize_only(true);
+    for (int i = 220; i < 225; ++i) slam.process(twins.frame(i, {.dark = true}));
+    if (suggested) {
+      Rigid3 pose;
+      pose.translation.x() = twins.camera_x(*suggested) + 0.05;
+      slam.suggest_pose(pose, Matrix6d::Identity() * 0.01);
+    }
+    FrameResult r;
+    for (int i = 225; i < 235; ++i) r = slam.process(twins.frame(i, {.shift = 40 + period}));
+    if (!r.tracked()) return std::nullopt;
+    return r.world_from_cam->translation.x();
+  };
+  for (const int place : {40, 40 + period, 40 + 2 * period}) {
+    const auto x = found_at(place);
+    ASSERT_TRUE(x) << place;
+    EXPECT_NEAR(*x, twins.camera_x(place), 0.01) << place;
+  }
+}
+
+TEST_F(LibraryPriors, ASuggestionThatIsNoPoseIsRefused) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  Rigid3 nowhere;
+  nowhere.translation.x() = std::nan("");
+  EXPECT_NE(error_of([&] { slam.suggest_pose(nowhere, Matrix6d::Identity()); }).find("suggested pose: "),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { slam.suggest_pose({}, Matrix6d::Zero()); }).find("positive definite"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace dkb::test
