@@ -38,18 +38,13 @@ case "${1:-}" in
     packages+=(
       catkin libroscpp-dev libtf2-ros-dev libnodeletlib-dev libnodeletlib-tools ros-message-generation ros-geometry-msgs
       ros-std-msgs libgeometry-msgs-dev libnav-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev
-      libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev rosout python3-roslaunch python3-rosbag python3-std-msgs
-      python3-geometry-msgs python3-nav-msgs python3-sensor-msgs python3-visualization-msgs python3-diagnostic-msgs
-      python3-std-srvs python3-tf2-msgs python3-pil
+      libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev rosout python3-roslaunch python3-std-msgs
+      python3-geometry-msgs python3-visualization-msgs python3-diagnostic-msgs python3-std-srvs python3-pil
     )
     ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-<<<<<<< HEAD
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|docs|lint|ros|slurm]" >&2; exit 2 ;;
-=======
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|slurm]" >&2; exit 2 ;;
->>>>>>> main
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|ros|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then
