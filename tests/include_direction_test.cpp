@@ -118,7 +118,8 @@ TEST(Architecture, EverySourceFileNamesItsLicence) {
   for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "fuzz", "python", "ros"}) {
     for (const std::string& file : files_below(folder, {".cpp", ".h", ".txt", ".cmake", ".py", ".pyi"})) {
       const std::vector<std::string> lines = read_lines(source_dir() / file);
-      EXPECT_TRUE(!lines.empty() && lines[0].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)
+      const size_t first = !lines.empty() && lines[0].starts_with("#!") ? 1 : 0;  // scripts name their interpreter
+      EXPECT_TRUE(lines.size() > first && lines[first].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)
           << file << ": the first line must be the SPDX line";
     }
   }
