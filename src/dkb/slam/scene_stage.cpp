@@ -52,7 +52,9 @@ void SceneStage::learn(const FrameOutcome& before) {
   if (motion_) motion_->move_world(before.new_world_from_old);
 }
 
-MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes) {
+// `boxes` grows by all that were found, `unmasked` by those whose detector gave no mask with them.
+MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes,
+                                           std::vector<Detection>& unmasked) {
   MoverMask given;
   for (const auto& detector : prompt_) {
     Detections found;
@@ -65,7 +67,10 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
     }
     if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
     boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());
-    if (!found.mask.empty()) unite(given, {1, std::move(found.mask)}, camera_.width, camera_.height);
+    if (found.mask.empty())
+      unmasked.insert(unmasked.end(), found.boxes.begin(), found.boxes.end());
+    else
+      unite(given, {1, std::move(found.mask)}, camera_.width, camera_.height);
   }
   return given;
 }
@@ -88,9 +93,9 @@ MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_f
   return moving;
 }
 
-MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& boxes, const MoverMask& given,
+MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                               const MoverMask& moving) const {
-  MoverMask mask = given.empty() ? silhouettes(image.depth, boxes, options_.carried.silhouette) : MoverMask{};
+  MoverMask mask = silhouettes(image.depth, unmasked, options_.carried.silhouette);
   if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
   unite(mask, given, camera_.width, camera_.height);
   if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);
@@ -127,7 +132,9 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(scene.late_masks));
   }
   scene.boxes = carried_.boxes();
-  MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes);
+  std::vector<Detection> unmasked;
+  if (carried_.mask().empty()) unmasked = scene.boxes;
+  MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
   const MoverMask moving = segment_motion(image, expected.cam_from_world, scene.boxes);
   times_.add("flow", watch.ms());
@@ -141,7 +148,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
-    scene.mask = mask_of(image, scene.boxes, given, moving);
+    scene.mask = mask_of(image, unmasked, given, moving);
     for (size_t i = 0; i < corners.size(); ++i)
       if (scene.mask.at(corners[i].x, corners[i].y)) scene.rejected[i] = FeatureReason::on_mover;
   }
