@@ -9,16 +9,6 @@ export PATH=/usr/bin:/bin
 python3 "$here/../../test/respace.py" "$sequence" "$work/at30" 30 4
 frames=$(wc -l <"$work/at30/associations.txt")
 python3 "$here/make_bag.py" "$work/at30" "$work/at30.bag" "$frames" 517.3 516.5 318.6 255.3
-sed 's/^#.*//' >"$work/camera.yaml" <<CAMERA
-fx: 517.3
-fy: 516.5
-cx: 318.6
-cy: 255.3
-width: 640
-height: 480
-depth_factor: 5000
-CAMERA
-
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1 ROS_HOME=$work/ros ROS_LOG_DIR=$work/log
 roscore -p "$port" >"$work/roscore.log" 2>&1 &
@@ -37,6 +27,6 @@ for turn in 1 2 3; do
   kill -INT $node
   wait $node
   rm -rf "$work/at30-run"
-  "$work/prefix/bin/dkb-slam" run "$work/at30" --camera "$work/camera.yaml" --realtime --out "$work/at30-run" --quiet
+  "$work/prefix/bin/dkb-slam" run "$work/at30" --camera fr1 --realtime --out "$work/at30-run" --quiet
   python3 -c 'import json, sys; s = json.load(open(sys.argv[1])); print("run: frames", s["frames"], "skipped", s["skipped"], "tracking mean [ms]", round(s["stages"]["tracking"]["mean_ms"], 2), "cpu [s]", round(s["cpu_s"], 2))' "$work/at30-run/stats.json"
 done
