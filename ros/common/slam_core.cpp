@@ -326,7 +326,7 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
 }
 
 void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
-  publish_poses(result);
+  publish_odometry(result);
   const double out_ms =
       1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
   {
@@ -344,6 +344,7 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     recent_.latency_ms.add(out_ms);
     recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
   }
+  publish_transforms(result);
   if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
     MoversOutput movers = movers_of(result);
     movers.frame_id = parameters_.map_frame;
@@ -358,30 +359,13 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
   tell_events();
 }
 
-void SlamCore::publish_poses(const dkb::FrameResult& result) {
-  const Rigid3 cam_from_base = base_from_cam_.inverse();
-  std::vector<TransformOutput> transforms;
+void SlamCore::publish_odometry(const dkb::FrameResult& result) {
   if (!result.tracked()) {
     last_pose_.reset();
-    if (parameters_.publish_map_tf && map_from_odom_)
-      transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
-    if (!transforms.empty()) middleware_.publish(transforms);
     return;
   }
-  const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
-  const Rigid3 odom_from_base = *result.odom_from_cam * cam_from_base;
+  const Rigid3 odom_from_base = *result.odom_from_cam * base_from_cam_.inverse();
   const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
-
-  if (parameters_.publish_odom_tf) {
-    map_from_odom_ = result.world_from_odom;
-    transforms.push_back({result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, odom_from_base});
-  } else {
-    place_robots_odometry(result.stamp_ns, map_from_base);
-  }
-  if (parameters_.publish_map_tf && map_from_odom_)
-    transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
-  if (!transforms.empty()) middleware_.publish(transforms);
-
   OdometryOutput odometry;
   odometry.pose = {result.stamp_ns, parameters_.odom_frame, odom_from_base,
                    ros_covariance(covariance, base_from_cam_, odom_from_base.rotation)};
@@ -398,9 +382,29 @@ void SlamCore::publish_poses(const dkb::FrameResult& result) {
   }
   last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
   middleware_.publish(odometry);
-  if (middleware_.wanted(Topic::pose))
-    middleware_.publish(PoseMessage{result.stamp_ns, parameters_.map_frame, map_from_base,
-                                    ros_covariance(covariance, base_from_cam_, map_from_base.rotation)});
+}
+
+void SlamCore::publish_transforms(const dkb::FrameResult& result) {
+  const Rigid3 cam_from_base = base_from_cam_.inverse();
+  std::vector<TransformOutput> transforms;
+  if (result.tracked()) {
+    const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
+    if (parameters_.publish_odom_tf) {
+      map_from_odom_ = result.world_from_odom;
+      transforms.push_back(
+          {result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, *result.odom_from_cam * cam_from_base});
+    } else {
+      place_robots_odometry(result.stamp_ns, map_from_base);
+    }
+    if (middleware_.wanted(Topic::pose))
+      middleware_.publish(PoseMessage{
+          result.stamp_ns, parameters_.map_frame, map_from_base,
+          ros_covariance(result.covariance.value_or(Matrix6d::Identity()), base_from_cam_, map_from_base.rotation)});
+  }
+  // While the camera is lost, the last one holds.
+  if (parameters_.publish_map_tf && map_from_odom_)
+    transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
+  if (!transforms.empty()) middleware_.publish(transforms);
 }
 
 // map -> odom, where odom -> base is the robot's. Its odometry of a frame's time may come later than the frame's pose.

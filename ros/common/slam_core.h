@@ -52,8 +52,8 @@ class SlamCore final : public RosCore {
     double sum = 0, max = 0;
     void add(double value) { ++count, sum += value, max = std::max(max, value); }
   };
-  // Of the frames since the last diagnostics. Latency: from the later image's arrival until the pose is out; overhead:
-  // what of it is neither the library's tracking nor its waiting.
+  // Of the frames since the last diagnostics. Latency: from the later image's arrival until the odometry is out;
+  // overhead: what of it is neither the library's tracking nor its waiting.
   struct Recent {
     int64_t frames = 0;
     Series skew_ms, tracking_ms, latency_ms, overhead_ms;
@@ -80,7 +80,8 @@ class SlamCore final : public RosCore {
   std::optional<dkb::MotionPrior> prior(int64_t stamp_ns);
   std::optional<Rigid3> cam_from(const std::string& frame);
   void publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result);
-  void publish_poses(const dkb::FrameResult& result);
+  void publish_odometry(const dkb::FrameResult& result);
+  void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_anew();
   void forget_motion();

@@ -5,6 +5,7 @@
 #include <dkb_slam/source.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
@@ -156,7 +157,7 @@ TEST_F(SlamCoreTest, TracksAndPublishesPosesOfTheBase) {
   const Rigid3 first = out.odometry[0].pose.pose;
   EXPECT_LT(first.translation.norm(), 1e-6);
   EXPECT_LT(first.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
-  ASSERT_TRUE(out.wait([&] { return out.poses.size() == 30 && !out.clouds.empty() && !out.paths.empty(); }));
+  ASSERT_TRUE(out.wait([&] { return out.transforms.size() == 30 && !out.clouds.empty() && !out.paths.empty(); }));
   for (size_t i = 0; i < 30; ++i) {
     ASSERT_EQ(out.transforms[i].size(), 2u);
     const TransformOutput &base = out.transforms[i][0], &odom = out.transforms[i][1];
@@ -171,6 +172,9 @@ TEST_F(SlamCoreTest, TracksAndPublishesPosesOfTheBase) {
     const Rigid3 motion = out.odometry[i - 1].pose.pose.inverse() * out.odometry[i].pose.pose;
     EXPECT_NEAR(out.odometry[i].twist.head<3>().norm(), motion.translation.norm() / dt, 0.02);
   }
+  ASSERT_TRUE(out.wait([&] { return !out.grids.empty(); }));
+  EXPECT_NEAR(out.grids.back().cell, 0.05, 1e-6);
+  EXPECT_GT(std::count(out.grids.back().cells.begin(), out.grids.back().cells.end(), 0), 100);
   EXPECT_GT(out.clouds.back().points.size(), 100u);
   EXPECT_EQ(out.images.back().width, source_camera().width);
   ASSERT_TRUE(out.wait([&] { return out.last_value("frames") == "30"; }));
@@ -269,7 +273,7 @@ TEST_F(SlamCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
   const Rigid3 odom_from_base(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {3, 1, 0});
   out.known_transforms["odom base_link"] = odom_from_base;
   feed_all(*core, 0, 3);
-  ASSERT_TRUE(out.wait([&] { return out.poses.size() == 3; }));
+  ASSERT_TRUE(out.wait([&] { return out.transforms.size() == 3; }));
   ASSERT_EQ(out.transforms.back().size(), 1u);
   EXPECT_EQ(out.transforms.back()[0].child, "odom");
   const Rigid3 error = out.poses.back().pose.inverse() * (out.transforms.back()[0].parent_from_child * odom_from_base);
