@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstring>
+#include <exception>
 #include <memory>
 
 #include "dkb/image/rgbd_image.h"
@@ -44,28 +45,40 @@ int record(const RecordArguments& args) {
   const bool terminal = isatty(STDERR_FILENO) != 0 && !args.quiet;
   LiveReport report;
   size_t kept = 0;
-  for (SourceFrame next = source->next(); next.state != SourceState::ended; next = source->next()) {
-    for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
-    report.add(next);
-    if (next.state == SourceState::unplugged)
-      warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
-    if (next.state == SourceState::skipped) warnings.warn("skipped", next.note + "; left out");
-    if (next.state != SourceState::frame) continue;
-    const RgbdImage& image = *next.frame.image();
-    const Picture picture{image.grey, image.colour};
-    writer->add({next.frame.stamp_ns(), next.frame.depth_stamp_ns(), {}, &picture, &image.depth});
-    if (++kept % 30 == 0 && terminal) fmt::print(stderr, "\r\033[K{} frames", kept);
+  std::exception_ptr failure;  // what was kept so far is not lost by it
+  const auto keep_all = [&] {
+    for (SourceFrame next = source->next(); next.state != SourceState::ended; next = source->next()) {
+      for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
+      report.add(next);
+      if (next.state == SourceState::unplugged)
+        warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
+      if (next.state == SourceState::skipped) warnings.warn("skipped", next.note + "; left out");
+      if (next.state != SourceState::frame) continue;
+      const RgbdImage& image = *next.frame.image();
+      const Picture picture{image.grey, image.colour};
+      writer->add({next.frame.stamp_ns(), next.frame.depth_stamp_ns(), {}, &picture, &image.depth});
+      if (++kept % 30 == 0 && terminal) fmt::print(stderr, "\r\033[K{} frames", kept);
+    }
+  };
+  try {
+    keep_all();
+  } catch (const OutputError&) {  // the disk is full: what is there cannot be completed
+    throw;
+  } catch (...) {
+    failure = std::current_exception();
   }
   if (terminal) fmt::print(stderr, "\n");
   for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
   source->stop();
   warnings.finish();
   if (kept == 0) {
+    if (failure) std::rethrow_exception(failure);
     fmt::print(stderr, "error: {} gave no frame; nothing was written\n", args.source);
     return Interrupt::happened() ? 130 : 1;
   }
   writer->close();
   if (!args.quiet) fmt::print("{}: {}\n", args.out, report.text(source->counts()));
+  if (failure) std::rethrow_exception(failure);
   return Interrupt::happened() ? 130 : 0;
 }
 

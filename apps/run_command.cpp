@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -197,46 +198,59 @@ int run(const RunArguments& args) {
   };
   warn();
   const Stopwatch wall;
-  while (!Interrupt::happened()) {
-    SourceFrame next = source.next();
-    warn();
-    if (next.state == SourceState::ended) break;
-    if (next.state != SourceState::unplugged) facts.offered = static_cast<int>(next.index) + 1;
-    if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
-    report.add(next);
-    if (next.state == SourceState::unplugged) {
-      warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
-      continue;
+  std::exception_ptr failure;  // what was tracked until then is written all the same
+  const auto track_all = [&] {
+    while (!Interrupt::happened()) {
+      SourceFrame next = source.next();
+      warn();
+      if (next.state == SourceState::ended) break;
+      if (next.state != SourceState::unplugged) facts.offered = static_cast<int>(next.index) + 1;
+      if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
+      report.add(next);
+      if (next.state == SourceState::unplugged) {
+        warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
+        continue;
+      }
+      if (next.state != SourceState::frame) {
+        ++facts.skipped;
+        warnings.warn("frame skipped, an image cannot be read",
+                      "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
+        progress.frame(next.index + 1, nullptr);
+        continue;
+      }
+      facts.stamps.push_back(next.stamp);
+      const FrameResult result = slam.process(next.frame);
+      for (const Mover& mover : result.movers)
+        facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+      for (const Event& event : slam.take_events())
+        if (event.kind == Event::Kind::warning)
+          warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+      if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
+      if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
+      progress.frame(next.index + 1, &result);
     }
-    if (next.state != SourceState::frame) {
-      ++facts.skipped;
-      warnings.warn("frame skipped, an image cannot be read",
-                    "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
-      progress.frame(next.index + 1, nullptr);
-      continue;
-    }
-    facts.stamps.push_back(next.stamp);
-    const FrameResult result = slam.process(next.frame);
-    for (const Mover& mover : result.movers)
-      facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-    for (const Event& event : slam.take_events())
-      if (event.kind == Event::Kind::warning)
-        warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
-    if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
-    if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
-    progress.frame(next.index + 1, &result);
+  };
+  try {
+    track_all();
+  } catch (...) {
+    failure = std::current_exception();
   }
+  try {
+    slam.finish();
+  } catch (...) {
+    if (!failure) failure = std::current_exception();
+  }
+  if (failure && slam.statistics().tracked == 0) std::rethrow_exception(failure);
   progress.finish();
   if (Interrupt::happened()) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
   source.stop();
   if (paced || live) facts.skipped += static_cast<int>(source.counts().dropped);
   // Nobody knows how many a camera could have given.
   if (live) facts.offered = static_cast<int>(facts.stamps.size()) + facts.skipped;
-  slam.finish();
   facts.wall_s = wall.ms() / 1000;
   facts.config_yaml = options.to_yaml();
   if (reader != nullptr) facts.times = reader->times();
-  if (args.dense) {
+  if (args.dense && !failure) {
     const Stopwatch building;
     const DenseMap map = slam.dense_map();
     facts.times.add("dense_build", building.ms());
@@ -246,6 +260,7 @@ int run(const RunArguments& args) {
   write_outputs(out, slam, facts);
   if (args.cv_orb && !Interrupt::happened()) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
+  if (failure) std::rethrow_exception(failure);
 
   const Statistics s = slam.statistics();
   if (!args.quiet)

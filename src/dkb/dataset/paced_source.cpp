@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/paced_source.h"
 
+#include <deque>
 #include <utility>
 
 #include "dkb/image/skipped_motion.h"
@@ -18,12 +19,8 @@ PacedSource::Due by_stamps() {
   };
 }
 
-void leave_motion(const SourceFrame& dropped, SourceFrame& next) {
-  if (dropped.state != SourceState::frame || next.state != SourceState::frame) return;
-  SkippedMotion skipped;
-  skipped.skip(dropped.frame);
-  next.frame = skipped.with_motion(std::move(next.frame));
-}
+// A recording whose clock jumps would keep its consumer waiting: from so long a pause on, the pace begins anew.
+constexpr std::chrono::seconds kLongestPause{10};
 
 }  // namespace
 
@@ -69,11 +66,26 @@ void PacedSource::run() {
   using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> start;
   std::optional<int64_t> last_stamp;
+  SkippedMotion left_out;  // since the last frame that waits in the queue
+  const auto leave_motion = [&](const SourceFrame& dropped, std::deque<SourceFrame>& waiting) {
+    if (dropped.state != SourceState::frame) return;
+    SkippedMotion motion;
+    motion.skip(dropped.frame);
+    for (SourceFrame& next : waiting)
+      if (next.state == SourceState::frame) {
+        next.frame = motion.with_motion(std::move(next.frame));
+        return;
+      }
+    left_out.skip(dropped.frame);
+  };
   try {
     for (;;) {
       SourceFrame frame = source_.next();
       if (const auto due = due_(frame)) {
-        if (!start) start = Clock::now() - *due;
+        const Clock::time_point now = Clock::now();
+        // Compared as durations, so that no stamp overflows a time.
+        if (!start || *due > (now - *start) + kLongestPause || *due < (now - *start) - kLongestPause)
+          start = now - *due;
         std::unique_lock lock(mutex_);
         if (wake_.wait_until(lock, *start + *due, [&] { return stopped_; })) break;
       }
@@ -82,9 +94,12 @@ void PacedSource::run() {
         const int64_t stamp = frame.frame.stamp_ns();
         if (last_stamp && stamp <= *last_stamp) {
           ++late_;
+          left_out.skip(frame.frame);
           continue;
         }
         last_stamp = stamp;
+        frame.frame = left_out.with_motion(std::move(frame.frame));
+        left_out = {};
       }
       dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
     }

@@ -17,11 +17,12 @@ constexpr int kSupportCell = 4;  // [px] cells of the motion segmentation when i
 SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options,
                        const Detectors& detectors, bool threaded, bool realtime)
     : camera_(camera),
+      noise_(noise),
       options_(options),
       schedule_(detectors.schedule),
       prompt_(detectors.prompt),
       slow_(detectors.slow),
-      carried_(camera, options.carried) {
+      carried_(camera, noise, options.carried) {
   options_.rivals.flow = options_.carried.flow;
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
@@ -95,7 +96,7 @@ MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_f
 
 MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                               const MoverMask& moving) const {
-  MoverMask mask = silhouettes(image.depth, unmasked, options_.carried.silhouette);
+  MoverMask mask = silhouettes(image.depth, unmasked, camera_, noise_, options_.carried.silhouette);
   if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
   unite(mask, given, camera_.width, camera_.height);
   if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);

@@ -69,6 +69,7 @@ class SceneStage {
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
 
   Camera camera_;
+  SensorNoise noise_;
   DynamicsOptions options_;
   DetectionSchedule schedule_;
   std::vector<std::shared_ptr<Detector>> prompt_;
