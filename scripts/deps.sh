@@ -8,6 +8,7 @@
 #   scripts/deps.sh python   what `make python` and `pip install .` need
 #   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
+#   scripts/deps.sh ros      what `make test` needs, and ROS 1 for the tests of its package
 #   scripts/deps.sh slurm    the same and Slurm, for bench/slurm/one_node_cluster.sh
 #
 # DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
@@ -34,9 +35,17 @@ case "${1:-}" in
   check) packages=("${needed[@]}") ;;
   python) packages=("${needed[@]}" "${python[@]}") ;;
   docs) packages=(doxygen) ;;
+  ros)
+    packages+=(
+      catkin libroscpp-dev libtf2-ros-dev libnodeletlib-dev libnodeletlib-tools ros-message-generation ros-geometry-msgs
+      ros-std-msgs libgeometry-msgs-dev libnav-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev
+      libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev rosout python3-roslaunch python3-std-msgs
+      python3-geometry-msgs python3-visualization-msgs python3-diagnostic-msgs python3-std-srvs python3-pil
+    )
+    ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|slurm]" >&2; exit 2 ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|ros|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

@@ -73,7 +73,8 @@ struct Statistics {
   std::map<std::string, std::vector<int>> stage_histograms;
 };
 
-/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map() and the switches.
+/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map(), dense_map_task() and
+/// the switches.
 /// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
 /// Several systems may live in one process and know nothing of each other.
 ///
@@ -129,6 +130,9 @@ class DKB_SLAM_API Slam {
 
   /// The still world from the keyframes so far; takes seconds. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
+  /// The same, to be called on any thread and at any time: it makes the map of the moment of this call, which itself
+  /// takes no time. For robots that want a grid while they go on tracking.
+  std::function<DenseMap()> dense_map_task() const;
 
   /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is
   /// set.

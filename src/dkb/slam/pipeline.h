@@ -56,7 +56,7 @@ class Pipeline {
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
   const TrackingMap& map() const { return tracker_.map(); }
   // From the keyframes so far. Throws InputError when dense mapping is off.
-  DenseMap dense_map() const;
+  std::function<DenseMap()> dense_map_task() const;
 
   std::vector<Event> take_events();
 
