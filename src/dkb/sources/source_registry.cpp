@@ -8,22 +8,13 @@
 #include "dkb/devices/module_device.h"
 #include "dkb/devices/oni_file.h"
 #include "dkb/devices/v4l2_device.h"
+#include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
 namespace {
-
-bool is_rosbag2(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) return false;
-  if (fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error)) return false;
-  if (fs::exists(folder / "metadata.yaml", error)) return true;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-    if (const std::string ending = it->path().extension(); ending == ".db3" || ending == ".mcap") return true;
-  return false;
-}
 
 std::unique_ptr<Source> open_recording(const std::string& where, const SourceOptions& options) {
   return std::make_unique<RecordedSource>(where, options);
