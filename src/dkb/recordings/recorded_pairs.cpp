@@ -2,6 +2,7 @@
 #include "dkb/recordings/recorded_pairs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
@@ -108,7 +109,9 @@ std::optional<StoredPair> RecordedPairs::next() {
     if (ended_) {
       if (filter_.seen() == 0)
         throw InputError(name_ + ": no colour image of " + decoder_->colour.topic.name + " has a depth image of " +
-                         decoder_->depth.topic.name + " within 0.02 s; both must be of one clock");
+                         decoder_->depth.topic.name + " within " +
+                         std::to_string(std::lround(1000 * AssociationOptions().max_difference)) +
+                         " ms; both must be of one clock");
       filter_.require_any(name_);
       return std::nullopt;
     }

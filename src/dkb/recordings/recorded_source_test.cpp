@@ -324,7 +324,7 @@ TEST_F(RecordedSourceTest, ClocksThatHaveNothingInCommonAreTold) {
     list.add("/depth/image", "sensor_msgs/Image", n, image_message(n * kInterval, "32FC1", 32, 24, depth));
   }
   EXPECT_EQ(refused(list),
-            "r.bag: no colour image of /rgb/image has a depth image of /depth/image within 0.02 s; both must be of one "
+            "r.bag: no colour image of /rgb/image has a depth image of /depth/image within 20 ms; both must be of one "
             "clock");
 }
 
