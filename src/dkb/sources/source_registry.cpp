@@ -11,6 +11,7 @@
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -100,6 +101,15 @@ bool is_live(const std::string& where) {
   const std::vector<SourceKind> kinds = source_kinds();
   const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SourceKind& k) { return k.fits(where); });
   return kind != kinds.end() && kind->live;
+}
+
+PriorKind prior_kind_named(const std::string& name, const std::string& option) {
+  const std::vector<std::string> names = {"none", "odom", "imu", "auto"};
+  constexpr PriorKind kinds[] = {PriorKind::none, PriorKind::odometry, PriorKind::imu, PriorKind::automatic};
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(option + ": there is no \"" + name + "\"" + did_you_mean(name, names) + "; none, odom, imu, auto");
+  return kinds[found - names.begin()];
 }
 
 std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options) {
