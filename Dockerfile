@@ -12,7 +12,7 @@ RUN make install PREFIX=/opt/dkb-slam
 FROM debian:12-slim
 RUN apt-get update -qq \
  && apt-get install -y -qq --no-install-recommends libpng16-16 libjpeg62-turbo libyaml-cpp0.7 libfmt9 libbz2-1.0 \
-      liblz4-1 libzstd1 libsqlite3-0 libopencv-dnn406 libopencv-features2d406 \
+      liblz4-1 libzstd1 libsqlite3-0 libopenni2-0 libopencv-dnn406 libopencv-features2d406 \
  && rm -rf /var/lib/apt/lists/*
 COPY --from=build /opt/dkb-slam /usr/local
 RUN ldconfig

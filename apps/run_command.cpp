@@ -130,20 +130,11 @@ Options options_of(const RunArguments& args) {
   return options;
 }
 
-PriorKind prior_kind(const std::string& name) {
-  const std::vector<std::string> names = {"none", "odom", "imu", "auto"};
-  constexpr PriorKind kinds[] = {PriorKind::none, PriorKind::odometry, PriorKind::imu, PriorKind::automatic};
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw InputError("--prior: there is no \"" + name + "\"" + did_you_mean(name, names) + "; none, odom, imu, auto");
-  return kinds[found - names.begin()];
-}
-
 std::unique_ptr<Source> open_source(const RunArguments& args, bool threaded) {
   SourceOptions options = args.reading;
   options.threaded = threaded;
   // What is given is not to be mixed with what the recording holds.
-  options.prior = args.prior_file.empty() ? prior_kind(args.prior) : PriorKind::none;
+  options.prior = args.prior_file.empty() ? prior_kind_named(args.prior, "--prior") : PriorKind::none;
   try {
     return open_source(args.source, options);
   } catch (const InputError&) {

@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "bindings.h"
+#include "dkb/sources/source_registry.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb::python {
@@ -136,14 +137,6 @@ class PySource final : public Closable {
   bool unplugged_ = false;
 };
 
-PriorKind prior_kind(const std::string& name) {
-  if (name == "none") return PriorKind::none;
-  if (name == "odom") return PriorKind::odometry;
-  if (name == "imu") return PriorKind::imu;
-  if (name == "auto") return PriorKind::automatic;
-  throw InputError("prior: there is no \"" + name + "\"; priors: none, odom, imu, auto");
-}
-
 std::shared_ptr<PySource> open(const py::object& where, const py::object& camera, const py::kwargs& a) {
   SourceOptions options;
   options.start = argument<double>(a["start"], "start", "a number of seconds");
@@ -151,7 +144,7 @@ std::shared_ptr<PySource> open(const py::object& where, const py::object& camera
   if (!a["max_frames"].is_none()) options.max_frames = argument<int64_t>(a["max_frames"], "max_frames", "an int");
   options.skip_pairs = argument<int64_t>(a["skip_pairs"], "skip_pairs", "an int");
   options.threaded = argument<bool>(a["threaded"], "threaded", "a bool");
-  options.prior = prior_kind(argument<std::string>(a["prior"], "prior", "a str"));
+  options.prior = prior_kind_named(argument<std::string>(a["prior"], "prior", "a str"), "prior");
   for (const auto& [name, topic] :
        {std::pair{"colour_topic", &options.colour_topic}, std::pair{"depth_topic", &options.depth_topic},
         std::pair{"info_topic", &options.info_topic}, std::pair{"odom_topic", &options.odom_topic},

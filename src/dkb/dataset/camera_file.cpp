@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <limits>
 #include <vector>
 
 #include "dkb/util/errors.h"
@@ -101,6 +102,11 @@ std::string Camera::to_yaml() const {
   Settings settings;
   bind(&settings, &copy);
   return settings.to_yaml();
+}
+
+Camera without_limits(Camera camera) {
+  camera.depth_min = 0, camera.depth_max = std::numeric_limits<float>::max();
+  return camera;
 }
 
 CameraChoice choose_camera(const std::string& option, const fs::path& dataset) {

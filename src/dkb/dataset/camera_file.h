@@ -11,6 +11,9 @@ namespace dkb {
 // The text of a camera file (Camera::load), which `name` stands for in messages.
 Camera parse_camera(const std::string& text, const std::string& name);
 
+// A camera without limits of depth: what is read by it loses nothing.
+Camera without_limits(Camera camera);
+
 struct CameraChoice {
   CameraModel camera;
   std::string origin;  // for people: `fr1 (from the folder's name)`, `data/camera.yaml`

@@ -210,7 +210,7 @@ FolderLayout open_scannet(const fs::path& folder) {
 }  // namespace
 
 FolderLayout open_folder_layout(const fs::path& folder) {
-  if (there(folder / "associations.txt") || there(folder / "rgb.txt")) return open_tum(folder);
+  if (has_tum_lists(folder)) return open_tum(folder);
   if (there(folder / "color.txt") && there(folder / "aligned_depth.txt")) return open_openloris(folder);
   if (const NumberedImages colour = numbered_images(folder, "frame-", {".color.png", ".color.jpg"}); !colour.empty()) {
     FolderLayout layout;

@@ -13,7 +13,14 @@ FolderLayout selected_pairs(const std::filesystem::path& folder, const SourceOpt
   return layout;
 }
 
-CameraChoice camera_of(const std::filesystem::path& folder, const FolderLayout& layout, const SourceOptions& options) {
+std::string described(const TumDataset& dataset, const CameraChoice& camera) {
+  return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
+}
+
+}  // namespace
+
+CameraChoice choose_folder_camera(const std::filesystem::path& folder, const FolderLayout& layout,
+                                  const SourceOptions& options) {
   const bool told = !options.camera.empty() || std::filesystem::exists(folder / "camera.yaml");
   if (!told && layout.camera) return *layout.camera;
   try {
@@ -24,15 +31,9 @@ CameraChoice camera_of(const std::filesystem::path& folder, const FolderLayout& 
   }
 }
 
-std::string described(const TumDataset& dataset, const CameraChoice& camera) {
-  return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
-}
-
-}  // namespace
-
 FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOptions& options)
     : layout_(selected_pairs(folder, options)) {
-  const CameraChoice choice = camera_of(folder, layout_, options);
+  const CameraChoice choice = choose_folder_camera(folder, layout_, options);
   choice.camera.check();
   description_ = described(layout_.dataset, choice);
   start(pairs_in_files(layout_.dataset.pairs, choice.camera, layout_.fit_colour), choice.camera, options.threaded);

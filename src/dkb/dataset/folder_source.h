@@ -6,6 +6,10 @@
 
 namespace dkb {
 
+// The option's, else camera.yaml in the folder, else what the layout or the folder's name tells, else the fallback.
+CameraChoice choose_folder_camera(const std::filesystem::path& folder, const FolderLayout& layout,
+                                  const SourceOptions& options);
+
 // A folder in one of the known layouts as a source.
 class FolderSource final : public ReaderSource {
  public:

@@ -124,6 +124,11 @@ std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, c
   return result;
 }
 
+bool has_tum_lists(const fs::path& folder) {
+  std::error_code error;
+  return fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error);
+}
+
 TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& options) {
   options.check();
   std::error_code ec;

@@ -35,6 +35,9 @@ struct TumDataset {
   std::vector<DatasetPair> pairs;  // colour stamps strictly rising, at least one
 };
 
+// Whether a folder is in TUM layout, by what lies in it.
+bool has_tum_lists(const std::filesystem::path& folder);
+
 // Reads the lists of a folder in TUM layout (no image is opened): the rows of associations.txt as they are
 // (`rgb_stamp rgb_path depth_stamp depth_path`, or depth first: told by the folders' names) when it is there, else
 // rgb.txt and depth.txt (`stamp path`), paired one to one, nearest stamps first. Comments, blank lines and CRLF are

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
 
@@ -14,7 +15,31 @@ namespace {
 constexpr int kPollMs = 100;  // so long may stop() have to wait
 constexpr std::chrono::milliseconds kReopenEvery{500};
 
+std::string size_text(const Camera& camera) {
+  return std::to_string(camera.width) + "x" + std::to_string(camera.height);
+}
+
 }  // namespace
+
+Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options) {
+  Camera camera = told;
+  if (!options.camera.empty()) {
+    camera = choose_camera(options.camera, {}).camera;
+  } else if (!(told.fx > 0)) {
+    if (!options.fallback_camera) throw InputError(name + ": does not tell its camera; give --camera FILE");
+    camera = *options.fallback_camera;
+  }
+  if (camera.width != told.width || camera.height != told.height)
+    throw InputError(name + ": its images are of " + size_text(told) + " px, the camera is of " + size_text(camera) +
+                     "; give the camera that took them");
+  if (camera.fps == 0) camera.fps = told.fps;
+  try {
+    camera.check();
+  } catch (const InvalidOption& e) {
+    throw InputError(name + ": " + e.what() + "; give --camera FILE");
+  }
+  return camera;
+}
 
 DeviceSource::DeviceSource(std::unique_ptr<ImageDevice> device, const Camera& camera, const SourceOptions& options)
     : device_(std::move(device)), camera_(camera), options_(options) {}
@@ -104,13 +129,22 @@ SourceFrame DeviceSource::next() {
       std::optional<SourceFrame> frame = frame_of(*pair);
       if (frame) return *frame;
     }
+    if (device_ended_) {
+      pairs_.restart();  // what is left over has no partner
+      unpaired_ = pairs_.unpaired();
+      return none;
+    }
     DeviceImages images;
     const DeviceState state = device_->next(kPollMs, &images);
     if (std::vector<std::string> lines = device_->take_warnings(); !lines.empty()) {
       const std::lock_guard lock(mutex_);
       warnings_.insert(warnings_.end(), lines.begin(), lines.end());
     }
-    if (state == DeviceState::ended) return none;
+    if (state == DeviceState::ended) {
+      device_ended_ = true;
+      pairs_.close();
+      continue;
+    }
     if (state == DeviceState::unplugged) {
       unplugged_ = true;
       gone_since_ = std::chrono::steady_clock::now();

@@ -65,7 +65,8 @@ class DeviceSource final : public Source {
   size_t seen_ = 0;    // pairs
   int64_t taken_ = 0;  // pairs from options_.start on
   std::optional<int64_t> first_stamp_;
-  bool unplugged_ = false, ended_ = false;
+  bool unplugged_ = false, device_ended_ = false;
+  bool ended_ = false;  // by the options
   // The clocks of some devices start anew when they are plugged in again: then the time that has passed meanwhile goes
   // by this computer's clock.
   int64_t shift_ns_ = 0, last_stamp_ = 0;
@@ -76,5 +77,9 @@ class DeviceSource final : public Source {
   std::condition_variable wake_;
   bool stopped_ = false;
 };
+
+// The camera of a device or a recording of one: the option's, else what it tells (`told`; fx is 0 where it tells only
+// the size of its images and their rate), else the fallback. Throws InputError, which begins with `name`.
+Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options);
 
 }  // namespace dkb

@@ -136,6 +136,18 @@ TEST(DeviceSource, APairIsNotHeldBackWhereNothingLaterCanBeNearer) {
   EXPECT_EQ(stamps_of(source), (Stamps{100, 133}));
 }
 
+TEST(DeviceSource, TheEndOfTheImagesSettlesTheLastPair) {
+  Steps steps;
+  add_pair(&steps, 100, 85);  // with no other image known, a nearer one could come
+  DeviceSource one(std::make_unique<ScriptedDevice>(steps), small_camera(), {});
+  EXPECT_EQ(stamps_of(one), (Stamps{100}));
+  EXPECT_EQ(one.counts().unpaired, 0);
+  steps.push_back({DeviceState::images, 150, false});
+  DeviceSource other(std::make_unique<ScriptedDevice>(steps), small_camera(), {});
+  EXPECT_EQ(stamps_of(other), (Stamps{100}));
+  EXPECT_EQ(other.counts().unpaired, 1);
+}
+
 TEST(DeviceSource, UnplugIsToldOnceAndStampsGoOnRisingAfterIt) {
   Steps steps;
   add_pair(&steps, 100, 100), add_pair(&steps, 133, 133);

@@ -2,14 +2,21 @@
 #include "dkb/devices/image_pairs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
+
+#include "dkb/dataset/tum_dataset.h"
 
 namespace dkb {
 namespace {
 
-constexpr int64_t kMaxDifference = 20'000'000;  // [ns] between the images of a pair
-constexpr size_t kMostWaiting = 8;              // images of a stream whose other stream is silent
+constexpr size_t kMostWaiting = 8;  // images of a stream whose other stream is silent
+
+// [ns] between the images of a pair
+int64_t max_difference() {
+  return std::llround(1e9 * (AssociationOptions().max_difference + kStampRounding));
+}
 
 }  // namespace
 
@@ -35,6 +42,7 @@ void ImagePairs::add(const DeviceImage& image, bool is_depth) {
 }
 
 std::optional<ImagePair> ImagePairs::take() {
+  const int64_t most_apart = max_difference();
   std::deque<KeptImage>&colours = colour_.waiting, &depths = depth_.waiting;
   const auto apart = [](const KeptImage& a, const KeptImage& b) { return std::abs(a.stamp_ns - b.stamp_ns); };
   while (!colours.empty() && !depths.empty()) {
@@ -42,9 +50,9 @@ std::optional<ImagePair> ImagePairs::take() {
     while (depths.size() > 1 && apart(colour, depths[1]) <= apart(colour, depths[0])) drop_front(depth_);
     const int64_t difference = apart(colour, depths.front());
     // What comes later is one interval further on at least, so half of it is near enough not to wait.
-    const bool depth_settled = depths.size() > 1 || depths.front().stamp_ns >= colour.stamp_ns ||
+    const bool depth_settled = closed_ || depths.size() > 1 || depths.front().stamp_ns >= colour.stamp_ns ||
                                (depth_.interval > 0 && 2 * difference <= depth_.interval);
-    if (difference > kMaxDifference) {
+    if (difference > most_apart) {
       if (depths.front().stamp_ns > colour.stamp_ns)
         drop_front(colour_);
       else
@@ -53,7 +61,7 @@ std::optional<ImagePair> ImagePairs::take() {
     }
     if (!depth_settled) return std::nullopt;
     // The depth image may suit the next colour image better.
-    const bool colour_settled = colours.size() > 1 || colour.stamp_ns >= depths.front().stamp_ns ||
+    const bool colour_settled = closed_ || colours.size() > 1 || colour.stamp_ns >= depths.front().stamp_ns ||
                                 (colour_.interval > 0 && 2 * difference <= colour_.interval);
     if (colours.size() > 1 && apart(colours[1], depths.front()) < difference) {
       drop_front(colour_);

@@ -38,13 +38,16 @@ inline bool is_stamp(int64_t ns) {
   return ns >= 0 && ns <= kMaxStampNs;
 }
 
-// Pairs images of two streams, each colour image with the depth image of the nearest stamp within 20 ms, each used
-// once. An image whose stamp is not after the one before in its stream, or is none, is left out.
+// Pairs images of two streams, each colour image with the depth image of the nearest stamp that is as near as the
+// lists of a folder allow, each used once. An image whose stamp is not after the one before in its stream, or is none,
+// is left out.
 class ImagePairs {
  public:
   void add(const DeviceImage& image, bool is_depth);
   // The next pair that nothing still to come can better.
   std::optional<ImagePair> take();
+  // No more images will come.
+  void close() { closed_ = true; }
   // What waits is forgotten: the device was unplugged.
   void restart();
 
@@ -61,6 +64,7 @@ class ImagePairs {
 
   Stream colour_, depth_;
   int64_t unpaired_ = 0, late_ = 0;
+  bool closed_ = false;
 };
 
 }  // namespace dkb

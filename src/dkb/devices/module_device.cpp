@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 
-#include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/devices/device_module.h"
 #include "dkb/devices/device_source.h"
@@ -84,38 +83,20 @@ class ModuleDevice final : public ImageDevice {
   void* device_ = nullptr;
 };
 
-Camera camera_of(const ModuleDevice& device, const std::string& where, const SourceOptions& options) {
+Camera told_camera(const ModuleDevice& device) {
   const DkbDeviceCamera told = device.camera();
   Camera camera;
-  if (!options.camera.empty()) {
-    camera = choose_camera(options.camera, {}).camera;
-  } else if (told.fx > 0) {
-    camera.width = told.width, camera.height = told.height;
-    camera.fx = told.fx, camera.fy = told.fy, camera.cx = told.cx, camera.cy = told.cy;
-    camera.k1 = told.k1, camera.k2 = told.k2, camera.p1 = told.p1, camera.p2 = told.p2, camera.k3 = told.k3;
-    camera.depth_factor = told.depth_factor;
-  } else if (options.fallback_camera) {
-    camera = *options.fallback_camera;
-  } else {
-    throw InputError(where + ": does not tell its camera; give --camera FILE");
-  }
-  if (camera.width != told.width || camera.height != told.height)
-    throw InputError(where + ": gives images of " + std::to_string(told.width) + "x" + std::to_string(told.height) +
-                     " px, the camera is of " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
-                     "; give the camera of this device");
-  if (camera.fps == 0) camera.fps = told.fps;
-  try {
-    camera.check();
-  } catch (const InvalidOption& e) {
-    throw InputError(where + ": " + e.what() + "; give --camera FILE");
-  }
+  camera.width = told.width, camera.height = told.height, camera.fps = told.fps;
+  camera.fx = told.fx, camera.fy = told.fy, camera.cx = told.cx, camera.cy = told.cy;
+  camera.k1 = told.k1, camera.k2 = told.k2, camera.p1 = told.p1, camera.p2 = told.p2, camera.k3 = told.k3;
+  camera.depth_factor = told.depth_factor;
   return camera;
 }
 
 std::unique_ptr<Source> open_device(const DeviceModule& module, const std::string& where, const std::string& place,
                                     const SourceOptions& options) {
   auto device = std::make_unique<ModuleDevice>(api_of(module, where), where, place);
-  const Camera camera = camera_of(*device, where, options);
+  const Camera camera = device_camera(where, told_camera(*device), options);
   return std::make_unique<DeviceSource>(std::move(device), camera, options);
 }
 

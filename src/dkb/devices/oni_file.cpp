@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/devices/device_source.h"
 #include "dkb/devices/oni_codecs.h"
@@ -275,30 +274,16 @@ class OniFile final : public ImageDevice {
 
 Camera camera_of(const OniFile& file, const std::string& name, const SourceOptions& options) {
   const Stream& stream = file.colour();
-  Camera camera;
-  if (!options.camera.empty()) {
-    camera = choose_camera(options.camera, {}).camera;
-  } else if (stream.horizontal_fov > 0 && stream.vertical_fov > 0) {
-    camera.width = stream.width, camera.height = stream.height;
-    camera.fx = stream.width / (2 * std::tan(stream.horizontal_fov / 2));
-    camera.fy = stream.height / (2 * std::tan(stream.vertical_fov / 2));
-    camera.cx = (stream.width - 1) / 2.0, camera.cy = (stream.height - 1) / 2.0;
-  } else if (options.fallback_camera) {
-    camera = *options.fallback_camera;
-  } else {
-    throw InputError(name + ": does not tell its camera; give --camera FILE");
+  Camera told;
+  told.width = stream.width, told.height = stream.height, told.fps = std::clamp(stream.fps, 1, 1000);
+  told.fx = told.fy = 0;
+  if (stream.horizontal_fov > 0 && stream.vertical_fov > 0) {
+    told.fx = stream.width / (2 * std::tan(stream.horizontal_fov / 2));
+    told.fy = stream.height / (2 * std::tan(stream.vertical_fov / 2));
+    told.cx = (stream.width - 1) / 2.0, told.cy = (stream.height - 1) / 2.0;
   }
-  if (camera.width != stream.width || camera.height != stream.height)
-    throw InputError(name + ": holds images of " + std::to_string(stream.width) + "x" + std::to_string(stream.height) +
-                     " px, the camera is of " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
-                     "; give the camera of this recording");
+  Camera camera = device_camera(name, told, options);
   camera.depth_factor = file.depth_factor();  // the recording knows its unit
-  if (camera.fps == 0) camera.fps = std::clamp(stream.fps, 1, 1000);
-  try {
-    camera.check();
-  } catch (const InvalidOption& e) {
-    throw InputError(name + ": " + e.what() + "; give --camera FILE");
-  }
   return camera;
 }
 

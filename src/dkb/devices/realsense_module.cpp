@@ -51,10 +51,15 @@ class Device {
   }
 
   int next(int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth) {
-    rs2::frameset frames;
-    if (!pipeline_.try_wait_for_frames(&frames, static_cast<unsigned>(timeout_ms)))
-      return gone() ? dkb_unplugged : dkb_waiting;
-    frames_ = align_.process(frames);
+    try {
+      rs2::frameset frames;
+      if (!pipeline_.try_wait_for_frames(&frames, static_cast<unsigned>(timeout_ms)))
+        return gone() ? dkb_unplugged : dkb_waiting;
+      frames_ = align_.process(frames);
+    } catch (const rs2::error&) {  // also of a camera that is pulled out meanwhile
+      if (gone()) return dkb_unplugged;
+      throw;
+    }
     give(frames_.get_color_frame(), dkb_rgb8, colour);
     give(frames_.get_depth_frame(), dkb_depth_u16, depth);
     return dkb_images;
@@ -105,7 +110,11 @@ void* open_device(const char* place, char* error, size_t error_size) {
 }
 
 void describe_device(void* device, DkbDeviceCamera* camera) {
-  static_cast<Device*>(device)->describe(camera);
+  DkbDeviceCamera told{};
+  char error[1];
+  if (dkb::module::guarded(false, error, sizeof error,
+                           [&] { return static_cast<Device*>(device)->describe(&told), true; }))
+    *camera = told;
 }
 
 int next_images(void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error,

@@ -99,7 +99,7 @@ class Stream {
     fd_.reset();
   }
 
-  // The newest image that is there; false when there is none. ENODEV comes back as `gone`.
+  // The oldest image that has not been given out; false when there is none. ENODEV comes back as `gone`.
   bool take(DeviceImages* images, bool* gone) {
     give_back();
     v4l2_buffer buffer = empty_buffer();

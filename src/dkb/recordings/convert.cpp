@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "dkb/dataset/camera_file.h"
-#include "dkb/dataset/tum_dataset.h"
+#include "dkb/dataset/folder_source.h"
 #include "dkb/recordings/depth_registration.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
@@ -15,6 +15,7 @@
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
 #include "dkb/recordings/stamp_pairing.h"
+#include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 
@@ -43,8 +44,9 @@ bool pairs_by_stamps(const std::vector<DatasetPair>& pairs) {
 }
 
 Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
-  const TumDataset dataset = open_tum_dataset(in);
-  const Camera camera = choose_camera(options.source.camera, in).camera;
+  const FolderLayout layout = open_folder_layout(in);
+  const TumDataset& dataset = layout.dataset;
+  const Camera camera = choose_folder_camera(in, layout, options.source).camera;
   const std::string text = camera_text(camera, options.source.camera, in);
   const bool own_stamps = !is_recording_name(out) || pairs_by_stamps(dataset.pairs);
   if (!own_stamps)
@@ -56,10 +58,11 @@ Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertO
   for (const DatasetPair& pair : dataset.pairs) {
     try {
       const std::string colour = read_file(pair.colour_path);
-      const Picture picture = decode_picture(colour, pair.colour_path.string());
+      Picture picture = decode_picture(colour, pair.colour_path.string());
+      if (layout.fit_colour) picture = resampled(picture, camera.width, camera.height);
       const DepthImage depth = read_depth(pair.depth_path, without_limits(camera));
       PairToWrite write{pair.stamp_ns, own_stamps ? pair.depth_stamp_ns : pair.stamp_ns, colour, &picture, &depth};
-      if (options.raw) write.colour_file = {};
+      if (options.raw || layout.fit_colour) write.colour_file = {};
       writer->add(write);
       ++converted.count;
     } catch (const OutputError&) {
@@ -73,18 +76,30 @@ Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertO
   return converted;
 }
 
-// A message in the ROS 1 encoding; nothing for types that are not known here.
-std::optional<std::string> as_ros1(const std::string& type, MessageEncoding encoding, std::string_view bytes) {
-  if (!has_definition(type)) return std::nullopt;
-  if (encoding == MessageEncoding::ros1) return std::string(bytes);
-  if (type == "sensor_msgs/Image") return encode(decode_image(bytes, encoding));
-  if (type == "sensor_msgs/CompressedImage") return encode(decode_compressed_image(bytes, encoding));
-  if (type == "sensor_msgs/CameraInfo") return encode(decode_camera_info(bytes, encoding));
-  if (type == "sensor_msgs/Imu") return encode(decode_imu(bytes, encoding));
-  if (type == "nav_msgs/Odometry") return encode(decode_odometry(bytes, encoding));
-  if (type == "tf2_msgs/TFMessage") return encode(decode_transforms(bytes, encoding));
-  if (type == "std_msgs/String") return encode_string(decode_string(bytes, encoding));
-  return std::nullopt;
+// Brings messages into the ROS 1 encoding.
+using ToRos1 = std::string (*)(std::string_view bytes, MessageEncoding encoding);
+
+template <auto decode>
+std::string encoded_anew(std::string_view bytes, MessageEncoding encoding) {
+  return encode(decode(bytes, encoding));
+}
+
+// Null where messages of this kind cannot be brought into it.
+ToRos1 to_ros1(const RecordedTopic& topic) {
+  if (!has_definition(topic.type)) return nullptr;
+  if (topic.encoding == MessageEncoding::ros1)
+    return [](std::string_view bytes, MessageEncoding) { return std::string(bytes); };
+  static const std::map<std::string, ToRos1> known = {
+      {"sensor_msgs/Image", encoded_anew<decode_image>},
+      {"sensor_msgs/CompressedImage", encoded_anew<decode_compressed_image>},
+      {"sensor_msgs/CameraInfo", encoded_anew<decode_camera_info>},
+      {"sensor_msgs/Imu", encoded_anew<decode_imu>},
+      {"nav_msgs/Odometry", encoded_anew<decode_odometry>},
+      {"tf2_msgs/TFMessage", encoded_anew<decode_transforms>},
+      {"std_msgs/String",
+       [](std::string_view bytes, MessageEncoding encoding) { return encode_string(decode_string(bytes, encoding)); }}};
+  const auto found = known.find(topic.type);
+  return found == known.end() ? nullptr : found->second;
 }
 
 // The camera file that goes along: the user's, else the recording's own; empty when there is none.
@@ -107,20 +122,25 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
                            const ConvertOptions& options) {
   const std::string camera = camera_text_of(in, options);
   const auto writer = write_recording(out, options.compression);
-  std::vector<std::optional<size_t>> topics;  // by the stream's
+  struct Written {
+    size_t topic = 0;
+    ToRos1 to_ros1 = nullptr;  // null: it is left out
+  };
+  std::vector<Written> topics;  // by the stream's
   const auto add_topics = [&] {
     std::vector<std::string> names;
     for (size_t i = topics.size(); i < stream.topics().size(); ++i) {
       const RecordedTopic& topic = stream.topics()[i];
-      const bool latched = topic.name == "/tf_static";
+      const bool latched = topic.name == kTransforms;
       const bool replaced = topic.name == kCameraTopic && !camera.empty();
       topics.emplace_back();
       if (replaced) continue;
-      if (has_definition(topic.type))
-        topics.back() = writer->add_topic(topic.name, topic.type, latched);
+      topics.back().to_ros1 = to_ros1(topic);
+      if (topics.back().to_ros1 != nullptr)
+        topics.back().topic = writer->add_topic(topic.name, topic.type, latched);
       else
-        options.warn(in.string() + ": topic " + topic.name + " of type " + topic.type +
-                     " is left out; its type is not known");
+        options.warn(in.string() + ": topic " + topic.name + " of type " + topic.type + " is left out; its type is " +
+                     (has_definition(topic.type) ? "not converted from ROS 2" : "not known"));
     }
   };
   if (!camera.empty()) writer->add_text(kCameraText, camera);
@@ -132,12 +152,11 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
     if (camera_topic) writer->write(*camera_topic, message->recorded_ns, encode_string(camera));
     camera_topic.reset();
     add_topics();
-    if (!topics[message->topic]) continue;
+    const Written& written = topics[message->topic];
+    if (written.to_ros1 == nullptr) continue;
     const RecordedTopic& topic = stream.topics()[message->topic];
     try {
-      const auto bytes = as_ros1(topic.type, topic.encoding, message->bytes);
-      if (!bytes) continue;
-      writer->write(*topics[message->topic], message->recorded_ns, *bytes);
+      writer->write(written.topic, message->recorded_ns, written.to_ros1(message->bytes, topic.encoding));
       ++converted.count;
     } catch (const OutputError&) {
       throw;
@@ -162,7 +181,8 @@ class PairsToFolder {
       if (topic.name == contents.depth.name) encoding_[StampPairing::depth] = topic.encoding;
     }
     if (contents.depth_camera)
-      registration_.emplace(contents.depth_camera->camera, contents.camera, contents.depth_camera->colour_from_depth);
+      registration_.emplace(contents.depth_camera->camera, without_limits(contents.camera),
+                            contents.depth_camera->colour_from_depth);
   }
 
   void add(StampPairing::Kind kind, const RecordedMessage& message) {
@@ -247,9 +267,10 @@ Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs:
 Converted convert(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
   std::error_code error;
   if (!fs::exists(in, error)) throw InputError(in.string() + ": no such file or folder");
-  const bool folder =
-      fs::is_directory(in, error) && (fs::exists(in / "associations.txt", error) || fs::exists(in / "rgb.txt", error));
-  if (folder) return convert_folder(in, out, options);
+  if (fs::is_directory(in, error) && !is_rosbag2(in)) return convert_folder(in, out, options);
+  if (in.extension() == ".oni")
+    throw InputError(in.string() + ": is a recording of OpenNI, not of ROS messages; `dkb-slam record " + in.string() +
+                     " --out " + out.string() + "` converts it");
   const auto stream = open_messages(in);
   return is_recording_name(out) ? convert_messages(*stream, in, out, options)
                                 : convert_to_folder(*stream, in, out, options);

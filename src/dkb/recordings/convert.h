@@ -18,10 +18,10 @@ struct ConvertOptions {
   std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
-// Writes a folder in TUM layout or a recording anew, as a folder, FILE.bag or FILE.mcap, so that the same frames are
-// read from it: images and depths bit for bit, stamps to the nanosecond, the camera file with all its fields. A
-// recording made of a recording keeps its messages in their order, of the types that are known here. Returns how many
-// pairs, or messages, there were. Throws InputError; what has the name of `out` is then what it was.
+// Writes a folder in any of the known layouts, or a recording, anew, as a folder, FILE.bag or FILE.mcap, so that the
+// same frames are read from it: images and depths bit for bit, stamps to the nanosecond, the camera file with all its
+// fields. A recording made of a recording keeps its messages in their order, of the types that are known here. Returns
+// how many pairs, or messages, there were. Throws InputError; what has the name of `out` is then what it was.
 struct Converted {
   size_t count = 0;
   std::string unit;  // "pairs", "messages"

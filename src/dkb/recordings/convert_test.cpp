@@ -161,6 +161,74 @@ TEST_F(ConvertTest, AKindThatIsNotWrittenIsRefused) {
   }
 }
 
+// Frames of the layouts' own cameras, of 640 x 480 px.
+TEST_F(ConvertTest, FoldersOfOtherLayoutsGiveTheSameFrames) {
+  const auto write_pair = [&](const std::string& colour, const std::string& depth, int n) {
+    ColourImage picture(640, 480, {static_cast<uint8_t>(50 * n), 100, 200});
+    Image<uint16_t> units(640, 480, static_cast<uint16_t>(1000 + n));
+    units(1, 1) = 65535, units(2, 2) = 0;
+    write_bytes(scratch / "in" / colour, encode_png(picture));
+    write_bytes(scratch / "in" / depth, encode_png(units));
+  };
+  for (const std::string layout : {"ICL-NUIM", "7-Scenes", "ScanNet"}) {
+    SCOPED_TRACE(layout);
+    for (const char* name : {"in", "out"}) fs::remove_all(scratch / name);
+    for (const char* name : {"rgb", "depth", "color", "intrinsic"}) fs::create_directories(scratch / "in" / name);
+    std::string list;
+    for (int n = 0; n < 3; ++n) {
+      const std::string number = std::to_string(n);
+      if (layout == "ICL-NUIM") {
+        write_pair("rgb/" + number + ".png", "depth/" + number + ".png", n);
+        list += number + " depth/" + number + ".png " + number + " rgb/" + number + ".png\n";
+      } else if (layout == "7-Scenes") {
+        write_pair("frame-00000" + number + ".color.png", "frame-00000" + number + ".depth.png", n);
+      } else {
+        write_bytes(scratch / "in/color" / (number + ".jpg"), encode_jpeg(noise_picture(3, 64, 48)));
+        write_bytes(scratch / "in/depth" / (number + ".png"), encode_png(noise_depth(4)));
+      }
+    }
+    if (layout == "ICL-NUIM") write_bytes(scratch / "in/associations.txt", list);
+    if (layout == "ScanNet")
+      write_bytes(scratch / "in/intrinsic/intrinsic_color.txt", "60 0 31 0\n0 60 23 0\n0 0 1 0\n0 0 0 1\n");
+    for (const char* out : {"a.mcap", "a.bag", "out"}) {
+      convert_and_compare("in", out);
+      EXPECT_EQ(frames(out)[1].frame.stamp_ns(), 33'333'000);
+    }
+  }
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+}
+
+TEST_F(ConvertTest, RecordingsOfOtherKindsAreRefusedWithARemedy) {
+  write_bytes(scratch / "a.oni", "NI10");
+  const std::string oni = (scratch / "a.oni").string(), out = (scratch / "b.bag").string();
+  EXPECT_EQ(input_error_of([&] { convert(oni, out, options); }),
+            oni + ": is a recording of OpenNI, not of ROS messages; `dkb-slam record " + oni + " --out " + out +
+                "` converts it");
+}
+
+TEST_F(ConvertTest, DepthOfACameraOfItsOwnIsRegisteredWithoutLimits) {
+  const auto writer = write_recording(scratch / "a.bag");
+  const auto write = [&](const std::string& topic, const std::string& type, const std::string& bytes) {
+    writer->write(writer->add_topic(topic, type), kFirst, bytes);
+  };
+  const std::string metres = metres_of(Image<uint16_t>(32, 24, 50'000), 2000);  // beyond the 10 m of the camera
+  const CameraInfoMessage info = info_message(small_camera(), "colour");
+  write(
+      "/tf_static", "tf2_msgs/TFMessage",
+      encode(TransformsMessage{transform_message("colour", "depth", {Eigen::Quaterniond::Identity(), {0.01, 0, 0}})}));
+  write("/rgb/camera_info", "sensor_msgs/CameraInfo", encode(info));
+  write("/depth/camera_info", "sensor_msgs/CameraInfo", encode(info_message(small_camera(), "depth")));
+  write("/rgb/image", "sensor_msgs/Image",
+        encode(image_message(kFirst, "rgb8", 32, 24, bytes_of(noise_picture(1)), "colour")));
+  write("/depth/image", "sensor_msgs/Image", encode(image_message(kFirst, "32FC1", 32, 24, metres, "depth")));
+  writer->close();
+  EXPECT_EQ(convert(scratch / "a.bag", scratch / "out", options).count, 1U);
+  Camera camera = choose_camera("", scratch / "out").camera;
+  EXPECT_EQ(camera.depth_max, small_camera().depth_max);
+  const fs::path depth = fs::directory_iterator(scratch / "out/depth")->path();
+  EXPECT_NEAR(read_depth(depth, without_limits(camera))(16, 12), 25, 1e-3);
+}
+
 TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {
   const auto writer = write_recording(scratch / "a.bag");
   ImuMessage imu;

@@ -26,6 +26,10 @@ DepthImage DepthRegistration::registered(const DepthImage& depth) const {
   // both cameras see equally fine.
   constexpr double kMargin = 0.1, kMaxReach = 8;  // [px]
   constexpr double kFarOutside = 1.0;             // [image sides] beyond the border distortion is not to be trusted
+  const auto near = [&](const Eigen::Vector2d& pixel) {  // false for what is no number
+    return pixel.x() > -kFarOutside * colour_.width && pixel.x() < (1 + kFarOutside) * colour_.width &&
+           pixel.y() > -kFarOutside * colour_.height && pixel.y() < (1 + kFarOutside) * colour_.height;
+  };
   DepthImage out(colour_.width, colour_.height);
   const Eigen::Matrix3d rotation = colour_from_depth_.matrix3();
   for (size_t i = 0; i < depth.size(); ++i) {
@@ -35,10 +39,9 @@ DepthImage DepthRegistration::registered(const DepthImage& depth) const {
     const Eigen::Vector3d point = rotation * seen + colour_from_depth_.translation;
     if (!(point.z() > 0)) continue;
     Eigen::Vector2d pixel = colour_.project(point);
-    if (!(pixel.x() > -kFarOutside * colour_.width && pixel.x() < (1 + kFarOutside) * colour_.width &&
-          pixel.y() > -kFarOutside * colour_.height && pixel.y() < (1 + kFarOutside) * colour_.height))
-      continue;
+    if (!near(pixel)) continue;
     if (colour_.distorted()) pixel = colour_.distort(pixel);
+    if (!near(pixel)) continue;  // strong distortion leaves the range of numbers
     const double reach = std::min(0.5 * scale_ * z / point.z() + kMargin, kMaxReach);
     const auto metres = static_cast<float>(point.z());
     const int left = std::max(0, static_cast<int>(std::ceil(pixel.x() - reach)));

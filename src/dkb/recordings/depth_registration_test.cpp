@@ -79,5 +79,13 @@ TEST(DepthRegistration, DepthBeyondTheCamerasLimitsIsNone) {
   EXPECT_EQ(DepthRegistration(camera, camera, nearer).registered(depth)(20, 15), 2.5f);
 }
 
+TEST(DepthRegistration, DistortionBeyondAllNumbersLeavesPointsOut) {
+  const Camera camera = camera_of(40, 30, 35);
+  Camera distorted = camera;
+  distorted.k1 = 1e300;
+  const DepthImage registered = DepthRegistration(camera, distorted, {}).registered(DepthImage(40, 30, 1));
+  EXPECT_LE(std::count_if(registered.data(), registered.data() + registered.size(), [](float z) { return z > 0; }), 1);
+}
+
 }  // namespace
 }  // namespace dkb

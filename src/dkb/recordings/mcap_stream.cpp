@@ -151,7 +151,10 @@ void McapStream::take(uint8_t op, std::string_view bytes) {
   } else if (op == kMetadataIndex) {
     const uint64_t at = in.u64();
     const std::optional<Record> record = record_at(at);
-    if (record && record->op == kMetadata) take_small(*record);
+    // The index may name one record any number of times.
+    if (!record || record->op != kMetadata || record->size > kMaxTexts - metadata_read_) return;
+    metadata_read_ += record->size;
+    take_small(*record);
   } else if (op == kChunkIndex) {
     add_chunk_index(in);
   } else if (op == kStatistics) {

@@ -54,6 +54,7 @@ class McapStream final : public MessageStream {
       chunks_;  // channels in each chunk of the index, by its place; empty = not known
   std::map<std::string, std::string> texts_;
   size_t texts_size_ = 0;
+  uint64_t metadata_read_ = 0;    // [bytes] by the index
   uint64_t start_ = 0, end_ = 0;  // of the data section
   bool told_cut_ = false, told_foreign_ = false;
 

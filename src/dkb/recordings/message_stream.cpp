@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "dkb/dataset/tum_dataset.h"
 #include "dkb/recordings/bag_stream.h"
 #include "dkb/recordings/mcap_stream.h"
 #include "dkb/recordings/recorded_topics.h"
@@ -146,6 +147,15 @@ class JoinedStream final : public MessageStream {
 };
 
 }  // namespace
+
+bool is_rosbag2(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error) || has_tum_lists(folder)) return false;
+  if (fs::exists(folder / "metadata.yaml", error)) return true;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    if (is_recording(it->path())) return true;
+  return false;
+}
 
 std::unique_ptr<MessageStream> open_messages(const fs::path& path) {
   std::error_code error;

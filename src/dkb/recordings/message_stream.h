@@ -47,6 +47,9 @@ class MessageStream {
   virtual std::vector<std::string> take_warnings() = 0;
 };
 
+// Whether a folder is a rosbag2's, by what lies in it.
+bool is_rosbag2(const std::filesystem::path& folder);
+
 // FILE.bag (ROS 1, version 2.0), FILE.mcap, FILE.db3 or the folder of a rosbag2, told apart by content. Throws
 // InputError when it is none of them.
 std::unique_ptr<MessageStream> open_messages(const std::filesystem::path& path);

@@ -221,6 +221,31 @@ TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
   EXPECT_TRUE(stream->take_warnings().empty());
 }
 
+// Each entry of the index costs as much as the record it names.
+TEST(MessageStream, AnMcapIndexThatNamesOneTextManyTimesIsReadInTime) {
+  const Scratch scratch;
+  const auto text = [](const std::string& value) {
+    ByteWriter out;
+    out.u32(static_cast<uint32_t>(value.size())), out.raw(value);
+    return out.bytes();
+  };
+  ByteWriter out;
+  out.raw(mcap::kMagic);
+  const uint64_t at = out.bytes().size();
+  const std::string metadata = text("note") + text(text("key") + text(std::string((1 << 24) - 100, 'x')));
+  out.u8(mcap::kMetadata), out.u64(metadata.size()), out.raw(metadata);
+  out.u8(mcap::kDataEnd), out.u64(4), out.u32(0);
+  const uint64_t summary = out.bytes().size();
+  for (int i = 0; i < 60'000; ++i) {
+    out.u8(mcap::kMetadataIndex), out.u64(20);
+    out.u64(at), out.u64(mcap::kRecordStart + metadata.size()), out.raw(text(""));
+  }
+  out.u8(mcap::kFooter), out.u64(mcap::kFooterSize), out.u64(summary), out.u64(0), out.u32(0);
+  out.raw(mcap::kMagic);
+  write_bytes(scratch / "a.mcap", out.bytes());
+  EXPECT_EQ(open_messages(scratch / "a.mcap")->metadata().at("note").size(), size_t{(1 << 24) - 100});
+}
+
 TEST(MessageStream, EncodingsOfOthersAreToldWhenThereIsNothingElse) {
   const Scratch scratch;
   write_bytes(scratch / "plain", plain_mcap("protobuf"));

@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <system_error>
 
+#include "dkb/dataset/camera_file.h"
 #include "dkb/image/image.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
+#include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
@@ -195,11 +196,6 @@ class RecordingPairWriter final : public PairWriter {
 };
 
 }  // namespace
-
-Camera without_limits(Camera camera) {
-  camera.depth_min = 0, camera.depth_max = std::numeric_limits<float>::max();
-  return camera;
-}
 
 std::unique_ptr<PairWriter> write_pairs(const fs::path& path, const Camera& camera, const std::string& camera_text,
                                         const PairWriterOptions& options) {

@@ -41,10 +41,4 @@ class PairWriter {
 std::unique_ptr<PairWriter> write_pairs(const std::filesystem::path& path, const Camera& camera,
                                         const std::string& camera_text, const PairWriterOptions& options = {});
 
-// A camera without limits of depth: what is read by it loses nothing.
-Camera without_limits(Camera camera);
-
-constexpr const char* kCameraTopic = "/dkb_slam/camera";
-constexpr const char* kCameraText = "dkb_slam_camera";
-
 }  // namespace dkb

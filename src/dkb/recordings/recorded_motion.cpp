@@ -51,25 +51,31 @@ Eigen::Vector3d turned(const Eigen::Matrix3d& b_from_a, const Eigen::Vector3d& i
 }  // namespace
 
 bool RecordedMotion::take_stamp(int64_t stamp_ns) {
-  if (!samples_.empty() && stamp_ns <= samples_.back().stamp_ns) return false;
+  constexpr int kMostRefused = 10;
+  if (!samples_.empty() && stamp_ns <= samples_.back().stamp_ns) {
+    if (++refused_ < kMostRefused) return false;
+    while (!samples_.empty() && samples_.back().stamp_ns >= stamp_ns) samples_.pop_back();
+  }
+  refused_ = 0;
   if (samples_.size() >= kMaxSamples) samples_.pop_front();
   return true;
 }
 
-void RecordedMotion::add(const OdometryMessage& message) {
+bool RecordedMotion::add(const OdometryMessage& message) {
   const double norm = message.pose.orientation.norm();
   if (!message.pose.position.allFinite() || !(std::abs(norm - 1) < 0.01) || !take_stamp(message.header.stamp_ns))
-    return;
+    return false;
   Sample sample;
   sample.stamp_ns = message.header.stamp_ns;
   sample.pose = {message.pose.orientation.normalized(), message.pose.position};
   sample.pose_variance = diagonal_of(message.pose_covariance);
   sample.twist_variance = diagonal_of(message.twist_covariance);
   samples_.push_back(sample);
+  return true;
 }
 
-void RecordedMotion::add(const ImuMessage& message) {
-  if (!message.angular_velocity.allFinite() || !take_stamp(message.header.stamp_ns)) return;
+bool RecordedMotion::add(const ImuMessage& message) {
+  if (!message.angular_velocity.allFinite() || !take_stamp(message.header.stamp_ns)) return false;
   inertial_ = true;
   Sample sample;
   sample.stamp_ns = message.header.stamp_ns;
@@ -77,6 +83,7 @@ void RecordedMotion::add(const ImuMessage& message) {
   const std::array<double, 9>& covariance = message.angular_velocity_covariance;
   sample.rate_variance = {covariance[0], covariance[4], covariance[8]};
   samples_.push_back(sample);
+  return true;
 }
 
 void RecordedMotion::forget_before(int64_t stamp_ns) {
@@ -85,8 +92,14 @@ void RecordedMotion::forget_before(int64_t stamp_ns) {
 }
 
 std::optional<MotionPrior> RecordedMotion::between(int64_t from_ns, int64_t to_ns) const {
+  constexpr double kFarthest = 1e6;  // [m]
   if (to_ns <= from_ns) return std::nullopt;
-  return inertial_ ? by_rates(from_ns, to_ns) : by_poses(from_ns, to_ns);
+  std::optional<MotionPrior> prior = inertial_ ? by_rates(from_ns, to_ns) : by_poses(from_ns, to_ns);
+  // Numbers that are finite may have differences that are not.
+  if (prior && !(prior->previous_from_current.translation.norm() < kFarthest &&
+                 prior->previous_from_current.rotation.coeffs().allFinite() && prior->covariance.allFinite()))
+    prior.reset();
+  return prior;
 }
 
 std::optional<RecordedMotion::Moment> RecordedMotion::at(int64_t stamp_ns) const {

@@ -16,9 +16,10 @@ class RecordedMotion {
   // `body_from_cam`: the camera in the frame that the messages speak of: the odometry's child frame, or the unit's.
   explicit RecordedMotion(const Rigid3& body_from_cam = {}) : body_from_cam_(body_from_cam) {}
 
-  // Messages that are not after the one before, or not finite, are left out. One kind only.
-  void add(const OdometryMessage& message);
-  void add(const ImuMessage& message);
+  // False: the message is left out, since it is not after the one before, or not finite. After ten such in a row the
+  // clock is taken to have been set back, or one stamp to have been far ahead: it goes on from there. One kind only.
+  bool add(const OdometryMessage& message);
+  bool add(const ImuMessage& message);
   // Whether what is known reaches up to this time.
   bool reaches(int64_t stamp_ns) const { return !samples_.empty() && samples_.back().stamp_ns >= stamp_ns; }
   void forget_before(int64_t stamp_ns);
@@ -27,7 +28,8 @@ class RecordedMotion {
   // the growth of the pose's; else, where that tells nothing, the twist's; else that of a drift of 1% of the way, and
   // 0.01 rad for each metre and radian, over ten of them; a floor of 1 mm and 1 mrad is added. Inertial unit: the
   // rotation by the angular rates; their covariance, or 0.01 rad/s where there is none, times the duration, and the
-  // same floor. Nothing when messages are missing: farther apart than 0.5 s (odometry) or 0.1 s (inertial unit).
+  // same floor. Nothing when messages are missing: farther apart than 0.5 s (odometry) or 0.1 s (inertial unit); and
+  // for motions that nothing can make.
   std::optional<MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
 
  private:
@@ -51,6 +53,7 @@ class RecordedMotion {
   Rigid3 body_from_cam_;
   bool inertial_ = false;
   std::deque<Sample> samples_;
+  int refused_ = 0;  // messages in a row that were not after the one before
 };
 
 }  // namespace dkb

@@ -133,6 +133,45 @@ TEST(RecordedMotion, NumbersThatAreNoneAreLeftOut) {
   EXPECT_FALSE(motion.reaches(ns(0)));
 }
 
+TEST(RecordedMotion, HugeNumbersGiveNone) {
+  RecordedMotion odometry, inertial;
+  for (int i = 0; i < 4; ++i) {
+    OdometryMessage message = odometry_at(0.1 * i);
+    message.pose.position.x() = i % 2 == 0 ? 1e308 : -1e308;
+    EXPECT_TRUE(odometry.add(message));
+    ImuMessage rates = imu_at(0.05 * i);
+    rates.angular_velocity = Eigen::Vector3d::Constant(i % 2 == 0 ? 1e308 : -1e308);
+    EXPECT_TRUE(inertial.add(rates));
+  }
+  EXPECT_FALSE(odometry.between(ns(0), ns(0.1)));
+  EXPECT_FALSE(odometry.between(ns(0.05), ns(0.25)));
+  EXPECT_FALSE(inertial.between(ns(0), ns(0.12)));
+}
+
+TEST(RecordedMotion, OneStampFarAheadDoesNotEndIt) {
+  RecordedMotion motion;
+  int refused = 0;
+  for (int i = 0; i < 50; ++i) {
+    refused += !motion.add(odometry_at(0.02 * i));
+    if (i == 20) refused += !motion.add(odometry_at(1000));
+  }
+  EXPECT_EQ(refused, 9);
+  EXPECT_TRUE(motion.reaches(ns(0.9)));
+  EXPECT_FALSE(motion.reaches(ns(1000)));
+  for (const double from : {0.2, 0.5, 0.8}) {  // before, around and after what was left out
+    const auto prior = motion.between(ns(from), ns(from + 0.1));
+    ASSERT_TRUE(prior) << from;
+    EXPECT_NEAR(prior->previous_from_current.translation.norm(), 0.05, 1e-3);
+  }
+}
+
+TEST(RecordedMotion, AClockThatWasSetBackDoesNotEndIt) {
+  RecordedMotion motion;
+  for (int i = 0; i < 20; ++i) motion.add(imu_at(100 + 0.01 * i));
+  for (int i = 0; i < 50; ++i) motion.add(imu_at(0.01 * i));
+  EXPECT_TRUE(motion.between(ns(0.2), ns(0.4)));
+}
+
 // The odometry of each interval is recorded 50 ms after the images that end it.
 TEST(RecordedMotion, ComesWithTheFramesOfARecording) {
   MessageList list;

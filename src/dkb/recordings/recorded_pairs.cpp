@@ -2,19 +2,18 @@
 #include "dkb/recordings/recorded_pairs.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 #include <utility>
 
+#include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
 
-// Without limits, for depth that is yet to be registered.
-Camera unlimited(Camera camera) {
-  camera.depth_min = 0, camera.depth_max = std::numeric_limits<double>::infinity();
-  return camera;
+size_t bytes_of(const StampPairing::Pair& pair) {
+  return pair.colour.bytes.size() + pair.depth.bytes.size();
 }
 
 // Of the header, which images begin with.
@@ -88,7 +87,7 @@ RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const Record
   decoder_->colour = {contents.colour, MessageEncoding::ros1, contents.camera};
   decoder_->depth = {contents.depth, MessageEncoding::ros1, contents.camera};
   if (contents.depth_camera) {
-    decoder_->depth.camera = unlimited(contents.depth_camera->camera);
+    decoder_->depth.camera = without_limits(contents.depth_camera->camera);
     decoder_->registration.emplace(contents.depth_camera->camera, contents.camera,
                                    contents.depth_camera->colour_from_depth);
   }
@@ -104,12 +103,15 @@ std::optional<StoredPair> RecordedPairs::next() {
     if (!ready_.empty() && motion_is_known(ready_.front())) {
       StampPairing::Pair pair = std::move(ready_.front());
       ready_.pop_front();
+      ready_bytes_ -= bytes_of(pair);
       return stored(std::move(pair));
     }
     if (ended_) {
       if (filter_.seen() == 0)
         throw InputError(name_ + ": no colour image of " + decoder_->colour.topic.name + " has a depth image of " +
-                         decoder_->depth.topic.name + " within 0.02 s; both must be of one clock");
+                         decoder_->depth.topic.name + " within " +
+                         std::to_string(std::lround(1000 * AssociationOptions().max_difference)) +
+                         " ms; both must be of one clock");
       filter_.require_any(name_);
       return std::nullopt;
     }
@@ -139,7 +141,21 @@ void RecordedPairs::read_message() {
   counts_.unpaired = pairing_.unpaired() + broken_;
 }
 
+// Pixels of any encoding and padding fit, so that it holds no image of its topic's size, whatever it says.
+bool RecordedPairs::is_too_large(const Channel& channel, const RecordedMessage& message) {
+  constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
+  const size_t pixels = static_cast<size_t>(channel.topic.width) * static_cast<size_t>(channel.topic.height);
+  if (message.bytes.size() <= kMostPerPixel * pixels + kMostElse) return false;
+  ++broken_;
+  warn_once("large", name_ + ": " + channel.topic.name + ": a message of " +
+                         std::to_string(message.bytes.size() >> 20) + " MiB is too large for an image of " +
+                         std::to_string(channel.topic.width) + "x" + std::to_string(channel.topic.height) +
+                         " px; such are left out");
+  return true;
+}
+
 void RecordedPairs::add_image(StampPairing::Kind kind, const RecordedTopic& topic, const RecordedMessage& message) {
+  if (is_too_large(kind == StampPairing::colour ? decoder_->colour : decoder_->depth, message)) return;
   int64_t stamp = message.recorded_ns;
   try {
     if (stamped_) stamp = read_stamp(message.bytes, topic.encoding);
@@ -159,24 +175,32 @@ void RecordedPairs::add_image(StampPairing::Kind kind, const RecordedTopic& topi
 }
 
 void RecordedPairs::add_motion(const RecordedTopic& topic, const RecordedMessage& message) {
+  bool added = true;
   try {
     if (motion_topic_->inertial) {
       ImuMessage imu = decode_imu(message.bytes, topic.encoding);
       if (!stamped_) imu.header.stamp_ns = message.recorded_ns;
-      motion_->add(imu);
+      added = motion_->add(imu);
     } else {
       OdometryMessage odometry = decode_odometry(message.bytes, topic.encoding);
       if (!stamped_) odometry.header.stamp_ns = message.recorded_ns;
-      motion_->add(odometry);
+      added = motion_->add(odometry);
     }
   } catch (const InputError& e) {
     warn_once("motion", name_ + ": " + topic.name + ": a message is broken (" + e.what() + "); it is left out");
   }
+  if (!added)
+    warn_once("late motion", name_ + ": " + topic.name +
+                                 ": a message's stamp is not after the one before it, or its numbers are none; such "
+                                 "messages are left out");
 }
 
 void RecordedPairs::collect() {
   while (std::optional<StampPairing::Pair> pair = pairing_.take())
-    if (filter_.wants(seconds_from_ns(pair->colour.stamp_ns))) ready_.push_back(std::move(*pair));
+    if (filter_.wants(seconds_from_ns(pair->colour.stamp_ns))) {
+      ready_bytes_ += bytes_of(*pair);
+      ready_.push_back(std::move(*pair));
+    }
 }
 
 // What tells of the motion may be recorded a little later than the images; not for long are these held back.
@@ -184,7 +208,7 @@ bool RecordedPairs::motion_is_known(const StampPairing::Pair& pair) const {
   constexpr int64_t kPatience = kNsPerSecond / 2;
   constexpr size_t kMostReady = 30;
   return !motion_ || ended_ || motion_->reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
-         *newest_colour_ns_ > pair.colour.stamp_ns + kPatience;
+         ready_bytes_ > StampPairing::kMaxBytes || *newest_colour_ns_ > pair.colour.stamp_ns + kPatience;
 }
 
 StoredPair RecordedPairs::stored(StampPairing::Pair pair) {

@@ -51,6 +51,7 @@ class RecordedPairs {
   void add_image(StampPairing::Kind kind, const RecordedTopic& topic, const RecordedMessage& message);
   void add_motion(const RecordedTopic& topic, const RecordedMessage& message);
   void collect();
+  bool is_too_large(const Channel& channel, const RecordedMessage& message);
   bool motion_is_known(const StampPairing::Pair& pair) const;
   StoredPair stored(StampPairing::Pair pair);
   void warn_once(const std::string& kind, const std::string& line);
@@ -64,6 +65,7 @@ class RecordedPairs {
   StampPairing pairing_;
   PairFilter filter_;
   std::deque<StampPairing::Pair> ready_;  // wait for what is known of the motion up to them
+  size_t ready_bytes_ = 0;
   std::optional<int64_t> newest_colour_ns_, before_ns_;
   bool ended_ = false;
   int64_t broken_ = 0;               // [images] that cannot even be told the stamp of

@@ -294,6 +294,19 @@ TEST_F(RecordedSourceTest, BrokenImagesAreSkippedFrames) {
   EXPECT_EQ(source->take_warnings().size(), 1u);
 }
 
+TEST_F(RecordedSourceTest, MessagesLargerThanTheirImagesAreLeftOut) {
+  MessageList list;
+  add_pairs(list, 0, 4);
+  list.messages()[4].bytes.append(2 << 20, '\0');  // colour of pair 2
+  const auto source = open(list);
+  EXPECT_EQ(frames_of(*source).size(), 3u);
+  EXPECT_EQ(source->counts().unpaired, 2);
+  EXPECT_EQ(
+      source->take_warnings(),
+      std::vector<std::string>{"r.bag: /rgb/image: a message of 2 MiB is too large for an image of 32x24 px; such "
+                               "are left out"});
+}
+
 TEST_F(RecordedSourceTest, ARecordingOfBrokenImagesIsRefused) {
   MessageList list;
   add_pairs(list, 0, 8);
@@ -311,7 +324,7 @@ TEST_F(RecordedSourceTest, ClocksThatHaveNothingInCommonAreTold) {
     list.add("/depth/image", "sensor_msgs/Image", n, image_message(n * kInterval, "32FC1", 32, 24, depth));
   }
   EXPECT_EQ(refused(list),
-            "r.bag: no colour image of /rgb/image has a depth image of /depth/image within 0.02 s; both must be of one "
+            "r.bag: no colour image of /rgb/image has a depth image of /depth/image within 20 ms; both must be of one "
             "clock");
 }
 

@@ -3,14 +3,11 @@
 
 #include <algorithm>
 
+#include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
-
-constexpr const char* kCameraTopic = "/dkb_slam/camera";
-constexpr const char* kCameraText = "dkb_slam_camera";
-constexpr const char* kTransforms = "/tf_static";
 
 bool is_image(const std::string& type) {
   return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "dkb/dataset/mutation_test_tools.h"
+#include "dkb/recordings/convert.h"
 #include "dkb/recordings/recording_test_tools.h"
 #include "dkb/util/test_errors.h"
 
@@ -54,6 +55,20 @@ TEST(SqliteMessages, AreReadInTheOrderOfTheirTime) {
   stream->rewind();
   EXPECT_EQ(read_all(*stream).size(), 2U);
   EXPECT_TRUE(stream->take_warnings().empty());
+}
+
+TEST(SqliteMessages, TopicsThatCannotBeConvertedAreTold) {
+  const Scratch scratch;
+  run_sql(scratch / "a.db3", kTables + row(1, 1, 30, "6969") + row(2, 3, 10, "6868") +
+                                 "INSERT INTO topics VALUES(3, '/path', 'nav_msgs/msg/Path', 'cdr', '');");
+  std::vector<std::string> warnings;
+  ConvertOptions options;
+  options.warn = [&](const std::string& line) { warnings.push_back(line); };
+  EXPECT_EQ(convert(scratch / "a.db3", scratch / "a.mcap", options).count, 1U);
+  EXPECT_EQ(warnings, std::vector<std::string>{(scratch / "a.db3").string() +
+                                               ": topic /path of type nav_msgs/Path is left out; its type is not "
+                                               "converted from ROS 2"});
+  for (const RecordedTopic& topic : open_messages(scratch / "a.mcap")->topics()) EXPECT_NE(topic.name, "/path");
 }
 
 TEST(SqliteMessages, NothingIsWrittenBesideTheFile) {

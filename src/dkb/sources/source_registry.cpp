@@ -9,22 +9,14 @@
 #include "dkb/devices/module_device.h"
 #include "dkb/devices/oni_file.h"
 #include "dkb/devices/v4l2_device.h"
+#include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/settings.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
 namespace {
-
-bool is_rosbag2(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) return false;
-  if (fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error)) return false;
-  if (fs::exists(folder / "metadata.yaml", error)) return true;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-    if (const std::string ending = it->path().extension(); ending == ".db3" || ending == ".mcap") return true;
-  return false;
-}
 
 std::unique_ptr<Source> open_recording(const std::string& where, const SourceOptions& options) {
   return std::make_unique<RecordedSource>(where, options);
@@ -132,6 +124,15 @@ bool is_live(const std::string& where) {
   const std::vector<SourceKind> kinds = source_kinds();
   const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SourceKind& k) { return k.fits(where); });
   return kind != kinds.end() && kind->live;
+}
+
+PriorKind prior_kind_named(const std::string& name, const std::string& option) {
+  const std::vector<std::string> names = {"none", "odom", "imu", "auto"};
+  constexpr PriorKind kinds[] = {PriorKind::none, PriorKind::odometry, PriorKind::imu, PriorKind::automatic};
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(option + ": there is no \"" + name + "\"" + did_you_mean(name, names) + "; none, odom, imu, auto");
+  return kinds[found - names.begin()];
 }
 
 std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options) {

@@ -31,4 +31,7 @@ std::vector<SourceKind> source_kinds();
 // Whether `where` names a live device.
 bool is_live(const std::string& where);
 
+// none, odom, imu or auto. Throws InputError, which begins with `option`.
+PriorKind prior_kind_named(const std::string& name, const std::string& option);
+
 }  // namespace dkb

@@ -19,6 +19,12 @@ TEST(SourceRegistry, KindsHaveNamesOfTheirOwn) {
     for (size_t j = 0; j < i; ++j) EXPECT_NE(kinds[i].name, kinds[j].name);
 }
 
+TEST(SourceRegistry, PriorsHaveNames) {
+  EXPECT_EQ(prior_kind_named("odom", ""), PriorKind::odometry);
+  EXPECT_EQ(prior_kind_named("auto", ""), PriorKind::automatic);
+  EXPECT_THROW(prior_kind_named("", "--prior"), InputError);
+}
+
 TEST(SourceRegistry, WhatIsNotThereIsNamed) {
   try {
     open_source("/no/such/folder");
