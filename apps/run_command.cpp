@@ -26,6 +26,7 @@
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
 #include "run_outputs.h"
+#include "run_viewer.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -43,6 +44,7 @@ struct RunArguments {
   DetectorChoice detection;
   std::string filter, disable;
   std::string load_map, prior_file;
+  ViewerArguments viewer;
   bool localize = false;
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
        quiet = false;
@@ -179,7 +181,7 @@ int run(const RunArguments& args) {
   Slam slam(recording->camera(), options, std::move(detectors));
   if (!args.load_map.empty()) slam.load_map(args.load_map);
   slam.localize_only(args.localize);
-  slam.explain_keyframes(args.debug_log);
+  slam.explain_keyframes(args.debug_log || args.viewer.on);
   const fs::path out = args.out.empty() ? default_output(args.source) : fs::path(args.out);
   make_output_folder(out);
   if (!args.quiet) fmt::print("{}, results in {}\n", recording->description(), out.string());
@@ -193,6 +195,12 @@ int run(const RunArguments& args) {
   std::optional<PacedSource> paced;
   if (args.realtime) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
+  std::unique_ptr<RunViewer> viewer;
+  if (args.viewer.on)
+    viewer = std::make_unique<RunViewer>(args.viewer, *recording, args.source, options, out, interrupted);
+  const auto hold = [&](bool on) {
+    if (paced) paced->hold(on);
+  };
   Progress progress(recording->size(), args.quiet);
   const auto warn = [&] {
     for (const std::string& line : recording->take_warnings()) warnings.warn(line, line);
@@ -200,6 +208,7 @@ int run(const RunArguments& args) {
   warn();
   const Stopwatch wall;
   while (!interrupted) {
+    if (viewer) viewer->wait_turn(slam, hold);
     SourceFrame next = source.next();
     warn();
     if (next.state == SourceState::ended) break;
@@ -213,18 +222,21 @@ int run(const RunArguments& args) {
       continue;
     }
     facts.stamps.push_back(next.stamp);
-    const FrameResult result = slam.process(next.frame);
+    FrameResult result = slam.process(next.frame);
     for (const Mover& mover : result.movers)
       facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-    for (const Event& event : slam.take_events())
+    std::vector<Event> events = slam.take_events();
+    for (const Event& event : events)
       if (event.kind == Event::Kind::warning)
         warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
     if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
     if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
     progress.frame(next.index + 1, &result);
+    if (viewer) viewer->show(std::move(result), next.frame, slam, std::move(events));
   }
   progress.finish();
-  if (interrupted) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
+  const bool cut_short = interrupted;
+  if (cut_short) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
   if (paced) {
     paced->stop();
     facts.skipped += paced->dropped();
@@ -242,7 +254,7 @@ int run(const RunArguments& args) {
     if (!args.quiet) fmt::print("{}\n", line);
   }
   write_outputs(out, slam, facts);
-  if (args.cv_orb && !interrupted) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
+  if (args.cv_orb && !cut_short) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
 
   const Statistics s = slam.statistics();
@@ -252,7 +264,8 @@ int run(const RunArguments& args) {
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (const SourceCounts lost = recording->counts(); !args.quiet && lost.unpaired + lost.late > 0)
     fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
-  if (interrupted) return 130;
+  if (viewer) viewer->serve_on(slam, args.quiet);
+  if (cut_short) return 130;
   if (s.tracked > 0) return 0;
   if (args.localize)
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
@@ -313,6 +326,7 @@ void register_run(CLI::App& app, int& exit_code) {
                     "Write debug.log: each frame's state, and why it became a keyframe or did not");
   command->add_flag("--cv-orb", args->cv_orb,
                     "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
+  add_viewer_options(*command, args->viewer);
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = run(*args); });
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/paced_source.h"
 
-#include <chrono>
-
 #include "dkb/image/skipped_motion.h"
 
 namespace dkb {
@@ -24,8 +22,30 @@ void PacedSource::stop() {
   queue_.close();
 }
 
+void PacedSource::hold(bool on) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (on == held_since_.has_value()) return;
+    if (on) {
+      held_since_ = Clock::now();
+    } else {
+      held_ += Clock::now() - *held_since_;
+      held_since_.reset();
+    }
+  }
+  wake_.notify_all();
+}
+
+bool PacedSource::wait_until(Clock::time_point due) {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return stopped_ || !held_since_; });
+    if (stopped_) return false;
+    if (!wake_.wait_until(lock, due + held_, [&] { return stopped_ || held_since_; })) return true;
+  }
+}
+
 void PacedSource::run() {
-  using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> start;
   int64_t first_stamp = 0;
   for (SourceFrame frame = source_.next(); frame.state != SourceState::ended; frame = source_.next()) {
@@ -36,8 +56,7 @@ void PacedSource::run() {
         first_stamp = frame.frame.stamp_ns();
       }
       const auto due = *start + std::chrono::nanoseconds(frame.frame.stamp_ns() - first_stamp);
-      std::unique_lock lock(mutex_);
-      if (wake_.wait_until(lock, due, [&] { return stopped_; })) break;
+      if (!wait_until(due)) break;
     }
     const auto leave_motion = [](const SourceFrame& dropped, SourceFrame& next) {
       if (dropped.state != SourceState::frame || next.state != SourceState::frame) return;

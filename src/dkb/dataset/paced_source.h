@@ -2,8 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "dkb/util/bounded_queue.h"
@@ -21,12 +23,17 @@ class PacedSource final : public Source {
   const Camera& camera() const override { return source_.camera(); }
   SourceFrame next() override { return queue_.pop().value_or(SourceFrame{}); }
   void stop() override;
+  // While held the clock stands still.
+  void hold(bool on);
   std::optional<size_t> size() const override { return source_.size(); }
   std::string description() const override { return source_.description(); }
   int dropped() const { return dropped_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   void run();
+  bool wait_until(Clock::time_point due);  // by the clock that can be held; false when stopped
 
   Source& source_;
   BoundedQueue<SourceFrame> queue_{30};
@@ -34,6 +41,8 @@ class PacedSource final : public Source {
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopped_ = false;
+  std::optional<Clock::time_point> held_since_;
+  Clock::duration held_{};  // altogether, but for the time since then
   std::thread thread_;
 };
 
