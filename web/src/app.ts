@@ -190,8 +190,10 @@ function showEvents(list: { kind: string; frame: number; text: string }[]): void
     const row = document.createElement("li"), button = document.createElement("button"), frame = document.createElement("b");
     frame.textContent = String(e.frame + 1);
     button.className = e.kind;
-    button.append(frame, e.kind === "note" ? e.text : `${e.kind.replace("_", " ")}${e.text ? ": " + e.text : ""}`);
-    button.title = "Show where the camera was";
+    // Explanations begin with the kind's name.
+    const words = e.text.startsWith(e.kind) || e.kind === "note" ? e.text : `${e.kind.replace("_", " ")}${e.text ? ": " + e.text : ""}`;
+    button.append(frame, words);
+    button.title = words + "\n(shows where the camera was)";
     button.onclick = () => view.jumpTo(e.frame);
     row.append(button);
     events.prepend(row);

@@ -19,10 +19,12 @@ export class Charts {
 
   constructor(private timeBox: HTMLElement, private pointsBox: HTMLElement) {
     setInterval(() => this.draw(), 200);
-    new ResizeObserver(() => {
+    const observer = new ResizeObserver(() => {
       for (const [i, box] of [timeBox, pointsBox].entries())
         this.plots[i]?.setSize({ width: box.clientWidth, height: box.clientHeight });
-    }).observe(timeBox);
+    });
+    observer.observe(timeBox);
+    observer.observe(pointsBox);
   }
   begin(budget: number): void {
     this.budget = budget;

@@ -118,7 +118,7 @@ export class Cloud {
           shade = colour.rgb;
           vec4 p = viewMatrix * vec4(inWorld(position * unit, host), 1.0);
           gl_Position = projectionMatrix * p;
-          gl_PointSize = size * clamp(1.2 + 5.0 / max(0.1, -p.z), 1.5, 5.0);
+          gl_PointSize = size * clamp(1.6 + 5.0 / max(0.1, -p.z), 2.0, 6.0);
         }`,
       fragmentShader: `in vec3 shade; out vec4 color; void main() { color = vec4(shade, 1.0); }`,
     });

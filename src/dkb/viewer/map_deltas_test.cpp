@@ -6,6 +6,8 @@
 #include <cstring>
 #include <map>
 
+#include "dkb/map/map_test_tools.h"
+
 namespace dkb {
 namespace {
 
@@ -17,14 +19,9 @@ Rigid3 at(double x) {
 Map world(int keyframes, int points) {
   Map map;
   for (KeyframeId k = 0; k < keyframes; ++k) {
-    Keyframe keyframe;
-    keyframe.id = k;
+    Keyframe keyframe = test::keyframe_at(k, 0, points);
     keyframe.frame = 10 * k;
-    keyframe.parent = k - 1;
     keyframe.cam_from_world = at(k).inverse();
-    auto features = std::make_shared<RgbdFeatures>();
-    keyframe.points.assign(static_cast<size_t>(points), kNoPoint);
-    keyframe.features = features;
     map.add_keyframe(keyframe);
     for (int i = 0; i < points; ++i) {
       MapPoint point;
