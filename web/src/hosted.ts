@@ -111,7 +111,7 @@ export class Cloud {
   constructor(private poses: Poses, private unit: number) {
     this.material = new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
-      uniforms: { poses: poses.uniform, unit: { value: unit }, size: { value: 1 } },
+      uniforms: { poses: poses.uniform, unit: { value: unit }, size: { value: 1 }, lift: { value: 0 } },
       vertexShader: `in float host; in vec4 colour; uniform float unit; uniform float size; out vec3 shade;` + pose + `
         void main() {
           if (host < 0.0) { ${nowhere} return; }
@@ -120,7 +120,8 @@ export class Cloud {
           gl_Position = projectionMatrix * p;
           gl_PointSize = size * clamp(1.6 + 5.0 / max(0.1, -p.z), 2.0, 6.0);
         }`,
-      fragmentShader: `in vec3 shade; out vec4 color; void main() { color = vec4(shade, 1.0); }`,
+      // Dark points are lifted from a dark ground.
+      fragmentShader: `in vec3 shade; uniform float lift; out vec4 color; void main() { color = vec4(mix(shade, vec3(1.0), lift), 1.0); }`,
     });
   }
   get points(): number {

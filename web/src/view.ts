@@ -13,7 +13,7 @@ export type Mode = "follow" | "free" | "top";
 export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops"] as const;
 export type Layer = (typeof layers)[number];
 
-const kFrustum = 0.12; // [m] depth of a keyframe's drawn frustum
+const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
 
 type Palette = { keyframe: string; covisibility: string; path: string; loop: string; truth: string; camera: string; mover: string };
 
@@ -98,7 +98,7 @@ export class View {
     this.edges.clear();
     this.clearPath();
     this.truth.visible = false;
-    const c = hello.camera, z = 0.35;
+    const c = hello.camera, z = 0.16;
     const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
     const corners = [corner(0, 0), corner(c.width, 0), corner(c.width, c.height), corner(0, c.height)];
     const lines: number[] = [];
@@ -347,8 +347,8 @@ export class View {
   }
   private follow(): void {
     if (this.mode !== "follow" || !this.cameraPose) return;
-    const at = new THREE.Vector3(0, 0, 1.2).applyMatrix4(this.cameraPose);
-    const behind = new THREE.Vector3(0, -1.1, -2.2).applyMatrix4(this.cameraPose);
+    const at = new THREE.Vector3(0, 0, 1.0).applyMatrix4(this.cameraPose);
+    const behind = new THREE.Vector3(0, -0.8, -1.6).applyMatrix4(this.cameraPose);
     const share = this.still.matches ? 1 : 0.12;
     if (behind.distanceTo(this.camera.position) + at.distanceTo(this.controls.target) < 1e-3) return;
     this.camera.position.lerp(behind, share);
@@ -375,6 +375,7 @@ export class View {
   private render(points: number): void {
     this.rebuild();
     this.cloud.material.uniforms.size.value = this.renderer.getPixelRatio();
+    this.cloud.material.uniforms.lift.value = document.documentElement.dataset.theme === "dark" ? 0.18 : 0;
     this.cloud.draw(points);
     this.renderer.render(this.scene, this.camera);
     this.label();
