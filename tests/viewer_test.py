@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """`run --viewer` over HTTP: viewer_test.py DKB_SLAM SEQUENCE.
 

@@ -205,17 +205,19 @@ export class Cloud {
     }
     return best;
   }
-  middle(): THREE.Vector3 | null {
-    const sum = new THREE.Vector3(), p = new THREE.Vector3();
-    let n = 0;
+  // Where most of it is: the middle of a sample, and the distance that nine of ten points are within.
+  middle(): { at: THREE.Vector3; radius: number } | null {
+    const sample: THREE.Vector3[] = [], u = this.unit;
     for (const slot of this.slots.values()) {
       if (slot % 17 !== 0) continue;
       const [b, v] = this.place(slot);
-      const a = this.blocks[b].position.array, u = this.unit;
-      sum.add(this.poses.toWorld(this.blocks[b].host.array[v], [a[3 * v] * u, a[3 * v + 1] * u, a[3 * v + 2] * u], p));
-      n++;
+      const a = this.blocks[b].position.array;
+      sample.push(this.poses.toWorld(this.blocks[b].host.array[v], [a[3 * v] * u, a[3 * v + 1] * u, a[3 * v + 2] * u], new THREE.Vector3()));
     }
-    return n ? sum.divideScalar(n) : null;
+    if (sample.length === 0) return null;
+    const at = sample.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(sample.length);
+    const far = sample.map((p) => p.distanceTo(at)).sort((p, q) => p - q);
+    return { at, radius: far[Math.floor(0.9 * (far.length - 1))] };
   }
   dispose(): void {
     for (const b of this.blocks) b.geometry.dispose();

@@ -79,12 +79,12 @@ export class Picture {
     const n = report.getUint32(0, true);
     if (this.shown.has("mask")) this.drawMask(g, report, 4 + 8 * n, s, colour("--mover"));
     const shapes: Record<Feature, (x: number, y: number) => void> = {
-      used: (x, y) => { g.moveTo(x + 3.5, y); g.arc(x, y, 3.5, 0, 7); },
-      outlier: (x, y) => { g.moveTo(x - 3, y - 3); g.lineTo(x + 3, y + 3); g.moveTo(x + 3, y - 3); g.lineTo(x - 3, y + 3); },
-      dynamic: (x, y) => g.rect(x - 3, y - 3, 6, 6),
+      used: (x, y) => { g.moveTo(x + 4.5, y); g.arc(x, y, 4.5, 0, 7); },
+      outlier: (x, y) => { g.moveTo(x - 4, y - 4); g.lineTo(x + 4, y + 4); g.moveTo(x + 4, y - 4); g.lineTo(x - 4, y + 4); },
+      dynamic: (x, y) => g.rect(x - 4, y - 4, 8, 8),
       unused: (x, y) => g.rect(x - 1, y - 1, 2, 2),
     };
-    g.lineWidth = 1.5;
+    g.lineWidth = 2;
     for (const kind of features) {
       if (!this.shown.has(kind)) continue;
       g.beginPath();

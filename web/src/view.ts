@@ -215,8 +215,8 @@ export class View {
   }
   setMode(mode: Mode): void {
     if (mode === "top") {
-      const at = this.cloud.middle() ?? new THREE.Vector3(0, 0, 1);
-      const away = Math.max(4, 1.6 * this.extent(at));
+      const { at, radius } = this.cloud.middle() ?? { at: new THREE.Vector3(0, 0, 1), radius: 1 };
+      const away = 2.1 * Math.max(0.5, radius);
       this.controls.target.copy(at);
       this.camera.position.set(at.x, at.y - away, at.z - 0.01 * away);
       this.controls.update();
@@ -225,12 +225,6 @@ export class View {
     this.mode = mode;
     this.dirty = true;
     this.onMode();
-  }
-  private extent(at: THREE.Vector3): number {
-    const p = new THREE.Vector3();
-    let far = 1;
-    for (const f of this.pathFrames) far = Math.max(far, this.poses.toWorld(f.host, f.p, p).distanceTo(at));
-    return far;
   }
   // Shows where the camera was at a frame.
   jumpTo(frame: number): void {
