@@ -25,7 +25,7 @@ if(EXISTS ${WORK}/fetched)
 endif()
 set(result 0)
 if(NOT fetched STREQUAL lock)
-  execute_process(COMMAND ${NPM} ci --ignore-scripts --omit=dev --no-audit --no-fund --loglevel=error
+  execute_process(COMMAND ${NPM} ci --ignore-scripts --omit=dev --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-retry-maxtimeout=5000 --fetch-timeout=60000
     WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output TIMEOUT 300)
   if(result EQUAL 0)
     file(WRITE ${WORK}/fetched ${lock})
@@ -46,6 +46,6 @@ elseif(REQUIRED STREQUAL "ON")
   message(FATAL_ERROR "DKB_PAGE=ON: the page cannot be bundled (${result}): ${output}")
 else()
   message(WARNING "the page cannot be bundled, a plain one takes its place (${result}): ${output}\n"
-    "Fetching needs the network; build again with it, or give -D DKB_PAGE=OFF")
+    "Fetching needs the network: with it, remove ${OUT} and build again; -D DKB_PAGE=OFF does not try")
   plain_page()
 endif()

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <nlohmann/json.hpp>
 
 #include "dkb/map/map.h"
@@ -154,7 +155,11 @@ Session::Session(ViewerOptions options)
       server_(options_.host, options_.port, rules_, *this),
       thread_([this] {
         set_thread_priority(ThreadPriority::background);
-        server_.run();
+        try {
+          server_.run();
+        } catch (const std::exception&) {
+          // Out of memory, most likely: the page ends, the run goes on.
+        }
       }) {}
 
 Session::~Session() {
@@ -312,7 +317,11 @@ void Session::take_handover() {
 
 void Session::tick(size_t streams) {
   take_handover();
-  if (streams > 0 && shown_ != nullptr) map_.update(shown_->map);
+  const auto now = std::chrono::steady_clock::now();
+  if (streams == 0 || shown_ == nullptr || now < next_map_update_) return;
+  map_.update(shown_->map);
+  // A tenth of this thread's time at most: a large map takes a while to compare.
+  next_map_update_ = now + 10 * (std::chrono::steady_clock::now() - now);
 }
 
 Json Session::state() const {

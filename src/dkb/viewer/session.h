@@ -71,6 +71,7 @@ class Session final : public Viewer, private HttpService {
   int offered_ = 0, tracked_ = 0, lost_ = 0;
   bool ended_ = false, was_paused_ = false;
   MapDeltas map_;
+  std::chrono::steady_clock::time_point next_map_update_{};
   SessionHistory history_;
   std::optional<Rigid3> world_from_truth_;
   size_t aligned_at_ = 0;  // points of the path when it was computed
