@@ -216,7 +216,9 @@ export class View {
   setMode(mode: Mode): void {
     if (mode === "top") {
       const { at, radius } = this.cloud.middle() ?? { at: new THREE.Vector3(0, 0, 1), radius: 1 };
-      const away = 2.1 * Math.max(0.5, radius);
+      const p = new THREE.Vector3();
+      const far = this.pathFrames.reduce((r, f) => Math.max(r, this.poses.toWorld(f.host, f.p, p).distanceTo(at)), radius);
+      const away = 2 * Math.max(0.5, far);
       this.controls.target.copy(at);
       this.camera.position.set(at.x, at.y - away, at.z - 0.01 * away);
       this.controls.update();
