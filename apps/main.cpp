@@ -14,6 +14,7 @@
 #include "eval/eval_command.h"
 #include "export_command.h"
 #include "map_command.h"
+#include "record_command.h"
 #include "run_command.h"
 #include "run_viewer.h"
 #include "simulate_command.h"
@@ -54,7 +55,15 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     return "unknown command \"" + rest.front() + "\"" + dkb::did_you_mean(rest.front(), known) + help;
   }
   if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
-  return error.what() + help;
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !below.empty()) {
+    std::string commands;
+    for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
+    return "a command is missing: " + commands + help;
+  }
+  const std::string text = error.what();
+  if (const std::string begin = "Could not convert: "; text.starts_with(begin))  // all of the others are text
+    return text.substr(begin.size()) + " is not a number in range" + help;
+  return text + help;
 }
 
 }  // namespace
@@ -66,6 +75,9 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   try {
     dkb::register_run(app, exit_code);
+    dkb::register_live(app, exit_code);
+    dkb::register_record(app, exit_code);
+    dkb::register_sources(app, exit_code);
     dkb::register_eval(app, exit_code);
     dkb::register_simulate(app, exit_code);
     dkb::register_map(app, exit_code);

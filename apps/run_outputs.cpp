@@ -64,10 +64,7 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
   j["wall_s"] = facts.wall_s;
   j["cpu_s"] = cpu_seconds();
   j["peak_rss_mb"] = peak_rss_mb();
-  StageTimes times = facts.times;
-  auto stages = times.summaries();
-  stages.insert(s.stages.begin(), s.stages.end());
-  for (const auto& [name, stage] : stages)
+  for (const auto& [name, stage] : s.stages)
     j["stages"][name] = {{"mean_ms", stage.mean_ms},
                          {"median_ms", stage.median_ms},
                          {"p95_ms", stage.p95_ms},
@@ -104,6 +101,13 @@ double seconds_since_process_start() {
          std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
+Statistics statistics_with(const Slam& slam, const RunFacts& facts) {
+  Statistics s = slam.statistics();
+  s.stages.merge(facts.times.summaries());
+  s.stage_histograms.merge(facts.times.histograms());
+  return s;
+}
+
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
   write_by_map(folder, "trajectory", trajectories_by_map(slam.trajectory(), facts.stamps));
   write_by_map(folder, "trajectory_online", trajectories_by_map(slam.online_trajectory(), facts.stamps));
@@ -116,7 +120,7 @@ void write_outputs(const std::filesystem::path& folder, const Slam& slam, const 
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
   if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
-  write_file_atomically(folder / "stats.json", stats_json(slam.statistics(), facts));
+  write_file_atomically(folder / "stats.json", stats_json(statistics_with(slam, facts), facts));
 }
 
 std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds) {

@@ -27,6 +27,9 @@ struct RunFacts {
 // Seconds since this process was started, by the kernel's account.
 double seconds_since_process_start();
 
+// The system's statistics, with the stages that it does not have.
+Statistics statistics_with(const Slam& slam, const RunFacts& facts);
+
 // Writes every result of the contract into `folder`, each file atomically. Throws OutputError.
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
 

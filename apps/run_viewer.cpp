@@ -9,6 +9,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/module.h"
+#include "interrupt.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -64,8 +65,8 @@ void add_viewer_options(CLI::App& command, ViewerArguments& args) {
 }
 
 RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name,
-                     const Options& options, fs::path out, const std::atomic<bool>& interrupted)
-    : exit_(args.exit), out_(std::move(out)), interrupted_(interrupted) {
+                     const Options& options, fs::path out)
+    : exit_(args.exit), out_(std::move(out)) {
   ViewerOptions o;
   o.host = args.host;
   o.port = args.port;
@@ -94,7 +95,7 @@ void RunViewer::wait_turn(const Slam& slam, const std::function<void(bool)>& hol
   save_if_asked(slam);
   if (!viewer_->paused()) return;
   hold(true);
-  while (!interrupted_ && !viewer_->wait_turn(kPatience)) save_if_asked(slam);
+  while (!Interrupt::happened() && !viewer_->wait_turn(kPatience)) save_if_asked(slam);
   hold(false);
 }
 
@@ -104,9 +105,9 @@ void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, s
 
 void RunViewer::serve_on(const Slam& slam, bool quiet) {
   viewer_->ended();
-  if (exit_ || interrupted_) return;
+  if (exit_ || Interrupt::happened()) return;
   if (!quiet) fmt::print("the page is served until Ctrl-C\n");
-  while (!interrupted_) {
+  while (!Interrupt::happened()) {
     save_if_asked(slam);
     viewer_->wait_order(kPatience);
   }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -30,7 +29,7 @@ class RunViewer {
   // Opens the page and prints its address on stderr. Throws InputError when this build has none, or the port is taken.
   // Ground truth beside `source` in TUM layout is shown too.
   RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name, const Options& options,
-            std::filesystem::path out, const std::atomic<bool>& interrupted);
+            std::filesystem::path out);
 
   // Before a frame is taken: waits while the page says so, calling `hold` with true first and with false at last; saves
   // the map when it is asked to. A run that is interrupted waits no longer.
@@ -44,7 +43,6 @@ class RunViewer {
 
   const bool exit_;
   const std::filesystem::path out_;
-  const std::atomic<bool>& interrupted_;
   std::unique_ptr<Viewer> viewer_;
 };
 

@@ -8,6 +8,7 @@
 #   scripts/deps.sh python   what `make python` and `pip install .` need
 #   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
+#   scripts/deps.sh ros      what `make test` needs, and ROS 1 for the tests of its package
 #   scripts/deps.sh slurm    the same and Slurm, for bench/slurm/one_node_cluster.sh
 #
 # DKB_SKIP_DEPS=1 skips the check: for machines where the libraries come from elsewhere.
@@ -25,6 +26,7 @@ packages=(
   libgtest-dev libbenchmark-dev libceres-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
   libopencv-dnn-dev
+  libopenni2-dev  # optional for users: cameras of that kind
   python3-rosbag python3-sensor-msgs python3-nav-msgs python3-tf2-msgs  # bags as ROS itself writes and reads them
   "${python[@]}" python3-pip python3-venv
 )
@@ -37,9 +39,17 @@ case "${1:-}" in
   check) packages=("${needed[@]}") ;;
   python) packages=("${needed[@]}" "${python[@]}") ;;
   docs) packages=(doxygen) ;;
+  ros)
+    packages+=(
+      catkin libroscpp-dev libtf2-ros-dev libnodeletlib-dev libnodeletlib-tools ros-message-generation ros-geometry-msgs
+      ros-std-msgs libgeometry-msgs-dev libnav-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev
+      libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev rosout python3-roslaunch python3-std-msgs
+      python3-geometry-msgs python3-visualization-msgs python3-diagnostic-msgs python3-std-srvs python3-pil
+    )
+    ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|slurm]" >&2; exit 2 ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|ros|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

@@ -115,10 +115,11 @@ TEST(Architecture, TheLibraryNeitherSleepsNorExitsNorTunesForOneMachine) {
 }
 
 TEST(Architecture, EverySourceFileNamesItsLicence) {
-  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "fuzz", "python"}) {
+  for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "fuzz", "python", "ros"}) {
     for (const std::string& file : files_below(folder, {".cpp", ".h", ".txt", ".cmake", ".py", ".pyi"})) {
       const std::vector<std::string> lines = read_lines(source_dir() / file);
-      EXPECT_TRUE(!lines.empty() && lines[0].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)
+      const size_t first = !lines.empty() && lines[0].starts_with("#!") ? 1 : 0;  // scripts name their interpreter
+      EXPECT_TRUE(lines.size() > first && lines[first].find("SPDX-License-Identifier: Apache-2.0") != std::string::npos)
           << file << ": the first line must be the SPDX line";
     }
   }
@@ -126,7 +127,7 @@ TEST(Architecture, EverySourceFileNamesItsLicence) {
 
 // A hint for the reader of the log, not a failure: a long file often does two jobs.
 TEST(Architecture, LongFilesAreNamed) {
-  for (const std::string folder : {"src", "apps", "python", "tests"}) {
+  for (const std::string folder : {"src", "apps", "python", "ros", "tests"}) {
     for (const std::string& file : files_below(folder, kCpp)) {
       const size_t lines = read_lines(source_dir() / file).size();
       if (lines > 500) std::cout << "warning: " << file << " has " << lines << " lines; is it still one job?\n";

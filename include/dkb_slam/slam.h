@@ -36,7 +36,7 @@ struct Event {
   int frame = 0;         ///< index of the frame it came with, as in FrameResult
   int64_t stamp_ns = 0;  ///< of that frame
   int keyframe = -1;     ///< of keyframe, loop and merge
-  std::string text;      ///< one line for people, may be empty; of warnings what is wrong
+  std::string text;      ///< one line for people, may be empty; of warnings what is wrong, of keyframes the rule
 };
 DKB_SLAM_API const char* name_of(Event::Kind kind);
 
@@ -68,9 +68,13 @@ struct Statistics {
   double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
   int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
   std::map<std::string, StageSummary> stages;  ///< times by stage: "tracking", "mapping", "wait_mapper" ...
+  /// By stage: how often it took how long. Element k counts durations from 2^(k/4 - 5) ms to those of element k + 1, the
+  /// first and the 64th, which is the last that there may be, also what lies beyond.
+  std::map<std::string, std::vector<int>> stage_histograms;
 };
 
-/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map() and the switches.
+/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map(), dense_map_task() and
+/// the switches.
 /// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
 /// Several systems may live in one process and know nothing of each other.
 ///
@@ -100,7 +104,8 @@ class DKB_SLAM_API Slam {
   void pause(bool on);
   /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
   void localize_only(bool on);
-  /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found. The pose
+  /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found
+  /// or a new map begins. The pose
   /// is in the world of the map, the covariance a right perturbation, [translation m, rotation rad], camera axes.
   /// Throws InputError when a number is not finite or the covariance is not positive.
   void suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance);
@@ -125,6 +130,9 @@ class DKB_SLAM_API Slam {
 
   /// The still world from the keyframes so far; takes seconds. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
+  /// The same, to be called on any thread and at any time: it makes the map of the moment of this call, which itself
+  /// takes no time. For robots that want a grid while they go on tracking.
+  std::function<DenseMap()> dense_map_task() const;
 
   /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is
   /// set.

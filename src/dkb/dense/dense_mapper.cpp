@@ -38,20 +38,24 @@ DenseMapper::DenseMapper(const CameraModel& camera, const SensorNoise& noise, co
     : noise_(noise), options_(options), maker_(camera, options) {}
 
 void DenseMapper::add_keyframe(FrameIndex frame, const RgbdImage& image, const MoverMask& movers) {
-  views_.push_back(maker_.make(frame, image, movers));
+  views_.push_back(std::make_shared<const DepthView>(maker_.make(frame, image, movers)));
 }
 
 void DenseMapper::remove_movers(FrameIndex frame, const MoverMask& movers) {
-  for (auto view = views_.rbegin(); view != views_.rend() && view->frame >= frame; ++view)
-    if (view->frame == frame) maker_.remove(movers, &*view);
+  for (auto view = views_.rbegin(); view != views_.rend() && (*view)->frame >= frame; ++view) {
+    if ((*view)->frame != frame) continue;
+    auto without = std::make_shared<DepthView>(**view);
+    maker_.remove(movers, without.get());
+    *view = std::move(without);
+  }
 }
 
 DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed) const {
   std::vector<PlacedView> placed;
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  for (const DepthView& view : views_)
-    if (const auto world_from_cam = pose_at(trajectory, view.depth_timestamp)) {
-      placed.push_back({&view, world_from_cam->inverse()});
+  for (const auto& view : views_)
+    if (const auto world_from_cam = pose_at(trajectory, view->depth_timestamp)) {
+      placed.push_back({view.get(), world_from_cam->inverse()});
       up -= world_from_cam->rotation * Eigen::Vector3d::UnitY();
     }
   DenseMap map;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -21,7 +22,7 @@ struct TimedPose {
 };
 
 // The dense map of the still world. Keyframes are noted as they come, cheaply, and fused when the poses are final, so
-// that loop corrections count. Not thread-safe. Deterministic.
+// that loop corrections count. Not thread-safe, but a copy is cheap and may be built on another thread. Deterministic.
 class DenseMapper {
  public:
   DenseMapper(const CameraModel& camera, const SensorNoise& noise, const DenseOptions& options);
@@ -40,7 +41,7 @@ class DenseMapper {
   SensorNoise noise_;
   DenseOptions options_;
   DepthViewMaker maker_;
-  std::vector<DepthView> views_;  // by increasing frame
+  std::vector<std::shared_ptr<const DepthView>> views_;  // by increasing frame; copies of the mapper share them
 };
 
 }  // namespace dkb

@@ -54,6 +54,17 @@ TEST(DenseMapper, SameInputGivesTheSameBytes) {
   EXPECT_EQ(occupancy_yaml(*a.grid, "x"), occupancy_yaml(*b.grid, "x"));
 }
 
+TEST(DenseMapper, ACopyKeepsWhatItHadWhileTheOriginalGoesOn) {
+  DenseMapper mapper = mapper_with_views(4);
+  const std::string before = mesh_ply(mapper.build(trajectory(5), 1).mesh);
+  const DenseMapper copy = mapper;
+  const Camera camera = testing::scene_camera();
+  mapper.remove_movers(2, {.cell = 4, .cells = Image<uint8_t>((camera.width + 3) / 4, (camera.height + 3) / 4, 255)});
+  mapper.add_keyframe(4, DenseScene().draw(camera, testing::scene_pose(4), time_of(4)), {});
+  EXPECT_EQ(mesh_ply(copy.build(trajectory(5), 1).mesh), before);
+  EXPECT_NE(mesh_ply(mapper.build(trajectory(5), 1).mesh), before);
+}
+
 TEST(DenseMapper, FollowsTheFinishedTrajectory) {
   // The whole map moves with the poses.
   const Rigid3 moved(rotation_from_vector({0, 0.1, 0}), {1, 0, 0.5});

@@ -48,6 +48,7 @@ TEST(EvaluationReport, WhatCouldNotBeMeasuredIsNull) {
   const auto json = nlohmann::json::parse(evaluation_json(e));
   EXPECT_TRUE(json["rpe"]["translation_m"]["rmse"].is_null());
   EXPECT_NE(evaluation_table(e).find("no pair of poses is that far apart"), std::string::npos);
+  EXPECT_NE(evaluation_svg(e).find("RPE (1000m) no pair of poses is that far apart"), std::string::npos);
 }
 
 TEST(EvaluationReport, TableNamesApeAndUnits) {

@@ -72,9 +72,12 @@ std::string heading(const std::string& title, const std::string& line) {
 
 std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
   std::string out = svg::opening(kWidth, 800);
-  out += heading(names.title, fmt::format("APE {:.4f} m, {:.3f} deg rmse; RPE ({}) {:.4f} m, {:.3f} deg rmse; {} poses",
-                                          e.ape.translation.rmse, e.ape.rotation.rmse, to_string(e.options.rpe_delta),
-                                          e.rpe.translation.rmse, e.rpe.rotation.rmse, e.timestamps.size()));
+  const std::string rpe = e.rpe.translation.count == 0
+                              ? "no pair of poses is that far apart"
+                              : fmt::format("{:.4f} m, {:.3f} deg rmse", e.rpe.translation.rmse, e.rpe.rotation.rmse);
+  out +=
+      heading(names.title, fmt::format("APE {:.4f} m, {:.3f} deg rmse; RPE ({}) {}; {} poses", e.ape.translation.rmse,
+                                       e.ape.rotation.rmse, to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
   double legend = 70;
   for (const auto& [colour, name] : {std::pair{kTruth, names.truth}, std::pair{kEstimate, names.estimate}}) {
     out += fmt::format("<line x1=\"{:.1f}\" y1=\"76\" x2=\"{:.1f}\" y2=\"76\" stroke=\"{}\" stroke-width=\"3\"/>\n",

@@ -27,6 +27,16 @@ const char* yes_or_no(bool yes) {
   return yes ? "yes" : "no";
 }
 
+std::string rule_of(const KeyframeDecision& decision) {
+  std::string tests;
+  if (decision.rule == KeyframeRule::floor)
+    for (const auto& [spoke, name] :
+         {std::pair{decision.tests.few_points, "few points"},
+          std::pair{decision.tests.close_points, "few close points"}, std::pair{decision.tests.view_left, "view left"}})
+      if (spoke) tests += (tests.empty() ? " (" : ", ") + std::string(name);
+  return name_of(decision.rule) + tests + (tests.empty() ? "" : ")");
+}
+
 std::string explained(const KeyframeDecision& decision) {
   const std::string result = decision.insert ? fmt::format("keyframe ({})", name_of(decision.rule)) : "no keyframe";
   return result + ": " + decision.explanation;
@@ -45,9 +55,9 @@ void KeyframeTestCounts::add(const KeyframeTests& tests) {
 }
 
 std::map<std::string, int> KeyframeTestCounts::by_name() const {
-  return {{"decisions", decisions},   {"waited", waited},         {"parallax", parallax},
-          {"votes_asked", votes_asked}, {"visibility", visibility}, {"spread", spread},
-          {"few_points", few_points}, {"close_points", close_points}, {"view_left", view_left}};
+  return {{"decisions", decisions},   {"waited", waited}, {"parallax", parallax},     {"votes_asked", votes_asked},
+          {"visibility", visibility}, {"spread", spread}, {"few_points", few_points}, {"close_points", close_points},
+          {"view_left", view_left}};
 }
 
 }  // namespace dkb

@@ -63,6 +63,8 @@ struct KeyframeDecision {
   KeyframeTests tests = {};
 };
 
+// The rule, and of the floor the tests that spoke: "adaptive", "floor (few points, view left)".
+std::string rule_of(const KeyframeDecision& decision);
 // One line: the decision and its explanation.
 std::string explained(const KeyframeDecision& decision);
 

@@ -35,6 +35,14 @@ TEST(KeyframeDecision, IsExplainedInOneLine) {
   EXPECT_EQ(explained({false, KeyframeRule::none, "tracked 400"}), "no keyframe: tracked 400");
 }
 
+TEST(KeyframeDecision, NamesItsRuleAndTheTestsOfTheFloor) {
+  KeyframeDecision decision{true, KeyframeRule::floor, "", {}};
+  decision.tests.few_points = decision.tests.view_left = true;
+  EXPECT_EQ(rule_of(decision), "floor (few points, view left)");
+  decision.rule = KeyframeRule::adaptive;
+  EXPECT_EQ(rule_of(decision), "adaptive");
+}
+
 TEST(KeyframeRule, RulesHaveTheNamesOfTheStatistics) {
   EXPECT_STREQ(name_of(KeyframeRule::first), "first");
   EXPECT_STREQ(name_of(KeyframeRule::baseline), "baseline");

@@ -152,6 +152,15 @@ TEST_F(ConvertTest, NothingIsLeftBehindWhenItFails) {
             std::string::npos);
 }
 
+TEST_F(ConvertTest, AKindThatIsNotWrittenIsRefused) {
+  write_folder(5000);
+  for (const char* name : {"out.db3", "out.oni"}) {
+    EXPECT_NE(input_error_of([&] { convert(scratch / "in", scratch / name, options); }).find("FILE.mcap or FILE.bag"),
+              std::string::npos);
+    EXPECT_FALSE(fs::exists(scratch / name));
+  }
+}
+
 TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {
   const auto writer = write_recording(scratch / "a.bag");
   ImuMessage imu;

@@ -27,7 +27,9 @@ std::unique_ptr<MessageStream> open_file(const fs::path& path) {
   if (begin == std::string_view("SQLite format 3\0", 16)) return open_sqlite_messages(path);
   if (begin.rfind("\x28\xB5\x2F\xFD", 0) == 0)
     throw InputError(file->name() + ": is compressed as a whole; `zstd -d` on it gives a recording that can be read");
-  throw InputError(file->name() + ": is no recording of a known kind (.bag of ROS 1, .mcap, .db3 of rosbag2)");
+  throw InputError(file->name() +
+                   ": is no recording of a known kind (.bag of ROS 1, .mcap, .db3 of rosbag2); its "
+                   "content tells the kind, not its name");
 }
 
 bool is_recording(const fs::path& path) {
@@ -45,7 +47,8 @@ std::vector<fs::path> files_of(const fs::path& folder) {
     std::sort(files.begin(), files.end());
     if (files.empty())
       throw InputError(folder.string() +
-                       ": is no folder of rosbag2: it has no metadata.yaml, no .db3 and no .mcap file");
+                       ": is no folder of rosbag2: it has no metadata.yaml, no .db3 and no .mcap file; "
+                       "`dkb-slam record` brings images in other layouts into TUM's");
     return files;
   }
   std::string mode;

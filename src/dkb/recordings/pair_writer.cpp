@@ -205,6 +205,9 @@ std::unique_ptr<PairWriter> write_pairs(const fs::path& path, const Camera& came
                                         const PairWriterOptions& options) {
   if (is_recording_name(path))
     return std::make_unique<RecordingPairWriter>(path, camera, camera_text, options.compression);
+  if (path.extension() == ".db3" || path.extension() == ".oni")
+    throw InputError(path.string() + ": recordings are written as FILE.mcap or FILE.bag, not as " +
+                     path.extension().string());
   return std::make_unique<FolderPairWriter>(path, camera, camera_text, options.png_level);
 }
 

@@ -259,6 +259,25 @@ TEST_F(RecordedSourceTest, WithoutStampsTheTimeOfRecordingStandsIn) {
             std::vector<std::string>{"r.bag: its images carry no stamps; the time of their recording stands in"});
 }
 
+TEST_F(RecordedSourceTest, StampsMayBeginAtZero) {
+  for (const bool indexed : {true, false}) {
+    MessageList list(indexed);
+    for (int64_t n = 0; n < 4; ++n) {
+      const int64_t stamp = n * kInterval, recorded = stamp + 1;
+      list.add("/rgb/image", "sensor_msgs/Image", recorded,
+               image_message(stamp, "rgb8", 32, 24, bytes_of(noise_picture(1))));
+      list.add("/depth/image", "sensor_msgs/Image", recorded,
+               image_message(stamp, "32FC1", 32, 24, metres_of(noise_depth(1))));
+    }
+    const auto source = open(list);
+    const auto frames = frames_of(*source);
+    ASSERT_EQ(frames.size(), 4u);
+    EXPECT_EQ(frames[0].frame.stamp_ns(), 0);
+    EXPECT_EQ(frames[1].frame.stamp_ns(), kInterval);
+    EXPECT_TRUE(source->take_warnings().empty());
+  }
+}
+
 TEST_F(RecordedSourceTest, BrokenImagesAreSkippedFrames) {
   MessageList list;
   add_pairs(list, 0, 8);

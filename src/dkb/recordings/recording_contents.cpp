@@ -227,7 +227,14 @@ class Chooser {
 RecordingContents look_into(MessageStream& stream, const SourceOptions& options, const std::string& name) {
   RecordingSurvey survey;
   survey.read(stream, options);
-  RecordingContents contents = Chooser(survey, options, name).choose();
+  RecordingContents contents;
+  try {
+    contents = Chooser(survey, options, name).choose();
+  } catch (const InputError& e) {  // damage may be why: a recording cut short shows less than it had
+    const std::vector<std::string> warnings = stream.take_warnings();
+    if (warnings.empty()) throw;
+    throw InputError(std::string(e.what()) + " (" + warnings.front() + ")");
+  }
   std::vector<std::string> names{contents.colour.name, contents.depth.name};
   if (contents.motion) names.push_back(contents.motion->name);
   stream.select(names);

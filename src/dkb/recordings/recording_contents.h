@@ -17,7 +17,7 @@ struct RecordedImageTopic {
   std::string name, type, encoding, frame_id;
   ImageContent content = ImageContent::unknown;
   int width = 0, height = 0;  // [px]
-  bool stamped = false;       // the header's stamp is not zero
+  bool stamped = false;       // not all stamps of its headers are zero
 };
 
 // A camera of its own that depth was taken by.

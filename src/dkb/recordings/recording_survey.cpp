@@ -29,13 +29,11 @@ bool is_of_use(const RecordedTopic& topic, const SourceOptions& options) {
 
 }  // namespace
 
-const RecordedImageTopic* RecordingSurvey::image(const std::string& name) const {
-  const auto found = std::find_if(images.begin(), images.end(), [&](const auto& i) { return i.name == name; });
-  return found == images.end() ? nullptr : &*found;
-}
-
 bool RecordingSurvey::shown(const RecordedTopic& topic) const {
-  if (is_image(topic.type)) return image(topic.name) != nullptr;
+  if (is_image(topic.type)) {
+    const auto found = shown_images_.find(topic.name);
+    return found != shown_images_.end() && (found->second.done || topic.count == 1);
+  }
   if (topic.type == "sensor_msgs/CameraInfo") return infos.contains(topic.name);
   if (topic.type == "nav_msgs/Odometry") return odometries.contains(topic.name);
   if (topic.type == "sensor_msgs/Imu") return inertial.contains(topic.name);
@@ -43,18 +41,34 @@ bool RecordingSurvey::shown(const RecordedTopic& topic) const {
   return camera_file.has_value();
 }
 
-bool RecordingSurvey::complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options) const {
-  return std::all_of(topics.begin(), topics.end(), [&](const RecordedTopic& topic) {
-    return !is_of_use(topic, options) || topic.count == 0 || shown(topic);
-  });
+// What has been shown stays so: each topic is passed once.
+bool RecordingSurvey::complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options) {
+  for (; shown_topics_ < topics.size(); ++shown_topics_) {
+    const RecordedTopic& topic = topics[shown_topics_];
+    if (is_of_use(topic, options) && topic.count != 0 && !shown(topic)) return false;
+  }
+  return true;
+}
+
+// A recording may begin at zero. One whose second stamp is zero as well has none.
+void RecordingSurvey::take_image(const RecordedTopic& topic, const RecordedMessage& message) {
+  const auto known = shown_images_.find(topic.name);
+  if (known != shown_images_.end() && known->second.done) return;
+  const RecordedImage seen = read_recorded_image(message.bytes, topic.type, topic.encoding, topic.name);
+  const bool zero = seen.header.stamp_ns == 0;
+  if (known == shown_images_.end()) {
+    shown_images_[topic.name] = {images.size(), !zero};
+    images.push_back({topic.name, topic.type, seen.encoding, frame_name(seen.header.frame_id), seen.content, seen.width,
+                      seen.height, true});
+  } else {
+    images[known->second.index].stamped = !zero;
+    known->second.done = true;
+  }
 }
 
 void RecordingSurvey::take(const RecordedTopic& topic, const RecordedMessage& message) {
   if (is_image(topic.type)) {
-    if (image(topic.name) != nullptr) return;
-    const RecordedImage seen = read_recorded_image(message.bytes, topic.type, topic.encoding, topic.name);
-    images.push_back({topic.name, topic.type, seen.encoding, frame_name(seen.header.frame_id), seen.content, seen.width,
-                      seen.height, seen.header.stamp_ns != 0});
+    take_image(topic, message);
   } else if (topic.type == "sensor_msgs/CameraInfo") {
     if (!infos.contains(topic.name)) infos.emplace(topic.name, decode_camera_info(message.bytes, topic.encoding));
   } else if (topic.type == "nav_msgs/Odometry") {
@@ -74,23 +88,28 @@ void RecordingSurvey::take(const RecordedTopic& topic, const RecordedMessage& me
 
 void RecordingSurvey::read(MessageStream& stream, const SourceOptions& options) {
   // After one image of colour and one of depth have come, what else there is should come soon.
-  constexpr int kMaxImages = 300, kMaxMessages = 20'000;
+  constexpr size_t kMaxImages = 300, kMaxMessages = 20'000;
   // Without an index topics are known only once they have come.
-  constexpr int kMinMessages = 100;
+  constexpr size_t kMinMessages = 100;
   const std::map<std::string, std::string> texts = stream.metadata();
   if (const auto text = texts.find(kCameraText); text != texts.end())
     camera_file = text->second, camera_file_origin = std::string("metadata ") + kCameraText;
-  const auto has = [&](ImageContent content, const std::string& name) {
-    if (!name.empty()) return image(name) != nullptr;
-    return std::any_of(images.begin(), images.end(), [&](const auto& i) { return i.content == content; });
+  const auto fits = [](const RecordedImageTopic& topic, ImageContent content, const std::string& picked) {
+    return picked.empty() ? topic.content == content : topic.name == picked;
   };
-  for (int further_images = 0, further = 0;;) {
-    const bool both = has(ImageContent::colour, options.colour_topic) && has(ImageContent::depth, options.depth_topic);
+  bool colour = false, depth = false;
+  for (size_t looked_at = 0, further_images = 0, further = 0;;) {
+    for (; looked_at < images.size(); ++looked_at) {
+      colour = colour || fits(images[looked_at], ImageContent::colour, options.colour_topic);
+      depth = depth || fits(images[looked_at], ImageContent::depth, options.depth_topic);
+    }
+    const bool both = colour && depth;
     if (both) {
       const std::vector<RecordedTopic>& topics = stream.topics();
-      const bool indexed =
-          std::all_of(topics.begin(), topics.end(), [](const RecordedTopic& t) { return t.count.has_value(); });
-      if ((indexed || further >= kMinMessages) && complete(topics, options)) return;
+      const auto indexed = [&] {
+        return std::all_of(topics.begin(), topics.end(), [](const RecordedTopic& t) { return t.count.has_value(); });
+      };
+      if (complete(topics, options) && (further >= kMinMessages || indexed())) return;
       if (further_images >= kMaxImages || further >= kMaxMessages) return;
     }
     const std::optional<RecordedMessage> message = stream.next();

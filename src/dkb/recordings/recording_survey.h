@@ -27,11 +27,17 @@ class RecordingSurvey {
   std::string first_failure;  // of an image message
 
  private:
+  struct Shown {
+    size_t index = 0;  // in `images`
+    bool done = true;  // false: its first stamp is zero, and a second one has not come
+  };
   void take(const RecordedTopic& topic, const RecordedMessage& message);
-  bool complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options) const;
+  void take_image(const RecordedTopic& topic, const RecordedMessage& message);
+  bool complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options);
   bool shown(const RecordedTopic& topic) const;
-  const RecordedImageTopic* image(const std::string& name) const;
 
+  std::map<std::string, Shown> shown_images_;  // by topic
+  size_t shown_topics_ = 0;                    // the stream's first ones, which need not be looked at again
   int64_t transform_messages_ = 0;
 };
 

@@ -194,8 +194,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
     if (!scene.mask.at(at.x(), at.y())) continue;
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
-    const double surface = depth(x, y);
-    if (std::abs(surface - point.depth) < 0.05 * surface + 0.05 &&
+    if (options_.noise.same_surface(depth(x, y), point.depth) &&
         !std::binary_search(matched.begin(), matched.end(), point.id))
       on_mover.push_back(point.id);
   }
@@ -267,8 +266,9 @@ void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
     // People who stand still are fit to track by, but no part of the map.
     MoverMask movers = scene.mask;
     const RgbdImage& image = scene.extracted.image();
-    unite(movers, silhouettes(image.depth, scene.boxes, options_.dynamics.carried.silhouette), image.depth.width(),
-          image.depth.height());
+    unite(movers,
+          silhouettes(image.depth, scene.boxes, context_.camera, options_.noise, options_.dynamics.carried.silhouette),
+          image.depth.width(), image.depth.height());
     dense_->add_keyframe(tracked.index, image, movers);
     record_.add_time("dense_keyframe", watch.ms());
   }
@@ -308,7 +308,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.world_from_odom = odometry_.world_from_odom();
   record_.add(tracked, result, tracker_.map());
   note_changes(tracked);
-  if (decision.insert) note(Event::Kind::keyframe, "", tracked.reference);
+  if (decision.insert) note(Event::Kind::keyframe, rule_of(decision), tracked.reference);
   if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
 
   const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
@@ -328,7 +328,8 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 }
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
-  if (tracked.starts_map) note(Event::Kind::new_map);
+  // Where a prior tells how the camera came there, the old map goes on.
+  if (tracked.starts_map && !tracked.predicted_cam_from_world) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
@@ -357,12 +358,12 @@ std::vector<Event> Pipeline::take_events() {
   return std::exchange(events_, {});
 }
 
-DenseMap Pipeline::dense_map() const {
+std::function<DenseMap()> Pipeline::dense_map_task() const {
   if (!dense_) throw InputError("dense map: it was not asked for; set Options::dense_map");
   std::vector<TimedPose> poses;
   for (const TrajectoryFrame& f : record_.trajectory(false))
     if (f.map == 0) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
-  return dense_->build(poses, options_.seed);
+  return [dense = *dense_, poses = std::move(poses), seed = options_.seed] { return dense.build(poses, seed); };
 }
 
 }  // namespace dkb

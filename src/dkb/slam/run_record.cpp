@@ -93,6 +93,7 @@ Statistics RunRecord::statistics() const {
   s.maps = static_cast<int>(map_.view().roots().size());
   s.map_points = map_.view().point_count();
   s.stages = times_.summaries();
+  s.stage_histograms = times_.histograms();
   return s;
 }
 

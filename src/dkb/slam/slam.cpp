@@ -223,8 +223,11 @@ Statistics Slam::statistics() const {
   return impl_->shared_record()->statistics();
 }
 DenseMap Slam::dense_map() const {
+  return dense_map_task()();
+}
+std::function<DenseMap()> Slam::dense_map_task() const {
   impl_->throw_failure();
-  return impl_->pipeline->dense_map();
+  return impl_->pipeline->dense_map_task();
 }
 
 std::vector<Event> Slam::take_events() {

@@ -25,6 +25,44 @@ TEST(SourceRegistry, WhatIsNotThereIsNamed) {
     FAIL() << "it was opened";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/no/such/folder: no such folder"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("`dkb-slam sources`"), std::string::npos) << error.what();
+  }
+}
+
+TEST(SourceRegistry, OptionsOfBagsAreRefusedElsewhere) {
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  const auto error_with = [&](const SourceOptions& options) -> std::string {
+    try {
+      open_source(folder, options);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "it was opened";
+  };
+  SourceOptions topic, prior;
+  topic.colour_topic = "/colour", prior.prior = PriorKind::odometry;
+  EXPECT_EQ(error_with(topic), "--colour-topic: " + folder + " is no bag, and only bags have topics; leave it out");
+  EXPECT_EQ(error_with(prior), "--prior odom: " + folder +
+                                   " is no bag, and only bags have topics; leave it out, or give --prior-file FILE");
+}
+
+TEST(SourceRegistry, LiveDevicesAreKnownByTheirScheme) {
+  for (const char* where : {"fake:folder", "v4l2:0,1", "openni2", "openni2:uri", "realsense:12", "orbbec"})
+    EXPECT_TRUE(is_live(where)) << where;
+  for (const char* where : {"folder", "openni2.oni", "fake", "a.bag", "/data/realsense"})
+    EXPECT_EQ(is_live(where), std::string(where) == "fake") << where;
+}
+
+TEST(SourceRegistry, ACameraThatIsNotBuiltInIsNamedWithTheRemedy) {
+  for (const SourceKind& kind : source_kinds()) {
+    if (kind.why_not().empty()) continue;
+    try {
+      open_source(kind.name + ":1");
+      FAIL() << "it was opened";
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()), kind.name + ":1: " + kind.why_not());
+      EXPECT_NE(kind.why_not().find("build again"), std::string::npos);
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 #include "dkb/util/timing.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dkb {
 
@@ -23,6 +24,19 @@ std::map<std::string, StageSummary> StageTimes::summaries() const {
     const size_t n = sorted.size();
     result[stage] = {sum / static_cast<double>(n), sorted[n / 2], sorted[std::min(n - 1, n * 95 / 100)], sorted.back(),
                      n};
+  }
+  return result;
+}
+
+std::map<std::string, std::vector<int>> StageTimes::histograms() const {
+  std::map<std::string, std::vector<int>> result;
+  for (const auto& [stage, samples] : samples_) {
+    std::vector<int>& counts = result[stage];
+    for (const float ms : samples) {
+      const auto bin = static_cast<size_t>(std::clamp(4 * (std::log2(std::max(ms, 1e-6F)) + 5), 0.0F, 63.0F));
+      if (bin >= counts.size()) counts.resize(bin + 1);
+      ++counts[bin];
+    }
   }
   return result;
 }

@@ -31,6 +31,8 @@ class StageTimes {
   // Hands over what it holds.
   StageTimes take() { return std::exchange(*this, {}); }
   std::map<std::string, StageSummary> summaries() const;
+  // As Statistics::stage_histograms.
+  std::map<std::string, std::vector<int>> histograms() const;
 
  private:
   std::map<std::string, std::vector<float>> samples_;

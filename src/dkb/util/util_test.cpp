@@ -126,6 +126,17 @@ TEST(StageTimes, SummarisesWithPercentiles) {
   EXPECT_DOUBLE_EQ(s.p95_ms, 96);
 }
 
+TEST(StageTimes, CountsDurationsByQuarterOctaves) {
+  StageTimes times;
+  for (const double ms : {0.0, 0.001, 1.0, 1.1, 1.2, 1e9}) times.add("x", ms);
+  const std::vector<int> counts = times.histograms().at("x");
+  ASSERT_EQ(counts.size(), 64u);
+  EXPECT_EQ(counts[0], 2);
+  EXPECT_EQ(counts[20], 2) << "2^0 to 2^0.25 = 1.19 ms";
+  EXPECT_EQ(counts[21], 1);
+  EXPECT_EQ(counts[63], 1);
+}
+
 TEST(WarningLog, MergesRepeatedWarnings) {
   std::vector<std::string> lines;
   WarningLog log([&](const std::string& l) { lines.push_back(l); });

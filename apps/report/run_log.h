@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb_slam/slam.h"
+#include "report/overlay_picture.h"
+
+namespace dkb::report {
+
+// What the report keeps of a frame.
+struct FrameRow {
+  int64_t stamp_ns = 0;
+  TrackingState state = TrackingState::initialising;
+  bool keyframe = false;
+  uint8_t rule = 0;                   // of a keyframe, index into RunLog::rules()
+  uint16_t movers = 0;                // as obstacles
+  int features = 0;                   // extracted
+  int removed = 0, inliers = 0;       // kept from tracking by the filter; map points that the pose rests on
+  float masked = 0, depth = 0;        // shares of the image: on movers; with depth
+  float with_depth = 0;               // share of the features that have depth where they are
+  float brightness = 0;               // mean grey level
+  float turned_deg = 0, moved_m = 0;  // since the frame before, when both have poses
+  float position_sd = 0;              // [m] by the covariance; 0 = unknown
+  float tracking_ms = 0, waiting_ms = 0;
+
+  bool tracked() const { return state != TrackingState::initialising && state != TrackingState::lost; }
+};
+
+// Something worth a line: a loop, a new map.
+struct Happening {
+  size_t row = 0;
+  Event::Kind kind = Event::Kind::warning;
+  std::string text;
+};
+
+// Listens to a run. Keeps some 80 bytes a frame and at most 25 small pictures.
+class RunLog {
+ public:
+  // `expected`: about how many frames there will be.
+  explicit RunLog(std::optional<size_t> expected = {});
+  void frame(const Frame& frame, const FrameResult& result);
+  void event(const Event& event);  // of the last frame
+
+  const std::vector<FrameRow>& rows() const { return rows_; }
+  const std::vector<std::string>& rules() const { return rules_; }
+  const std::vector<Happening>& happenings() const { return happenings_; }  // the first 200
+  const std::vector<OverlayPicture>& even() const { return even_; }         // spread evenly over the run
+  const std::vector<OverlayPicture>& lost() const { return lost_; }         // first of a stretch without poses
+  const std::optional<OverlayPicture>& fewest() const { return fewest_; }   // with about the fewest inliers
+  std::vector<const OverlayPicture*> pictures() const;                      // all of them, by row, none twice
+
+ private:
+  void keep_pictures(const Frame& frame, const FrameResult& result);
+
+  std::vector<FrameRow> rows_;
+  std::vector<std::string> rules_;
+  std::vector<Happening> happenings_;
+  std::optional<Rigid3> last_pose_;
+  size_t stride_;
+  std::vector<OverlayPicture> even_, lost_;
+  std::optional<OverlayPicture> fewest_;
+};
+
+}  // namespace dkb::report

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/run_report.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <limits>
+
+#include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
+#include "report/page_style.h"
+#include "report/report_sections.h"
+
+namespace dkb::report {
+namespace {
+
+void flatten(const YAML::Node& node, const std::string& key, std::vector<std::pair<std::string, std::string>>& out) {
+  if (!node.IsMap()) {
+    out.emplace_back(key, node.IsScalar() ? node.Scalar() : YAML::Dump(node));
+    return;
+  }
+  for (const auto& entry : node)
+    flatten(entry.second, (key.empty() ? "" : key + ".") + entry.first.as<std::string>(), out);
+}
+
+std::vector<std::pair<std::string, std::string>> flattened(const std::string& yaml) {
+  std::vector<std::pair<std::string, std::string>> out;
+  flatten(YAML::Load(yaml), "", out);
+  return out;
+}
+
+}  // namespace
+
+std::vector<ChangedSetting> changed_settings(const std::string& effective, const std::string& usual) {
+  std::map<std::string, std::string> before;
+  for (auto& [key, value] : flattened(usual)) before[key] = value;
+  std::vector<ChangedSetting> changed;
+  for (const auto& [key, value] : flattened(effective))
+    if (const auto it = before.find(key); it == before.end() || it->second != value)
+      changed.push_back({key, value, it == before.end() ? "" : it->second});
+  return changed;
+}
+
+Truth truth_beside(const std::string& source, const Trajectory& trajectory) {
+  Truth truth;
+  const std::filesystem::path file = std::filesystem::path(source) / "groundtruth.txt";
+  std::error_code nobody_asks;
+  if (!std::filesystem::is_regular_file(file, nobody_asks)) return truth;
+  try {
+    truth.poses = read_trajectory(file);
+    if (!trajectory.empty()) truth.evaluation = evaluate(truth.poses, trajectory, {}, "trajectory.txt");
+  } catch (const InputError& e) {
+    truth.note = e.what();
+  }
+  return truth;
+}
+
+Context::Context(const RunLog& run_log, const ReportFacts& run_facts, const Truth& run_truth)
+    : log(run_log), facts(run_facts), truth(run_truth) {
+  const std::vector<FrameRow>& rows = log.rows();
+  std::vector<int64_t> stamps;
+  for (const FrameRow& r : rows) {
+    stamps.push_back(r.stamp_ns);
+    seconds.push_back(1e-9 * static_cast<double>(r.stamp_ns - rows.front().stamp_ns));
+  }
+  fps = facts.camera.fps > 0 ? facts.camera.fps : frame_rate_of(stamps);
+  if (!seconds.empty()) duration = std::max(seconds.back(), 1 / fps);
+  stretches = lost_stretches(rows, facts.limits);
+  for (const LostStretch& s : stretches) {
+    const double end = s.end < seconds.size() ? seconds[s.end] : duration;
+    if (!bands.empty() && seconds[s.begin] - bands.back().end < least_gap(duration))
+      bands.back().end = end;
+    else
+      bands.push_back({seconds[s.begin], end, name_of(s.state)});
+  }
+  error_m.assign(rows.size(), std::numeric_limits<double>::quiet_NaN());
+  if (!truth.evaluation) return;
+  const Evaluation& e = *truth.evaluation;
+  for (size_t i = 0; i < e.timestamps.size(); ++i)
+    if (const size_t row = row_of(e.timestamps[i]); row < rows.size()) error_m[row] = e.ape.translation_m[i];
+}
+
+double Context::seconds_of(double timestamp) const {
+  return timestamp - seconds_from_ns(log.rows().front().stamp_ns);
+}
+
+size_t Context::row_of(double timestamp) const {
+  const double at = seconds_of(timestamp);
+  const auto it = std::lower_bound(seconds.begin(), seconds.end(), at - 1e-5);
+  return it != seconds.end() && *it < at + 1e-5 ? static_cast<size_t>(it - seconds.begin()) : seconds.size();
+}
+
+std::string metres(double value) {
+  return fmt::format("{:.{}f} m", value, value < 0.1 ? 4 : value < 1 ? 3 : value < 10 ? 2 : 1);
+}
+
+std::string when(const Context& c, size_t row) {
+  return fmt::format("frame {}, {:.2f} s", row, c.seconds[row]);
+}
+
+std::string report_html(const RunLog& log, const ReportFacts& facts, const Truth& truth) {
+  const Context c(log, facts, truth);
+  const bool any = !log.rows().empty();
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\"/>\n<meta http-equiv=\"Content-Security-Policy\" "
+      "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"/>\n<title>Run: " +
+      svg::escaped(facts.name) + "</title>\n<style>" + kPageStyle + "</style>\n</head>\n<body>\n";
+  out += verdict(c);
+  if (any) {
+    out += lost_section(c) + path_section(c) + time_section(c) + tracking_section(c) + pictures_section(c) +
+           stages_section(c) + events_section(c);
+  }
+  return out + settings_section(c) + "</body>\n</html>\n";
+}
+
+}  // namespace dkb::report

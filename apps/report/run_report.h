@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dkb/dataset/trajectory_file.h"
+#include "dkb/evaluation/trajectory_error.h"
+#include "report/lost_stretches.h"
+#include "report/run_log.h"
+
+namespace dkb::report {
+
+struct ChangedSetting {
+  std::string key, value, usual;
+};
+// Settings in which two texts of Options::to_yaml() differ.
+std::vector<ChangedSetting> changed_settings(const std::string& effective, const std::string& usual);
+
+// What a run says of itself at its end.
+struct ReportFacts {
+  std::string name;                                          // of the recording
+  std::string source;                                        // what is read, for people
+  std::string version;                                       // of the program
+  std::vector<std::pair<std::string, std::string>> choices;  // how it was started: camera, detector ...
+  Camera camera;
+  bool realtime = false;         // frames came at the pace of their stamps
+  int offered = 0, skipped = 0;  // as in stats.json
+  double wall_s = 0;             // likewise
+  Statistics statistics;         // with the stages of all threads
+  Trajectory trajectory;         // of the first map, as in trajectory.txt
+  std::vector<ChangedSetting> settings;
+  CauseLimits limits;
+  uint64_t seed = 1;  // picks the random pictures
+};
+
+// The truth that lies beside a recording.
+struct Truth {
+  Trajectory poses;
+  std::optional<Evaluation> evaluation;  // of the trajectory, as `eval` makes it
+  std::string note;                      // why there is none
+};
+// groundtruth.txt of that folder; without one all is empty. A file that cannot be used is a note and no error.
+Truth truth_beside(const std::string& source, const Trajectory& trajectory);
+
+// One page, complete without script and network. What a clock had a say in stands between <!--clock--> and
+// <!--/clock-->; the rest is the same in every run.
+std::string report_html(const RunLog& log, const ReportFacts& facts, const Truth& truth);
+
+}  // namespace dkb::report

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/run_report.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "report/charts.h"
+
+namespace dkb::report {
+namespace {
+
+TEST(Base64, EncodesAsRfc4648Says) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("\xff\xfe\xfd"), "//79");
+}
+
+TEST(ChangedSettings, AreThoseThatDifferWithTheirWholeKey) {
+  const auto changed = changed_settings("preset: paper\na:\n  b: 2  # two\n  c: 3\nexperiment.x: 1\n",
+                                        "preset: default\na:\n  b: 2\n  c: 4\n");
+  ASSERT_EQ(changed.size(), 3u);
+  EXPECT_EQ(changed[1].key, "a.c");
+  EXPECT_EQ(changed[1].value, "3");
+  EXPECT_EQ(changed[1].usual, "4");
+  EXPECT_EQ(changed[2].usual, "");
+}
+
+TEST(UpAxis, IsWhereCamerasHaveTheirTop) {
+  EXPECT_EQ(up_axis({Rigid3()}).axis, 1);  // the camera's own axes: y down
+  EXPECT_TRUE(up_axis({Rigid3()}).negative);
+  const Eigen::Quaterniond upright(Eigen::AngleAxisd(-M_PI / 2, Eigen::Vector3d::UnitX()));  // looks along y of a world
+  EXPECT_EQ(up_axis({Rigid3(upright, Eigen::Vector3d::Zero())}).axis, 2);
+  EXPECT_FALSE(up_axis({Rigid3(upright, Eigen::Vector3d::Zero())}).negative);
+}
+
+// A run of small images that wanders about, and is lost now and then.
+struct LongRun {
+  // `period` frames, of which the last fiftieth, at least one, is lost.
+  LongRun(int frames, int period) {
+    facts.camera.width = 32;
+    facts.camera.height = 24;
+    const GreyImage grey(32, 24, 100);
+    const DepthImage depth(32, 24, 1.0F);
+    ImageView grey_view{grey.data(), 32, 24, 0, PixelFormat::grey8},
+        depth_view{depth.data(), 32, 24, 0, PixelFormat::depth_f32};
+    for (int i = 0; i < frames; ++i) {
+      const int64_t stamp = int64_t{1'000'000'000} + i * int64_t{33'333'333};
+      const double t = i / 30.0;
+      const Rigid3 pose(Eigen::Quaterniond::Identity(),
+                        {3 * std::sin(t), 2 * std::sin(1.7 * t), 1 + std::cos(0.31 * t)});
+      const Frame frame(facts.camera, {stamp, grey_view, depth_view});
+      FrameResult result;
+      result.frame = i;
+      result.stamp_ns = stamp;
+      result.state = i % period < period - std::max(1, period / 50) ? TrackingState::tracking : TrackingState::lost;
+      result.inliers = 100 + i % 37;
+      result.features.resize(30);
+      result.keyframe = i % 7 == 0;
+      if (result.state == TrackingState::tracking) result.world_from_cam = pose;
+      log.frame(frame, result);
+      if (result.keyframe) log.event({Event::Kind::keyframe, i, stamp, i / 7, i % 2 == 0 ? "adaptive" : "floor"});
+      const double seconds = 1e-9 * static_cast<double>(stamp);
+      truth.poses.push_back({seconds, "", pose});
+      if (result.world_from_cam) facts.trajectory.push_back({seconds, "", pose});
+    }
+    truth.evaluation = evaluate(truth.poses, facts.trajectory);
+  }
+  RunLog log;
+  ReportFacts facts;
+  Truth truth;
+};
+
+TEST(RunReport, SizeHardlyGrowsWithTheFrames) {
+  for (const int period : {2, 500}) {
+    const LongRun run(60000, period);
+    EXPECT_LE(run.log.pictures().size(), 25u);
+    const std::string html = report_html(run.log, run.facts, run.truth);
+    EXPECT_LT(html.size(), 2'000'000u);
+    EXPECT_NE(html.find(fmt::format("And {} stretches more.", 60000 / period - 30)), std::string::npos);
+  }
+}
+
+TEST(RunLog, KeepsPicturesSpreadOverTheRun) {
+  const LongRun run(1000, 500);
+  const auto& even = run.log.even();
+  ASSERT_GE(even.size(), 8u);
+  ASSERT_LE(even.size(), 16u);
+  for (size_t i = 2; i < even.size(); ++i) EXPECT_EQ(even[i].row - even[i - 1].row, even[1].row - even[0].row);
+  EXPECT_GT(even.back().row, 850u);
+  ASSERT_EQ(run.log.lost().size(), 2u);
+  EXPECT_EQ(run.log.lost()[1].row, 990u);
+}
+
+}  // namespace
+}  // namespace dkb::report

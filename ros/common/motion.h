@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motions and their covariances in ROS' terms, and motion priors from wheel odometry and gyroscopes.
+#pragma once
+
+#include <dkb_slam/frame.h>
+
+#include <deque>
+#include <optional>
+
+#include "types.h"
+
+namespace dkb_ros {
+
+// The twist [v, w] that is this motion after one second, in the axes of the moving frame.
+Vector6d twist_of(const Rigid3& motion);
+// A rotation by a vector [rad].
+Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector);
+// Maps right perturbations [translation, rotation] in frame b to the same in frame a.
+Matrix6d adjoint(const Rigid3& a_from_b);
+// The library's covariance, a right perturbation in camera axes, as that of the base's pose in ROS' order: position and
+// rotation about the fixed axes of the parent frame.
+Matrix6d ros_covariance(const Matrix6d& in_camera, const Rigid3& base_from_cam,
+                        const Eigen::Quaterniond& parent_from_base);
+// The reverse, for /initialpose.
+Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam,
+                           const Eigen::Quaterniond& parent_from_base);
+
+// Poses of wheel odometry; answers with the motion between two times.
+class OdometryHistory {
+ public:
+  // `drift`: [m per m, rad per rad, rad per m] assumed where the messages give no covariance.
+  explicit OdometryHistory(double drift) : drift_(drift) {}
+
+  // False when its stamp does not rise or a number is not finite; it is left out then.
+  bool add(const OdometryMessage& message);
+  void clear() { messages_.clear(); }
+  bool empty() const { return messages_.empty(); }
+  const std::string& child_frame_id() const { return messages_.back().child_frame_id; }
+
+  // The motion of the child frame; its covariance is that of a right perturbation in the child frame's axes. Poses are
+  // interpolated, and carried on by the twist for at most 0.1 s after the newest. Nothing where messages are missing.
+  std::optional<dkb::MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
+
+ private:
+  std::optional<Rigid3> pose_at(int64_t stamp_ns) const;
+
+  double drift_;
+  std::deque<OdometryMessage> messages_;  // by stamp
+};
+
+// Angular velocities; answers with the rotation between two times.
+class GyroHistory {
+ public:
+  bool add(const ImuMessage& message);  // as above
+  void clear() { messages_.clear(); }
+  bool empty() const { return messages_.empty(); }
+  const std::string& frame_id() const { return messages_.back().frame_id; }
+
+  // The rotation of the sensor's frame. Nothing where samples are more than 0.1 s apart.
+  std::optional<dkb::MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
+
+ private:
+  std::deque<ImuMessage> messages_;  // by stamp
+};
+
+// A prior of another frame that is fixed to the camera, as the camera's.
+dkb::MotionPrior moved_to_camera(const dkb::MotionPrior& prior, const Rigid3& cam_from_frame);
+
+}  // namespace dkb_ros

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dkb_ros {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+
+// The camera on a robot: 0.2 m ahead of the base, 0.5 m up, looking ahead.
+Rigid3 mount() {
+  return {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.2, 0, 0.5}};
+}
+
+// base in odom of a robot that drives a circle: 0.5 m/s, 0.4 rad/s.
+Rigid3 on_circle(double t) {
+  const double v = 0.5, w = 0.4, r = v / w;
+  return {rotation_by({0, 0, w * t}), {r * std::sin(w * t), r * (1 - std::cos(w * t)), 0}};
+}
+
+OdometryMessage odometry_at(int64_t stamp_ns) {
+  OdometryMessage m;
+  m.stamp_ns = stamp_ns;
+  m.child_frame_id = "base_link";
+  m.pose = on_circle(1e-9 * static_cast<double>(stamp_ns));
+  m.twist << 0.5, 0, 0, 0, 0, 0.4;
+  return m;
+}
+
+TEST(Twist, IsThatOfADriveAlongACircle) {
+  const Rigid3 motion = on_circle(1).inverse() * on_circle(1.1);
+  Vector6d expected;
+  expected << 0.05, 0, 0, 0, 0, 0.04;
+  EXPECT_LT((twist_of(motion) - expected).norm(), 1e-9);
+  EXPECT_LT((twist_of(Rigid3(Eigen::Quaterniond::Identity(), {1, 2, 3})).head<3>() - Eigen::Vector3d(1, 2, 3)).norm(),
+            1e-12);
+}
+
+TEST(Covariance, OfTheBaseIsThatOfPosesDrawnAroundTheCamera) {
+  // Numerically: the base's pose for a small right perturbation of the camera's, in each of its six directions.
+  const Rigid3 map_from_base = on_circle(2), map_from_cam = map_from_base * mount();
+  Matrix6d j;
+  for (int i = 0; i < 6; ++i) {
+    Vector6d d = Vector6d::Zero();
+    d(i) = 1e-6;
+    const Rigid3 moved = map_from_cam * Rigid3(rotation_by(d.tail<3>()), d.head<3>()) * mount().inverse();
+    const Eigen::AngleAxisd turn(moved.rotation * map_from_base.rotation.conjugate());  // about the fixed axes
+    j.col(i) << (moved.translation - map_from_base.translation) / 1e-6, turn.angle() * turn.axis() / 1e-6;
+  }
+  Matrix6d in_camera = Matrix6d::Identity();
+  in_camera.diagonal() << 1e-4, 2e-4, 3e-4, 1e-5, 2e-5, 3e-5;
+  in_camera(0, 4) = in_camera(4, 0) = 1e-5;
+  const Matrix6d ros = ros_covariance(in_camera, mount(), map_from_base.rotation);
+  EXPECT_LT((ros - j * in_camera * j.transpose()).norm(), 1e-8);
+  EXPECT_LT((camera_covariance(ros, mount(), map_from_base.rotation) - in_camera).norm(), 1e-12);
+}
+
+TEST(OdometryHistory, GivesTheMotionBetweenItsMessages) {
+  OdometryHistory history(0.02);
+  for (int64_t t = 0; t <= 1000; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMs)));
+  const auto prior = history.between(333 * kMs, 366 * kMs);
+  ASSERT_TRUE(prior);
+  const Rigid3 truth = on_circle(0.333).inverse() * on_circle(0.366);
+  EXPECT_LT((prior->previous_from_current.translation - truth.translation).norm(), 1e-4);
+  EXPECT_LT(prior->previous_from_current.rotation.angularDistance(truth.rotation), 1e-4);
+  // Beyond the newest message by its twist, but not far; and not before the first.
+  EXPECT_TRUE(history.between(980 * kMs, 1033 * kMs));
+  EXPECT_FALSE(history.between(980 * kMs, 1133 * kMs));
+  EXPECT_FALSE(history.between(-10 * kMs, 33 * kMs));
+  // 2% of 0.0165 m and 1 mm.
+  EXPECT_NEAR(std::sqrt(prior->covariance(0, 0)), 0.02 * 0.0165 + 1e-3, 1e-4);
+}
+
+TEST(OdometryHistory, LeavesOutWhatIsLateOrNoNumber) {
+  OdometryHistory history(0.02);
+  EXPECT_TRUE(history.add(odometry_at(20 * kMs)));
+  EXPECT_FALSE(history.add(odometry_at(20 * kMs)));
+  OdometryMessage broken = odometry_at(40 * kMs);
+  broken.pose.translation.x() = NAN;
+  EXPECT_FALSE(history.add(broken));
+  EXPECT_FALSE(history.between(20 * kMs, 20 * kMs + 1'000'000'000));
+}
+
+TEST(GyroHistory, AddsUpRotations) {
+  GyroHistory history;
+  ImuMessage m;
+  m.angular_velocity = {0, 0, 0.4};
+  for (int64_t t = 0; t <= 100; t += 5) {
+    m.stamp_ns = t * kMs;
+    EXPECT_TRUE(history.add(m));
+  }
+  const auto prior = history.between(3 * kMs, 98 * kMs);
+  ASSERT_TRUE(prior);
+  EXPECT_TRUE(prior->rotation_only);
+  EXPECT_LT(prior->previous_from_current.rotation.angularDistance(rotation_by({0, 0, 0.4 * 0.095})), 1e-9);
+  EXPECT_FALSE(history.between(3 * kMs, 300 * kMs));
+  m.stamp_ns = 200 * kMs;
+  m.covariance(0, 0) = -1;  // an imu without a gyroscope
+  EXPECT_FALSE(history.add(m));
+}
+
+TEST(MotionPrior, OfTheBaseIsTheCamerasAfterTheMount) {
+  OdometryHistory history(0.02);
+  for (int64_t t = 0; t <= 100; t += 20) history.add(odometry_at(t * kMs));
+  const auto prior = history.between(20 * kMs, 80 * kMs);
+  ASSERT_TRUE(prior);
+  const dkb::MotionPrior moved = moved_to_camera(*prior, mount().inverse());
+  const Rigid3 truth = (on_circle(0.02) * mount()).inverse() * (on_circle(0.08) * mount());
+  EXPECT_LT((moved.previous_from_current.translation - truth.translation).norm(), 1e-4);
+  EXPECT_GT(moved.previous_from_current.translation.z(), 0.02);  // ahead is z
+}
+
+}  // namespace
+}  // namespace dkb_ros

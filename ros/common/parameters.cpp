@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parameters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace dkb_ros {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+std::vector<ParameterDescription> own_parameters() {
+  return {
+      {"map_frame", "map", "frame of the map, which is corrected and may jump"},
+      {"odom_frame", "odom", "frame that never jumps, for steering"},
+      {"base_frame", "base_link", "frame of the robot; the poses are its"},
+      {"camera_frame", "", "optical frame of the colour camera; empty = as its images say"},
+      {"base_from_cam", std::vector<double>{}, "[m, quaternion] mount of the camera, x y z qx qy qz qw; empty = by TF"},
+      {"publish_map_tf", true, "send map -> odom to TF"},
+      {"publish_odom_tf", true, "send odom -> base to TF; false: the robot does, and map -> odom goes on top of it"},
+      {"camera", "", "camera file, or fr1, fr2, fr3, bonn, in the place of rgb/camera_info"},
+      {"rectified", false, "colour images are rectified: take P of the CameraInfo, no distortion"},
+      {"depth_factor", 1000.0, "[units per metre] of 16UC1 depth images", 1e-3, 1e6},
+      {"sync_tolerance", 0.02, "[s] between the stamps of a colour image and its depth image", 0, 1},
+      {"queue_size", int64_t{10}, "[frames] that may wait for tracking; then the oldest is dropped", 1, 1000},
+      {"prior", "auto", "who helps where the images do not tell", -kInf, kInf, {"none", "odom", "imu", "auto"}},
+      {"prior_drift", 0.02, "error of odom_prior per metre and radian where it gives no covariance", 1e-4, 1},
+      {"detector", "auto", "what may move is found by: auto, yolo, motion, none; several joined by +"},
+      {"model", "", "ONNX file of the yolo detector"},
+      {"labels", "", "class names of that model, one per line; empty = COCO's"},
+      {"detect_every", int64_t{0}, "[frames] between detections; 0 = by the model's size", 0, 1000},
+      {"detect_latency", int64_t{0}, "[frames] until a detection is used; 0 = by the model's size", 0, 1000},
+      {"load_map", "", "map file to go on in"},
+      {"localize_only", false, "do not change the map"},
+      {"map_period", 1.0, "[s] between map_points and path; 0 = never", 0, 3600},
+      {"grid_period", 0.0, "[s] between grids, which cost memory and time; 0 = never", 0, 3600},
+      {"path_step", 0.05, "[m] between poses of the path", 0, 100},
+      {"preset", "default", "what the settings start from", -kInf, kInf, {"default", "paper", "orb"}},
+  };
+}
+
+// "0.01 ... 1", "above 0, at most 2", "at least 1", or names by comma.
+void read_range(const std::string& text, ParameterDescription* d) {
+  std::istringstream in(text);
+  const size_t dots = text.find(" ... ");
+  if (dots != std::string::npos) {
+    d->min = std::stod(text.substr(0, dots));
+    d->max = std::stod(text.substr(dots + 5));
+    return;
+  }
+  const auto number_after = [&](const std::string& word, double otherwise) {
+    const size_t at = text.find(word + " ");
+    return at == std::string::npos ? otherwise : std::stod(text.substr(at + word.size() + 1));
+  };
+  d->min = number_after("at least", number_after("above", -kInf));
+  d->max = number_after("at most", kInf);
+  if (!std::holds_alternative<std::string>(d->initial)) return;
+  for (std::string name; in >> name;) {
+    if (name.back() == ',') name.pop_back();
+    d->choices.push_back(name);
+  }
+}
+
+// The library writes its settings as YAML, a line each: "  count: 1000  # [features] wanted (at least 1; default
+// 1000)".
+std::vector<ParameterDescription> settings() {
+  std::vector<ParameterDescription> found;
+  std::istringstream yaml{dkb::Options().to_yaml()};
+  std::vector<std::string> sections;
+  for (std::string line; std::getline(yaml, line);) {
+    const size_t indent = line.find_first_not_of(' '), colon = line.find(':');
+    if (indent == std::string::npos || colon == std::string::npos) continue;
+    sections.resize(indent / 2);
+    std::string key = line.substr(indent, colon - indent);
+    const size_t comment = line.find("  # ", colon);
+    if (comment == std::string::npos) {  // a section
+      sections.push_back(key);
+      continue;
+    }
+    if (key == "preset") continue;
+    std::string name;
+    for (const std::string& s : sections) name += s + ".";
+    const std::string value = line.substr(colon + 2, comment - colon - 2);
+    const size_t notes = line.rfind(" ("), fallback = line.rfind("default ");
+    const std::string range = fallback > notes + 2 ? line.substr(notes + 2, fallback - notes - 4) : "";
+    ParameterDescription d{name + key, value, line.substr(comment + 4, notes - comment - 4)};
+    char* end = nullptr;
+    const double number = std::strtod(value.c_str(), &end);
+    const bool is_number = end != value.c_str() && *end == '\0';
+    const bool is_count = is_number && value.find_first_of(".e") == std::string::npos;
+    if (value == "true" || value == "false")
+      d.initial = value == "true";
+    else if (is_number)
+      d.initial = number;
+    read_range(range, &d);
+    // What the library keeps as a whole number refuses a fraction.
+    if (is_count) try {
+        dkb::Options().set(d.name, value + ".5");
+      } catch (const dkb::InputError&) {
+        d.initial = static_cast<int64_t>(number);
+      }
+    found.push_back(std::move(d));
+  }
+  return found;
+}
+
+std::string text_of(const ParameterValue& value) {
+  std::ostringstream text;
+  text.precision(17);
+  if (const bool* b = std::get_if<bool>(&value)) text << (*b ? "true" : "false");
+  if (const int64_t* i = std::get_if<int64_t>(&value)) text << *i;
+  if (const double* d = std::get_if<double>(&value)) text << *d;
+  if (const std::string* s = std::get_if<std::string>(&value)) text << *s;
+  if (std::holds_alternative<std::vector<double>>(value)) text << "[]";
+  return text.str();
+}
+
+std::string short_text_of(const ParameterValue& value) {
+  const double* number = std::get_if<double>(&value);
+  if (number == nullptr) return text_of(value);
+  std::ostringstream text;
+  text << *number;
+  return text.str();
+}
+
+std::string range_of(const ParameterDescription& d) {
+  std::string text;
+  for (const std::string& c : d.choices) text += (text.empty() ? "" : ", ") + c;
+  if (std::isfinite(d.min) && std::isfinite(d.max)) return short_text_of(d.min) + " ... " + short_text_of(d.max);
+  if (std::isfinite(d.min)) return "from " + short_text_of(d.min);
+  return text;
+}
+
+// Values by name, of the types that the table says.
+class Values {
+ public:
+  explicit Values(const std::map<std::string, ParameterValue>& given) {
+    for (const ParameterDescription& d : parameter_descriptions()) all_.emplace(d.name, d.initial);
+    for (const auto& [name, value] : given) {
+      const auto known = all_.find(name);
+      if (known == all_.end()) throw dkb::InputError(name + ": there is no such parameter; docs/ros.md lists them");
+      // An integer for a number is a convenience of launch files.
+      const int64_t* whole = std::get_if<int64_t>(&value);
+      if (whole != nullptr && std::holds_alternative<double>(known->second))
+        known->second = static_cast<double>(*whole);
+      else if (value.index() == known->second.index())
+        known->second = value;
+      else
+        throw dkb::InputError(name + ": its type is wrong; docs/ros.md lists the parameters");
+    }
+  }
+
+  template <class T>
+  T get(const std::string& name) const {
+    const T value = std::get<T>(all_.at(name));
+    if constexpr (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) {
+      const ParameterDescription& d = description(name);
+      if (!(static_cast<double>(value) >= d.min && static_cast<double>(value) <= d.max))
+        throw dkb::InvalidOption(name, text_of(value), range_of(d));
+    }
+    return value;
+  }
+  int number(const std::string& name) const { return static_cast<int>(get<int64_t>(name)); }
+  std::string text(const std::string& name) const { return get<std::string>(name); }
+  std::string any(const std::string& name) const { return text_of(all_.at(name)); }
+
+ private:
+  static const ParameterDescription& description(const std::string& name) {
+    const auto& all = parameter_descriptions();
+    return *std::find_if(all.begin(), all.end(), [&](const ParameterDescription& d) { return d.name == name; });
+  }
+
+  std::map<std::string, ParameterValue> all_;
+};
+
+Rigid3 mount(const std::vector<double>& numbers) {
+  const std::string remedy = "base_from_cam: it must be 7 numbers, x y z qx qy qz qw, with a quaternion of length 1";
+  if (numbers.size() != 7) throw dkb::InputError(remedy);
+  Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
+  const Eigen::Vector3d t(numbers[0], numbers[1], numbers[2]);
+  if (!t.allFinite() || !(std::abs(q.norm() - 1) < 0.01)) throw dkb::InputError(remedy);
+  return {q.normalized(), t};
+}
+
+PriorKind prior_kind(const std::string& name) {
+  if (name == "none") return PriorKind::none;
+  if (name == "odom") return PriorKind::odom;
+  if (name == "imu") return PriorKind::imu;
+  if (name == "auto") return PriorKind::automatic;
+  throw dkb::InputError("prior: there is no kind \"" + name + "\"; kinds: none, odom, imu, auto");
+}
+
+}  // namespace
+
+const std::vector<ParameterDescription>& parameter_descriptions() {
+  static const std::vector<ParameterDescription> all = [] {
+    std::vector<ParameterDescription> list = own_parameters();
+    for (ParameterDescription& d : settings()) list.push_back(std::move(d));
+    return list;
+  }();
+  return all;
+}
+
+std::string parameter_table() {
+  static constexpr const char* types[] = {"bool", "int", "double", "string", "double[]"};
+  std::string table = "| parameter | type | range | default | meaning |\n|---|---|---|---|---|\n";
+  for (const ParameterDescription& d : own_parameters())
+    table += "| `" + d.name + "` | " + types[d.initial.index()] + " | " + range_of(d) + " | " +
+             short_text_of(d.initial) + " | " + d.meaning + " |\n";
+  return table;
+}
+
+Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& given) {
+  const Values values(given);
+  Parameters p;
+  p.map_frame = values.text("map_frame");
+  p.odom_frame = values.text("odom_frame");
+  p.base_frame = values.text("base_frame");
+  p.camera_frame = values.text("camera_frame");
+  const auto numbers = values.get<std::vector<double>>("base_from_cam");
+  if (!numbers.empty()) p.base_from_cam = mount(numbers);
+  p.publish_map_tf = values.get<bool>("publish_map_tf");
+  p.publish_odom_tf = values.get<bool>("publish_odom_tf");
+  p.camera = values.text("camera");
+  p.rectified = values.get<bool>("rectified");
+  p.depth_factor = values.get<double>("depth_factor");
+  p.sync_tolerance = values.get<double>("sync_tolerance");
+  p.queue_size = values.number("queue_size");
+  p.prior = prior_kind(values.text("prior"));
+  p.prior_drift = values.get<double>("prior_drift");
+  p.detector.kinds = values.text("detector");
+  p.detector.model = values.text("model");
+  p.detector.labels = values.text("labels");
+  p.detector.every = values.number("detect_every");
+  p.detector.latency = values.number("detect_latency");
+  p.load_map = values.text("load_map");
+  p.localize_only = values.get<bool>("localize_only");
+  p.map_period = values.get<double>("map_period");
+  p.grid_period = values.get<double>("grid_period");
+  p.path_step = values.get<double>("path_step");
+
+  p.options = dkb::Options(values.text("preset"));
+  for (const auto& [name, value] : given) {
+    const auto own = own_parameters();
+    if (std::any_of(own.begin(), own.end(), [&, &key = name](const auto& d) { return d.name == key; })) continue;
+    p.options.set(name, values.any(name), "parameter");
+  }
+  p.options.check();
+  p.options.realtime = true;
+  p.options.dense_map = p.grid_period > 0;
+  return p;
+}
+
+}  // namespace dkb_ros

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the core does beside tracking: map, path, grid and diagnostics.
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <future>
+#include <utility>
+
+#include "outputs.h"
+#include "slam_core.h"
+
+namespace dkb_ros {
+namespace {
+
+std::chrono::steady_clock::time_point in_seconds(double s) {
+  return std::chrono::steady_clock::now() +
+         std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+}  // namespace
+
+void SlamCore::run_reports() {
+  auto diagnostics_due = in_seconds(1), map_due = in_seconds(parameters_.map_period);
+  int64_t published_ns = 0;
+  std::unique_lock lock(report_mutex_);
+  while (true) {
+    const auto due = parameters_.map_period > 0 ? std::min(diagnostics_due, map_due) : diagnostics_due;
+    if (report_due_.wait_until(lock, due, [this] { return stopping_; })) return;
+    const auto now = std::chrono::steady_clock::now();
+    const std::shared_ptr<const dkb::Slam> slam = slam_;
+    const int64_t stamp_ns = last_result_stamp_ns_;
+    lock.unlock();
+    if (now >= diagnostics_due) {
+      publish_diagnostics(slam.get());
+      diagnostics_due = in_seconds(1);
+    }
+    if (parameters_.map_period > 0 && now >= map_due) {
+      if (slam && stamp_ns != published_ns) publish_map(*slam, stamp_ns);
+      published_ns = stamp_ns;
+      map_due = in_seconds(parameters_.map_period);
+    }
+    lock.lock();
+  }
+}
+
+void SlamCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
+  if (middleware_.wanted(Topic::map_points)) {
+    CloudOutput cloud = cloud_of(slam.map().points());
+    cloud.stamp_ns = stamp_ns;
+    cloud.frame_id = parameters_.map_frame;
+    middleware_.publish(cloud);
+  }
+  if (middleware_.wanted(Topic::path))
+    middleware_.publish(
+        PathOutput{stamp_ns, parameters_.map_frame,
+                   path_of(slam.trajectory(), slam.options().base_from_cam.inverse(), parameters_.path_step)});
+}
+
+// The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.
+void SlamCore::run_grids() {
+#ifdef __linux__
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
+#endif
+  bool said_no_floor = false;
+  std::unique_lock lock(report_mutex_);
+  while (!report_due_.wait_until(lock, in_seconds(parameters_.grid_period), [this] { return stopping_; })) {
+    const bool started = slam_ != nullptr;
+    lock.unlock();
+    if (started && middleware_.wanted(Topic::grid)) {
+      std::promise<Answer> answered;
+      std::function<dkb::DenseMap()> make_dense_map;
+      int64_t stamp_ns = 0;
+      request(
+          [&](dkb::Slam& slam) {
+            make_dense_map = slam.dense_map_task();
+            stamp_ns = last_stamp_ns_.value_or(0);
+            return Answer{true, ""};
+          },
+          [&](const Answer& answer) { answered.set_value(answer); });
+      if (answered.get_future().get().success) try {
+          const dkb::DenseMap dense = make_dense_map();
+          if (dense.grid) {
+            GridOutput grid = grid_in_map(*dense.grid);
+            grid.stamp_ns = stamp_ns;
+            grid.frame_id = parameters_.map_frame;
+            middleware_.publish(grid);
+          } else if (!std::exchange(said_no_floor, true)) {
+            middleware_.log(LogLevel::warning, "no grid: the floor has not been seen");
+          }
+        } catch (const dkb::InputError& error) {
+          middleware_.log(LogLevel::warning, error.what());
+        }
+    }
+    lock.lock();
+  }
+}
+
+void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
+  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, last_image_ns = 0;
+  {
+    const std::lock_guard lock(input_mutex_);
+    unpaired = pairing_.unpaired();
+    late = pairing_.late();
+    late_motion = late_motion_;
+    dropped = dropped_;
+    last_image_ns = last_image_ns_;
+  }
+  const int maps = slam == nullptr ? 0 : slam->statistics().maps;
+  std::unique_lock lock(report_mutex_);
+  const int64_t newly_dropped = dropped - reported_dropped_;
+  reported_dropped_ = dropped;
+  const double silent = 1e-9 * static_cast<double>(steady_ns() - last_image_ns);
+  using Level = DiagnosticsOutput::Level;
+  DiagnosticsOutput d;
+  d.stamp_ns = middleware_.now_ns();
+  const auto say = [&](Level level, const std::string& message) {
+    if (level <= d.level && !d.message.empty()) return;
+    d.level = level;
+    d.message = message;
+  };
+  if (last_image_ns == 0)
+    say(Level::error, "no images have come");
+  else if (silent > 2)
+    say(Level::error, "no images for " + number(silent) + " s");
+  if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
+  if (slam != nullptr && state_ == dkb::TrackingState::predicted)
+    say(Level::warning, "carried by the motion prior");
+  else if (slam != nullptr && (state_ == dkb::TrackingState::lost || state_ == dkb::TrackingState::initialising))
+    say(Level::warning, "not localised");
+  if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
+  if (maps > 1) say(Level::warning, std::to_string(maps) + " maps that are not joined: poses are in the newest");
+  if (d.message.empty()) d.message = dkb::name_of(state_);
+  const auto add = [&](const std::string& key, const std::string& value) { d.values.emplace_back(key, value); };
+  const auto count = [&](const std::string& key, int64_t value) { add(key, std::to_string(value)); };
+  add("state", slam == nullptr ? "waiting" : dkb::name_of(state_));
+  count("frames", counts_.frames);
+  count("tracked", counts_.tracked);
+  count("predicted", counts_.predicted);
+  count("lost", counts_.lost);
+  count("dropped", dropped);
+  count("unpaired", unpaired);
+  count("late", late);
+  count("late odometry", late_motion);
+  count("rejected", counts_.rejected);
+  count("waiting", counts_.waiting);
+  count("with prior", counts_.priors);
+  count("maps", maps);
+  count("rate [1/s]", recent_.frames);
+  const auto series = [&](const std::string& name, const Series& s) {
+    add(name + " mean [ms]", number(s.count == 0 ? 0 : s.sum / static_cast<double>(s.count)));
+    add(name + " max [ms]", number(s.max));
+  };
+  series("skew", recent_.skew_ms);
+  series("tracking", recent_.tracking_ms);
+  series("latency", recent_.latency_ms);
+  series("overhead", recent_.overhead_ms);
+  recent_ = {};
+  lock.unlock();
+  middleware_.publish(d);
+}
+
+}  // namespace dkb_ros

@@ -1,0 +1,466 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "slam_core.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "inputs.h"
+#include "outputs.h"
+
+namespace dkb_ros {
+namespace {
+
+constexpr int64_t kRepeatAfter = 10'000'000'000;  // [ns] before the same complaint is made again
+constexpr size_t kMaxUnplaced = 30;               // [frames] that wait for the robot's odometry
+
+// Messages that differ in their numbers say the same.
+std::string without_digits(std::string text) {
+  std::erase_if(text, [](char c) { return c >= '0' && c <= '9'; });
+  return text;
+}
+
+const char* text_of(bool on) {
+  return on ? "on" : "off";
+}
+
+}  // namespace
+
+SlamCore::SlamCore(const Parameters& parameters, Middleware& middleware)
+    : parameters_(parameters),
+      middleware_(middleware),
+      pairing_(static_cast<int64_t>(1e9 * parameters.sync_tolerance), static_cast<size_t>(parameters.queue_size)),
+      odometry_(parameters.prior_drift) {
+  parameters_.options.check();
+  tracking_ = std::thread([this] { run_tracking(); });
+  reports_ = std::thread([this] { run_reports(); });
+  if (parameters_.grid_period > 0) grids_ = std::thread([this] { run_grids(); });
+}
+
+SlamCore::~SlamCore() {
+  {
+    const std::scoped_lock lock(input_mutex_, report_mutex_);
+    stopping_ = true;
+  }
+  input_changed_.notify_all();
+  report_due_.notify_all();
+  tracking_.join();
+  reports_.join();
+  if (grids_.joinable()) grids_.join();
+}
+
+void SlamCore::colour(ImageMessage image) {
+  image.arrived_ns = steady_ns();
+  const std::lock_guard lock(input_mutex_);
+  last_image_ns_ = image.arrived_ns;
+  enqueue(pairing_.add_colour(std::move(image)));
+}
+
+void SlamCore::depth(ImageMessage image) {
+  image.arrived_ns = steady_ns();
+  const std::lock_guard lock(input_mutex_);
+  last_image_ns_ = image.arrived_ns;
+  enqueue(pairing_.add_depth(std::move(image)));
+}
+
+void SlamCore::enqueue(std::vector<ImagePair> pairs) {
+  for (ImagePair& pair : pairs) {
+    if (pairs_.size() == static_cast<size_t>(parameters_.queue_size)) {
+      const bool jumped = pairs_.front().clock_jumped;
+      pairs_.pop_front();
+      ++dropped_;
+      if (jumped) (pairs_.empty() ? pair : pairs_.front()).clock_jumped = true;
+    }
+    pairs_.push_back(std::move(pair));
+  }
+  if (!pairs_.empty()) input_changed_.notify_one();
+}
+
+void SlamCore::camera_info(const CameraInfoMessage& info) {
+  const std::lock_guard lock(input_mutex_);
+  if (!camera_info_) camera_info_ = info;
+}
+
+void SlamCore::odometry(const OdometryMessage& odometry) {
+  const std::lock_guard lock(input_mutex_);
+  if (!odometry_.add(odometry)) ++late_motion_;
+}
+
+void SlamCore::imu(const ImuMessage& imu) {
+  const std::lock_guard lock(input_mutex_);
+  if (!gyro_.add(imu)) ++late_motion_;
+}
+
+void SlamCore::initial_pose(const PoseMessage& pose) {
+  request(
+      [this, pose](dkb::Slam& slam) {
+        const auto map_from_frame = pose.frame_id.empty() || pose.frame_id == parameters_.map_frame
+                                        ? Rigid3()
+                                        : middleware_.transform(parameters_.map_frame, pose.frame_id, std::nullopt);
+        if (!map_from_frame)
+          return Answer{false, "initialpose: no transform from " + parameters_.map_frame + " to " + pose.frame_id};
+        if (!pose.pose.translation.allFinite() || !(std::abs(pose.pose.rotation.norm() - 1) < 0.01))
+          return Answer{false, "initialpose: it is no pose"};
+        const Rigid3 base(pose.pose.rotation.normalized(), pose.pose.translation);
+        Matrix6d covariance = camera_covariance(pose.covariance, base_from_cam_, base.rotation);
+        covariance.diagonal().array() += 1e-4;  // RViz gives none for height, roll and pitch
+        slam.suggest_pose(*map_from_frame * base * base_from_cam_, covariance);
+        return Answer{true, ""};
+      },
+      [](const Answer&) {});
+}
+
+void SlamCore::request(Task task, Done done) {
+  {
+    const std::lock_guard lock(input_mutex_);
+    if (!stopping_) {
+      tasks_.emplace_back(std::move(task), std::move(done));
+      input_changed_.notify_one();
+      return;
+    }
+  }
+  done({false, "the node is stopping"});
+}
+
+void SlamCore::save_map(const std::string& path, Done done) {
+  request(
+      [path](dkb::Slam& slam) {
+        slam.save_map(path);
+        return Answer{true, "map written to " + path};
+      },
+      std::move(done));
+}
+
+void SlamCore::load_map(const std::string& path, Done done) {
+  request(
+      [this, path](dkb::Slam& slam) {
+        slam.load_map(path);
+        begin_anew();
+        return Answer{true, "going on in " + path};
+      },
+      std::move(done));
+}
+
+void SlamCore::reset(Done done) {
+  request(
+      [this](dkb::Slam& slam) {
+        slam.reset();
+        begin_anew();
+        return Answer{true, "a new world begins"};
+      },
+      std::move(done));
+}
+
+void SlamCore::pause(bool on, Done done) {
+  request(
+      [on](dkb::Slam& slam) {
+        slam.pause(on);
+        return Answer{true, std::string("pause is ") + text_of(on)};
+      },
+      std::move(done));
+}
+
+void SlamCore::localize_only(bool on, Done done) {
+  request(
+      [on](dkb::Slam& slam) {
+        slam.localize_only(on);
+        return Answer{true, std::string("localize_only is ") + text_of(on)};
+      },
+      std::move(done));
+}
+
+void SlamCore::run_tracking() {
+  std::unique_lock lock(input_mutex_);
+  while (true) {
+    input_changed_.wait(lock, [this] { return stopping_ || !tasks_.empty() || !pairs_.empty(); });
+    if (!tasks_.empty()) {
+      const auto [task, done] = std::move(tasks_.front());
+      tasks_.pop_front();
+      const bool stopping = stopping_;
+      lock.unlock();
+      Answer answer{false, stopping ? "the node is stopping" : "no frame has come yet, so there is no map"};
+      if (slam_ && !stopping) try {
+          answer = task(*slam_);
+        } catch (const dkb::InputError& error) {
+          answer = {false, error.what()};
+        }
+      if (!answer.success) complain(LogLevel::warning, answer.message);
+      done(answer);
+      lock.lock();
+      continue;
+    }
+    if (stopping_) return;
+    const ImagePair pair = std::move(pairs_.front());
+    pairs_.pop_front();
+    lock.unlock();
+    try {
+      process(pair);
+    } catch (const dkb::InputError& error) {
+      complain(LogLevel::error, error.what());
+      const std::lock_guard report(report_mutex_);
+      ++counts_.rejected;
+      trouble_ = error.what();
+    }
+    lock.lock();
+  }
+}
+
+void SlamCore::process(const ImagePair& pair) {
+  if (pair.clock_jumped) {
+    {
+      const std::lock_guard lock(input_mutex_);
+      odometry_.clear();
+      gyro_.clear();
+    }
+    complain(LogLevel::warning, "the stamps of the images went back by more than a second: a new world begins");
+    if (slam_) slam_->reset();
+    forget_motion();
+  }
+  if (!slam_ && !start(pair)) return;
+  const dkb::FrameInput input = input_of(pair);
+  const dkb::FrameResult result = slam_->process(input);
+  if (result.state != dkb::TrackingState::paused) last_stamp_ns_ = pair.colour.stamp_ns;
+  publish(pair, input, result);
+}
+
+const std::string& SlamCore::camera_frame(const ImagePair& pair) const {
+  return parameters_.camera_frame.empty() ? pair.colour.frame_id : parameters_.camera_frame;
+}
+
+// Makes the library's system once the camera and its mount are known.
+bool SlamCore::start(const ImagePair& pair) {
+  const auto wait_for = [this](const std::string& what) {
+    complain(LogLevel::warning, what);
+    const std::lock_guard lock(report_mutex_);
+    ++counts_.waiting;
+    trouble_ = what;
+    return false;
+  };
+  const std::optional<dkb::Camera> camera = find_camera();
+  if (!camera) return wait_for("waiting for rgb/camera_info; without it, set `camera`");
+  const std::string& frame = camera_frame(pair);
+  const auto mount = parameters_.base_from_cam ? parameters_.base_from_cam
+                                               : middleware_.transform(parameters_.base_frame, frame, std::nullopt);
+  if (!mount)
+    return wait_for("waiting for the transform from " + parameters_.base_frame + " to " + frame +
+                    "; without one, set `base_from_cam`");
+  base_from_cam_ = *mount;
+  camera_frame_ = frame;
+  dkb::Options options = parameters_.options;
+  options.base_from_cam = base_from_cam_;
+  auto slam = std::make_shared<dkb::Slam>(*camera, options, dkb::make_detectors(parameters_.detector, *camera));
+  slam->localize_only(parameters_.localize_only);
+  if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
+  middleware_.log(LogLevel::info, "started: camera " + std::to_string(camera->width) + " x " +
+                                      std::to_string(camera->height) + " in " + frame);
+  if (pair.depth.frame_id != pair.colour.frame_id)
+    middleware_.log(LogLevel::warning, "depth/image is in frame " + pair.depth.frame_id + ", rgb/image in " +
+                                           pair.colour.frame_id + ": taken for registered to the colour image");
+  const std::lock_guard lock(report_mutex_);
+  slam_ = std::move(slam);
+  return true;
+}
+
+std::optional<dkb::Camera> SlamCore::find_camera() {
+  std::optional<dkb::Camera> camera;
+  if (!parameters_.camera.empty()) {
+    camera = std::filesystem::exists(parameters_.camera) ? dkb::Camera::load(parameters_.camera)
+                                                         : dkb::Camera::named(parameters_.camera);
+  } else {
+    const std::lock_guard lock(input_mutex_);
+    if (!camera_info_) return std::nullopt;
+    const CameraInfoMessage info = *camera_info_;
+    camera_info_.reset();  // a wrong one may be followed by a right one
+    camera = camera_of(info, parameters_.rectified);
+    camera_info_ = info;
+  }
+  camera->depth_factor = parameters_.depth_factor;
+  camera->check();
+  return camera;
+}
+
+dkb::FrameInput SlamCore::input_of(const ImagePair& pair) {
+  dkb::FrameInput input;
+  input.stamp_ns = pair.colour.stamp_ns;
+  input.colour = view_of(pair.colour, false);
+  input.depth = view_of(pair.depth, true);
+  input.depth_stamp_ns = pair.depth.stamp_ns;
+  if (last_stamp_ns_) input.prior = prior(input.stamp_ns);
+  return input;
+}
+
+// What wheels or gyroscope say of the motion since the frame before.
+std::optional<dkb::MotionPrior> SlamCore::prior(int64_t stamp_ns) {
+  const PriorKind kind = parameters_.prior;
+  std::optional<dkb::MotionPrior> motion;
+  std::string frame;
+  {
+    const std::lock_guard lock(input_mutex_);
+    if ((kind == PriorKind::odom || kind == PriorKind::automatic) && !odometry_.empty()) {
+      motion = odometry_.between(*last_stamp_ns_, stamp_ns);
+      frame = odometry_.child_frame_id();
+    }
+    if (!motion && (kind == PriorKind::imu || kind == PriorKind::automatic) && !gyro_.empty()) {
+      motion = gyro_.between(*last_stamp_ns_, stamp_ns);
+      frame = gyro_.frame_id();
+    }
+  }
+  if (!motion) return std::nullopt;
+  const std::optional<Rigid3> cam_from_frame = cam_from(frame);
+  if (!cam_from_frame) {
+    complain(LogLevel::warning, "no transform from " + camera_frame_ + " to " + frame + ": its motion is not used");
+    return std::nullopt;
+  }
+  const std::lock_guard lock(report_mutex_);
+  ++counts_.priors;
+  return moved_to_camera(*motion, *cam_from_frame);
+}
+
+std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
+  if (frame.empty() || frame == parameters_.base_frame) return base_from_cam_.inverse();
+  const auto known = cam_from_frame_.find(frame);
+  if (known != cam_from_frame_.end()) return known->second;
+  const std::optional<Rigid3> found = middleware_.transform(camera_frame_, frame, std::nullopt);
+  if (found) cam_from_frame_.emplace(frame, *found);
+  return found;
+}
+
+void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
+  publish_odometry(result);
+  const double out_ms =
+      1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
+  {
+    const std::lock_guard lock(report_mutex_);
+    trouble_.clear();
+    state_ = result.state;
+    last_result_stamp_ns_ = result.stamp_ns;
+    ++counts_.frames;
+    counts_.tracked += result.tracked();
+    counts_.predicted += result.state == dkb::TrackingState::predicted;
+    counts_.lost += result.state == dkb::TrackingState::lost;
+    ++recent_.frames;
+    recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
+    recent_.tracking_ms.add(result.tracking_ms);
+    recent_.latency_ms.add(out_ms);
+    recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
+  }
+  publish_transforms(result);
+  if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
+    MoversOutput movers = movers_of(result);
+    movers.frame_id = parameters_.map_frame;
+    middleware_.publish(movers);
+  }
+  if (middleware_.wanted(Topic::features_image)) {
+    ColourImageOutput image = draw_features(input.colour, result);
+    image.stamp_ns = result.stamp_ns;
+    image.frame_id = camera_frame_;
+    middleware_.publish(image);
+  }
+  tell_events();
+}
+
+void SlamCore::publish_odometry(const dkb::FrameResult& result) {
+  if (!result.tracked()) {
+    last_pose_.reset();
+    return;
+  }
+  const Rigid3 odom_from_base = *result.odom_from_cam * base_from_cam_.inverse();
+  const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
+  OdometryOutput odometry;
+  odometry.pose = {result.stamp_ns, parameters_.odom_frame, odom_from_base,
+                   ros_covariance(covariance, base_from_cam_, odom_from_base.rotation)};
+  odometry.child_frame_id = parameters_.base_frame;
+  const Matrix6d to_base = adjoint(base_from_cam_);
+  const Matrix6d in_base = to_base * covariance * to_base.transpose();
+  const double dt = last_pose_ ? 1e-9 * static_cast<double>(result.stamp_ns - last_pose_->stamp_ns) : 0;
+  if (dt > 0) {
+    // The errors of both poses are taken for independent: an upper bound, since they share the map's.
+    odometry.twist = twist_of(last_pose_->odom_from_base.inverse() * odom_from_base) / dt;
+    odometry.twist_covariance = (last_pose_->covariance + in_base) / (dt * dt);
+  } else {
+    odometry.twist_covariance = 1e6 * Matrix6d::Identity();  // not known
+  }
+  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
+  middleware_.publish(odometry);
+}
+
+void SlamCore::publish_transforms(const dkb::FrameResult& result) {
+  const Rigid3 cam_from_base = base_from_cam_.inverse();
+  std::vector<TransformOutput> transforms;
+  if (result.tracked()) {
+    const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
+    if (parameters_.publish_odom_tf) {
+      map_from_odom_ = result.world_from_odom;
+      transforms.push_back(
+          {result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, *result.odom_from_cam * cam_from_base});
+    } else {
+      place_robots_odometry(result.stamp_ns, map_from_base);
+    }
+    if (middleware_.wanted(Topic::pose))
+      middleware_.publish(PoseMessage{
+          result.stamp_ns, parameters_.map_frame, map_from_base,
+          ros_covariance(result.covariance.value_or(Matrix6d::Identity()), base_from_cam_, map_from_base.rotation)});
+  }
+  // While the camera is lost, the last one holds.
+  if (parameters_.publish_map_tf && map_from_odom_)
+    transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
+  if (!transforms.empty()) middleware_.publish(transforms);
+}
+
+// map -> odom, where odom -> base is the robot's. Its odometry of a frame's time may come later than the frame's pose.
+void SlamCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base) {
+  unplaced_.emplace_back(stamp_ns, map_from_base);
+  if (unplaced_.size() > kMaxUnplaced) unplaced_.pop_front();
+  for (auto frame = unplaced_.rbegin(); frame != unplaced_.rend(); ++frame) {
+    const auto odom_from_base = middleware_.transform(parameters_.odom_frame, parameters_.base_frame, frame->first);
+    if (!odom_from_base) continue;
+    map_from_odom_ = frame->second * odom_from_base->inverse();
+    unplaced_.erase(unplaced_.begin(), frame.base());
+    return;
+  }
+  if (unplaced_.size() == kMaxUnplaced)
+    complain(LogLevel::warning, "no transform from " + parameters_.odom_frame + " to " + parameters_.base_frame +
+                                    " at the images' times; with `publish_odom_tf` false the robot must send it");
+}
+
+// After a service: the images that follow may have any stamps.
+void SlamCore::begin_anew() {
+  forget_motion();
+  const std::lock_guard lock(input_mutex_);
+  pairing_.restart();
+  odometry_.clear();
+  gyro_.clear();
+}
+
+void SlamCore::forget_motion() {
+  last_stamp_ns_.reset();
+  last_pose_.reset();
+  map_from_odom_.reset();
+  unplaced_.clear();
+}
+
+void SlamCore::tell_events() {
+  for (const dkb::Event& e : slam_->take_events()) {
+    using Kind = dkb::Event::Kind;
+    if (e.kind == Kind::keyframe) continue;
+    const bool bad = e.kind == Kind::warning || e.kind == Kind::lost;
+    middleware_.log(bad ? LogLevel::warning : LogLevel::info,
+                    std::string(dkb::name_of(e.kind)) + (e.text.empty() ? "" : ": " + e.text));
+  }
+}
+
+// The same complaint is made again only after a while.
+void SlamCore::complain(LogLevel level, const std::string& text) {
+  const int64_t now = steady_ns();
+  const std::string gist = without_digits(text);
+  if (gist == last_complaint_ && now - last_complaint_ns_ < kRepeatAfter) return;
+  last_complaint_ = gist;
+  last_complaint_ns_ = now;
+  middleware_.log(level, text);
+}
+
+std::unique_ptr<RosCore> make_core(const std::map<std::string, ParameterValue>& parameters, Middleware& middleware) {
+  return std::make_unique<SlamCore>(Parameters::from_values(parameters), middleware);
+}
+
+}  // namespace dkb_ros

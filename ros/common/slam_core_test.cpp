@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+// The node without a middleware, on a short simulated sequence.
+#include "ros_core.h"
+
+#include <dkb_slam/source.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <future>
+#include <mutex>
+
+namespace dkb_ros {
+namespace {
+
+using namespace std::chrono_literals;
+
+// The optical axes in those of a body that looks where the camera looks.
+Rigid3 optical() {
+  return {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0, 0, 0}};
+}
+
+// Keeps what is published; knows the transforms that a test sets.
+class Recorder final : public Middleware {
+ public:
+  void log(LogLevel, const std::string& text) override {
+    const std::lock_guard lock(mutex);
+    logged.push_back(text);
+    changed.notify_all();
+  }
+  bool wanted(Topic) override { return true; }
+  int64_t now_ns() override { return 0; }
+  std::optional<Rigid3> transform(const std::string& target, const std::string& source,
+                                  std::optional<int64_t>) override {
+    const std::lock_guard lock(mutex);
+    const auto known = known_transforms.find(target + " " + source);
+    return known == known_transforms.end() ? std::nullopt : std::optional(known->second);
+  }
+  void publish(const std::vector<TransformOutput>& t) override { keep(&transforms, t); }
+  void publish(const OdometryOutput& o) override { keep(&odometry, o); }
+  void publish(const PoseMessage& p) override { keep(&poses, p); }
+  void publish(const PathOutput& p) override { keep(&paths, p); }
+  void publish(const CloudOutput& c) override { keep(&clouds, c); }
+  void publish(const MoversOutput& m) override { keep(&movers, m); }
+  void publish(const ColourImageOutput& i) override { keep(&images, i); }
+  void publish(const GridOutput& g) override { keep(&grids, g); }
+  void publish(const DiagnosticsOutput& d) override { keep(&diagnostics, d); }
+
+  template <class T>
+  void keep(std::vector<T>* list, const T& value) {
+    const std::lock_guard lock(mutex);
+    list->push_back(value);
+    changed.notify_all();
+  }
+  // Waits until `condition` holds; a machine that is never done fails.
+  template <class Condition>
+  bool wait(const Condition& condition) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, 100s, condition);
+  }
+  std::string last_value(const std::string& key) const {
+    if (diagnostics.empty()) return "";
+    for (const auto& [name, value] : diagnostics.back().values)
+      if (name == key) return value;
+    return "";
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::map<std::string, Rigid3> known_transforms;  // "target source"
+  std::vector<std::string> logged;
+  std::vector<std::vector<TransformOutput>> transforms;
+  std::vector<OdometryOutput> odometry;
+  std::vector<PoseMessage> poses;
+  std::vector<PathOutput> paths;
+  std::vector<CloudOutput> clouds;
+  std::vector<MoversOutput> movers;
+  std::vector<ColourImageOutput> images;
+  std::vector<GridOutput> grids;
+  std::vector<DiagnosticsOutput> diagnostics;
+};
+
+ImageMessage message_of(const dkb::Frame& frame, bool depth) {
+  const dkb::ImageView view = depth ? frame.depth() : frame.colour();
+  ImageMessage m;
+  m.stamp_ns = frame.stamp_ns();  // of both, so that a pair waits for no other image
+  m.frame_id = "camera_optical";
+  m.encoding = depth ? "32FC1" : "rgb8";
+  m.width = view.width;
+  m.height = view.height;
+  m.step = view.row_bytes();
+  m.data = view.row(0);
+  m.size = m.step * static_cast<size_t>(m.height);
+  m.owner = std::make_shared<dkb::Frame>(frame);
+  return m;
+}
+
+CameraInfoMessage info_of(const dkb::Camera& c) {
+  CameraInfoMessage info;
+  info.width = c.width;
+  info.height = c.height;
+  info.distortion_model = "plumb_bob";
+  info.d = {c.k1, c.k2, c.p1, c.p2, c.k3};
+  info.k = {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
+  return info;
+}
+
+class SlamCoreTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    source_camera() = dkb::Camera();
+    const auto source = dkb::open_folder(DKB_TEST_SEQUENCE);
+    source_camera() = source->camera();
+    for (dkb::SourceFrame next; (next = source->next()).state != dkb::SourceState::ended;)
+      if (next.state == dkb::SourceState::frame) frames().push_back(next.frame);
+  }
+  static std::vector<dkb::Frame>& frames() {
+    static std::vector<dkb::Frame> all;
+    return all;
+  }
+  static dkb::Camera& source_camera() {
+    static dkb::Camera camera;
+    return camera;
+  }
+
+  std::unique_ptr<RosCore> start(std::map<std::string, ParameterValue> values = {}) {
+    values.emplace("base_from_cam", std::vector<double>{0.1, 0, 0.4, -0.5, 0.5, -0.5, 0.5});
+    return make_core(values, out);
+  }
+  void feed(RosCore& core, size_t i) {
+    core.colour(message_of(frames().at(i), false));
+    core.depth(message_of(frames().at(i), true));
+  }
+  // Each frame once the one before is out, so that no machine is too slow.
+  void feed_all(RosCore& core, size_t from, size_t count) {
+    for (size_t i = from; i < from + count; ++i) {
+      const size_t before = out.odometry.size();
+      feed(core, i);
+      ASSERT_TRUE(out.wait([&] { return out.odometry.size() > before; })) << "frame " << i;
+    }
+  }
+  static Answer answer_of(const std::function<void(RosCore::Done)>& request) {
+    std::promise<Answer> promise;
+    request([&](const Answer& answer) { promise.set_value(answer); });
+    return promise.get_future().get();
+  }
+
+  Recorder out;
+};
+
+TEST_F(SlamCoreTest, TracksAndPublishesPosesOfTheBase) {
+  const auto core = start({{"grid_period", 0.2}, {"map_period", 0.2}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 30);
+  const Rigid3 first = out.odometry[0].pose.pose;
+  EXPECT_LT(first.translation.norm(), 1e-6);
+  EXPECT_LT(first.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+  ASSERT_TRUE(out.wait([&] { return out.transforms.size() == 30 && !out.clouds.empty() && !out.paths.empty(); }));
+  for (size_t i = 0; i < 30; ++i) {
+    ASSERT_EQ(out.transforms[i].size(), 2u);
+    const TransformOutput &base = out.transforms[i][0], &odom = out.transforms[i][1];
+    EXPECT_EQ(base.parent + base.child + odom.parent + odom.child, "odombase_linkmapodom");
+    const Rigid3 error = out.poses[i].pose.inverse() * (odom.parent_from_child * base.parent_from_child);
+    EXPECT_LT(error.translation.norm(), 1e-9);
+    EXPECT_EQ(out.odometry[i].pose.stamp_ns, frames()[i].stamp_ns());
+    EXPECT_GT(out.odometry[i].pose.covariance(0, 0), 0);
+    if (i == 0) continue;
+    // The twist leads from each pose to the next.
+    const double dt = 1e-9 * static_cast<double>(frames()[i].stamp_ns() - frames()[i - 1].stamp_ns());
+    const Rigid3 motion = out.odometry[i - 1].pose.pose.inverse() * out.odometry[i].pose.pose;
+    EXPECT_NEAR(out.odometry[i].twist.head<3>().norm(), motion.translation.norm() / dt, 0.02);
+  }
+  ASSERT_TRUE(out.wait([&] { return !out.grids.empty(); }));
+  EXPECT_NEAR(out.grids.back().cell, 0.05, 1e-6);
+  EXPECT_GT(std::count(out.grids.back().cells.begin(), out.grids.back().cells.end(), 0), 100);
+  EXPECT_GT(out.clouds.back().points.size(), 100u);
+  EXPECT_EQ(out.images.back().width, source_camera().width);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("frames") == "30"; }));
+  EXPECT_EQ(out.last_value("tracked"), "30");
+  EXPECT_EQ(out.last_value("dropped"), "0");
+}
+
+TEST_F(SlamCoreTest, WaitsForTheCameraAndItsMountAndSaysSo) {
+  const auto core = make_core({}, out);
+  feed(*core, 0);
+  ASSERT_TRUE(out.wait([&] { return out.logged.size() == 1; }));
+  EXPECT_NE(out.logged[0].find("rgb/camera_info"), std::string::npos);
+  core->camera_info(info_of(source_camera()));
+  feed(*core, 1);
+  ASSERT_TRUE(out.wait([&] { return out.logged.size() == 2; }));
+  EXPECT_NE(out.logged[1].find("base_link to camera_optical"), std::string::npos);
+  {
+    const std::lock_guard lock(out.mutex);
+    out.known_transforms["base_link camera_optical"] = optical();
+  }
+  feed_all(*core, 2, 3);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("waiting") == "2"; }));
+}
+
+TEST_F(SlamCoreTest, GoesOnAfterBadImages) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 2);
+  const auto complaint = [&](ImageMessage colour, size_t frame) {
+    const size_t before = out.logged.size();
+    core->colour(std::move(colour));
+    core->depth(message_of(frames()[frame], true));
+    EXPECT_TRUE(out.wait([&] { return out.logged.size() > before; }));
+    return out.logged.back();
+  };
+  ImageMessage bayer = message_of(frames()[2], false), cut = message_of(frames()[3], false),
+               small = message_of(frames()[4], false);
+  bayer.encoding = "bayer_rggb8";
+  EXPECT_NE(complaint(bayer, 2).find("\"bayer_rggb8\" is not read"), std::string::npos);
+  cut.size /= 2;
+  EXPECT_NE(complaint(cut, 3).find("fewer than its width"), std::string::npos);
+  small.height /= 2;
+  EXPECT_NE(complaint(small, 4), "");
+  feed_all(*core, 5, 2);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("rejected") == "3"; }));
+}
+
+TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
+  const std::string file = testing::TempDir() + "dkb_ros_core_test.dkb";
+  const auto core = start();
+  EXPECT_FALSE(answer_of([&](auto done) { core->save_map(file, done); }).success);  // nothing has come yet
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 10);
+  EXPECT_TRUE(answer_of([&](auto done) { core->save_map(file, done); }).success);
+  EXPECT_GT(std::filesystem::file_size(file), 1000u);
+  EXPECT_FALSE(answer_of([&](auto done) { core->save_map("/nowhere/map.dkb", done); }).success);
+  EXPECT_FALSE(answer_of([&](auto done) { core->load_map("/nowhere/map.dkb", done); }).success);
+  feed_all(*core, 10, 1);  // a failed service harms nothing
+  EXPECT_TRUE(answer_of([&](auto done) { core->reset(done); }).success);
+  feed_all(*core, 0, 2);  // a new clock as well
+  EXPECT_LT(out.odometry[11].pose.pose.translation.norm(), 1e-6);
+  EXPECT_TRUE(answer_of([&](auto done) { core->load_map(file, done); }).success);
+  EXPECT_TRUE(answer_of([&](auto done) { core->localize_only(true, done); }).success);
+  PoseMessage there;
+  there.pose.translation.setZero();
+  there.covariance.diagonal().setConstant(0.01);
+  core->initial_pose(there);
+  feed_all(*core, 5, 3);  // found in the map
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(true, done); }).success);
+  feed(*core, 8);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "paused"; }));
+  EXPECT_EQ(out.odometry.size(), 16u);
+  std::filesystem::remove(file);
+}
+
+TEST_F(SlamCoreTest, AFullQueueDropsTheOldestAndCounts) {
+  const auto core = start({{"queue_size", int64_t{4}}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 1);
+  std::promise<void> held, go_on;
+  core->pause(false, [&](const Answer&) {
+    held.set_value();
+    go_on.get_future().wait();
+  });
+  held.get_future().wait();
+  for (size_t i = 1; i <= 10; ++i) feed(*core, i);
+  go_on.set_value();
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
+  EXPECT_EQ(out.odometry[1].pose.stamp_ns, frames()[7].stamp_ns());
+  ASSERT_TRUE(out.wait([&] { return out.last_value("dropped") == "6"; }));
+}
+
+TEST_F(SlamCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
+  const auto core = start({{"publish_odom_tf", false}});
+  core->camera_info(info_of(source_camera()));
+  const Rigid3 odom_from_base(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {3, 1, 0});
+  out.known_transforms["odom base_link"] = odom_from_base;
+  feed_all(*core, 0, 3);
+  ASSERT_TRUE(out.wait([&] { return out.transforms.size() == 3; }));
+  ASSERT_EQ(out.transforms.back().size(), 1u);
+  EXPECT_EQ(out.transforms.back()[0].child, "odom");
+  const Rigid3 error = out.poses.back().pose.inverse() * (out.transforms.back()[0].parent_from_child * odom_from_base);
+  EXPECT_LT(error.translation.norm(), 1e-9);
+}
+
+TEST_F(SlamCoreTest, StampsThatGoBackBeginANewWorld) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  const auto feed_at = [&](size_t i, int64_t offset) {
+    ImageMessage colour = message_of(frames().at(i), false), depth = message_of(frames().at(i), true);
+    colour.stamp_ns += offset;
+    depth.stamp_ns += offset;
+    core->colour(std::move(colour));
+    core->depth(std::move(depth));
+  };
+  for (size_t i = 0; i < 5; ++i) feed_at(i, 100'000'000'000);
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
+  for (size_t i = 0; i < 8; ++i) feed_at(i, 0);
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() >= 10; }));
+  EXPECT_LT(out.odometry[5].pose.pose.translation.norm(), 1e-6);
+}
+
+TEST_F(SlamCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  for (size_t i = 0; i < 6; ++i) {
+    OdometryMessage odometry;
+    odometry.stamp_ns = frames()[i].stamp_ns();
+    odometry.child_frame_id = "base_link";
+    core->odometry(odometry);
+    feed_all(*core, i, 1);
+  }
+  ASSERT_TRUE(out.wait([&] { return out.last_value("with prior") == "5"; }));
+}
+
+}  // namespace
+}  // namespace dkb_ros
