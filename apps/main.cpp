@@ -16,6 +16,7 @@
 #include "map_command.h"
 #include "record_command.h"
 #include "run_command.h"
+#include "run_viewer.h"
 #include "simulate_command.h"
 
 namespace {
@@ -83,7 +84,9 @@ int main(int argc, char** argv) {
     dkb::register_convert(app, exit_code);
     dkb::register_export(app, exit_code);
     dkb::register_bench(app, exit_code);
-    app.parse(argc, argv);
+    std::vector<std::string> words = dkb::with_default_port(argc, argv);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    app.parse(words);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
     print_error(usage_error(app, e));

@@ -29,6 +29,7 @@
 #include "live_report.h"
 #include "report/run_report.h"
 #include "run_outputs.h"
+#include "run_viewer.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -46,6 +47,7 @@ struct RunArguments {
   DetectorChoice detection;
   std::string filter, disable;
   std::string load_map, prior_file;
+  ViewerArguments viewer;
   bool localize = false;
   bool live = false;  // by the command `live`
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
@@ -200,7 +202,7 @@ int run(const RunArguments& args) {
   Slam slam(recording->camera(), options, std::move(detectors));
   if (!args.load_map.empty()) slam.load_map(args.load_map);
   slam.localize_only(args.localize);
-  slam.explain_keyframes(args.debug_log);
+  slam.explain_keyframes(args.debug_log || args.viewer.on);
   const fs::path out = args.out.empty() ? default_output(args.source) : fs::path(args.out);
   make_output_folder(out);
   if (!args.quiet) fmt::print("{}, results in {}\n", recording->description(), out.string());
@@ -214,6 +216,11 @@ int run(const RunArguments& args) {
   if (args.realtime && !live) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
   const Interrupt interrupt([&] { source.stop(); });
+  std::unique_ptr<RunViewer> viewer;
+  if (args.viewer.on) viewer = std::make_unique<RunViewer>(args.viewer, *recording, args.source, options, out);
+  const auto hold = [&](bool on) {
+    if (paced) paced->hold(on);
+  };
   LiveReport camera;
   Progress progress(recording->size(), args.quiet);
   const auto warn = [&] {
@@ -224,6 +231,7 @@ int run(const RunArguments& args) {
   std::exception_ptr failure;  // what was tracked until then is written all the same
   const auto track_all = [&] {
     while (!Interrupt::happened()) {
+      if (viewer) viewer->wait_turn(slam, hold);
       SourceFrame next = source.next();
       warn();
       if (next.state == SourceState::ended) break;
@@ -242,11 +250,12 @@ int run(const RunArguments& args) {
         continue;
       }
       facts.stamps.push_back(next.stamp);
-      const FrameResult result = slam.process(next.frame);
+      FrameResult result = slam.process(next.frame);
       for (const Mover& mover : result.movers)
         facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
       log.frame(next.frame, result);
-      for (const Event& event : slam.take_events()) {
+      std::vector<Event> events = slam.take_events();
+      for (const Event& event : events) {
         log.event(event);
         if (event.kind == Event::Kind::warning)
           warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
@@ -254,6 +263,7 @@ int run(const RunArguments& args) {
       if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
       if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
       progress.frame(next.index + 1, &result);
+      if (viewer) viewer->show(std::move(result), next.frame, slam, std::move(events));
     }
   };
   try {
@@ -302,7 +312,9 @@ int run(const RunArguments& args) {
     fmt::print("{}\n", line);
   if (const SourceCounts lost = recording->counts(); !live && !args.quiet && lost.unpaired + lost.late > 0)
     fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
-  if (Interrupt::happened()) return 130;
+  const bool cut_short = Interrupt::happened();
+  if (viewer) viewer->serve_on(slam, args.quiet);
+  if (cut_short) return 130;
   if (s.tracked > 0) return 0;
   if (args.localize)
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
@@ -361,6 +373,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
   command->add_flag("--debug-log", args->debug_log,
                     "Write debug.log: each frame's state, and why it became a keyframe or did not");
+  add_viewer_options(*command, args->viewer);
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
 }
 

@@ -30,6 +30,10 @@ packages=(
   python3-rosbag python3-sensor-msgs python3-nav-msgs python3-tf2-msgs  # bags as ROS itself writes and reads them
   "${python[@]}" python3-pip python3-venv
 )
+# The live page: what bundles it, and the browser of its tests. Node from elsewhere serves as well; without them the page
+# is plain and its tests are skipped.
+if ! command -v node >/dev/null || ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
+if grep -qs '^ID=debian' /etc/os-release && ! command -v chromium >/dev/null; then packages+=(chromium-headless-shell); fi
 case "${1:-}" in
   "") ;;
   check) packages=("${needed[@]}") ;;

@@ -55,6 +55,33 @@ void PacedSource::stop() {
   queue_.close();
 }
 
+void PacedSource::hold(bool on) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (on == held_since_.has_value()) return;
+    if (on) {
+      held_since_ = Clock::now();
+    } else {
+      held_ += Clock::now() - *held_since_;
+      held_since_.reset();
+    }
+  }
+  wake_.notify_all();
+}
+
+PacedSource::Clock::time_point PacedSource::now() const {
+  return (held_since_ ? *held_since_ : Clock::now()) - held_;
+}
+
+bool PacedSource::wait_until(Clock::time_point due) {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return stopped_ || !held_since_; });
+    if (stopped_) return false;
+    if (!wake_.wait_until(lock, due + held_, [&] { return stopped_ || held_since_; })) return true;
+  }
+}
+
 SourceCounts PacedSource::counts() const {
   SourceCounts counts = source_.counts();
   counts.dropped += dropped_;
@@ -63,7 +90,6 @@ SourceCounts PacedSource::counts() const {
 }
 
 void PacedSource::run() {
-  using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> start;
   std::optional<int64_t> last_stamp;
   SkippedMotion left_out;  // since the last frame that waits in the queue
@@ -82,12 +108,13 @@ void PacedSource::run() {
     for (;;) {
       SourceFrame frame = source_.next();
       if (const auto due = due_(frame)) {
-        const Clock::time_point now = Clock::now();
+        const Clock::time_point at = [&] {
+          const std::lock_guard lock(mutex_);
+          return now();
+        }();
         // Compared as durations, so that no stamp overflows a time.
-        if (!start || *due > (now - *start) + kLongestPause || *due < (now - *start) - kLongestPause)
-          start = now - *due;
-        std::unique_lock lock(mutex_);
-        if (wake_.wait_until(lock, *start + *due, [&] { return stopped_; })) break;
+        if (!start || *due > (at - *start) + kLongestPause || *due < (at - *start) - kLongestPause) start = at - *due;
+        if (!wait_until(*start + *due)) break;
       }
       if (frame.state == SourceState::ended) break;
       if (frame.state == SourceState::frame) {

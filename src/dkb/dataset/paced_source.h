@@ -35,6 +35,8 @@ class PacedSource final : public Source {
   const Camera& camera() const override { return source_.camera(); }
   SourceFrame next() override;
   void stop() override;
+  // While held the clock stands still.
+  void hold(bool on);
   std::vector<std::string> take_warnings() override { return source_.take_warnings(); }
   SourceCounts counts() const override;
   std::optional<size_t> size() const override { return source_.size(); }
@@ -42,7 +44,11 @@ class PacedSource final : public Source {
   int dropped() const { return dropped_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   void run();
+  Clock::time_point now() const;           // of the clock that can be held; `mutex_` is locked
+  bool wait_until(Clock::time_point due);  // by that clock; false when stopped
 
   const std::unique_ptr<Source> owned_;
   Source& source_;
@@ -52,6 +58,8 @@ class PacedSource final : public Source {
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopped_ = false;
+  std::optional<Clock::time_point> held_since_;
+  Clock::duration held_{};      // altogether, but for the time since then
   std::exception_ptr failure_;  // of the thread; written before the queue is closed
   std::thread thread_;
 };

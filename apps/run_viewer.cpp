@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_viewer.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "dkb/dataset/trajectory_file.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/module.h"
+#include "interrupt.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed after so long
+
+Viewer* open_viewer(const ViewerOptions& options) {
+  std::string reason;
+  const Module module{"libdkb_viewer.so", DKB_MODULE_LIBDIR, {DKB_VIEWER_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
+  void* symbol = module_symbol(module, kOpenViewerSymbol, &reason);
+  if (symbol == nullptr) throw InputError("--viewer: this build has no live page (" + reason + ")");
+  Viewer* viewer = reinterpret_cast<OpenViewer>(symbol)(options, &reason);
+  if (viewer == nullptr) throw InputError(reason);
+  return viewer;
+}
+
+std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
+  std::vector<ViewerOptions::TruePosition> truth;
+  std::error_code error;
+  const fs::path file = source / "groundtruth.txt";
+  if (!fs::is_regular_file(file, error)) return truth;
+  try {
+    for (const StampedPose& p : read_trajectory(file))
+      truth.push_back({std::llround(p.timestamp * 1e9), p.world_from_cam.translation});
+  } catch (const InputError&) {
+    truth.clear();  // a run does not depend on it
+  }
+  return truth;
+}
+
+}  // namespace
+
+std::vector<std::string> with_default_port(int argc, char** argv) {
+  std::vector<std::string> words(argv + 1, argv + argc);
+  for (size_t i = 0; i < words.size(); ++i) {
+    if (words[i] != "--viewer") continue;
+    const bool has_port = i + 1 < words.size() && !words[i + 1].empty() &&
+                          words[i + 1].find_first_not_of("0123456789") == std::string::npos;
+    if (!has_port) words[i] = fmt::format("--viewer={}", ViewerArguments().port);
+  }
+  return words;
+}
+
+void add_viewer_options(CLI::App& command, ViewerArguments& args) {
+  command
+      .add_option("--viewer", args.port, "Live page in the browser at this port (8090 by default, 0 = any free one)")
+      ->check(CLI::Range(0, 65535))
+      ->each([&args](const std::string&) { args.on = true; });
+  command.add_flag("--viewer-exit", args.exit, "End with the run instead of serving the page until Ctrl-C");
+  command.add_option("--viewer-host", args.host,
+                     "Address to serve at; another than 127.0.0.1 lets other machines in, with the printed token");
+}
+
+RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name,
+                     const Options& options, fs::path out)
+    : exit_(args.exit), out_(std::move(out)) {
+  ViewerOptions o;
+  o.host = args.host;
+  o.port = args.port;
+  o.description = source.description();
+  o.camera = source.camera();
+  o.frames = source.size();
+  if (o.camera.fps > 0) o.budget_ms = 1000 / o.camera.fps;
+  o.realtime = options.realtime;
+  o.truth = truth_beside(source_name);
+  viewer_.reset(open_viewer(o));
+  fmt::print(stderr, "viewer: {}\n", viewer_->url());
+  std::fflush(stderr);
+}
+
+void RunViewer::save_if_asked(const Slam& slam) {
+  if (!viewer_->take_save_order()) return;
+  try {
+    slam.save_map(out_ / "map_saved.dkb");
+    viewer_->say("map saved: " + (out_ / "map_saved.dkb").string());
+  } catch (const InputError& e) {
+    viewer_->say(e.what());
+  }
+}
+
+void RunViewer::wait_turn(const Slam& slam, const std::function<void(bool)>& hold) {
+  save_if_asked(slam);
+  if (!viewer_->paused()) return;
+  hold(true);
+  while (!Interrupt::happened() && !viewer_->wait_turn(kPatience)) save_if_asked(slam);
+  hold(false);
+}
+
+void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events) {
+  viewer_->show(std::move(result), frame, slam.map(), std::move(events));
+}
+
+void RunViewer::serve_on(const Slam& slam, bool quiet) {
+  viewer_->ended();
+  if (exit_ || Interrupt::happened()) return;
+  if (!quiet) fmt::print("the page is served until Ctrl-C\n");
+  while (!Interrupt::happened()) {
+    save_if_asked(slam);
+    viewer_->wait_order(kPatience);
+  }
+}
+
+}  // namespace dkb

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dkb/viewer/viewer.h"
+#include "dkb_slam/source.h"
+
+namespace dkb {
+
+// The options of the live page, on any command that tracks.
+struct ViewerArguments {
+  bool on = false, exit = false;
+  int port = 8090;
+  std::string host = "127.0.0.1";
+};
+void add_viewer_options(CLI::App& command, ViewerArguments& args);
+// The words of a command line, the port put in where `--viewer` stands without one.
+std::vector<std::string> with_default_port(int argc, char** argv);
+
+// The live page of one run.
+class RunViewer {
+ public:
+  // Opens the page and prints its address on stderr. Throws InputError when this build has none, or the port is taken.
+  // Ground truth beside `source` in TUM layout is shown too.
+  RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name, const Options& options,
+            std::filesystem::path out);
+
+  // Before a frame is taken: waits while the page says so, calling `hold` with true first and with false at last; saves
+  // the map when it is asked to. A run that is interrupted waits no longer.
+  void wait_turn(const Slam& slam, const std::function<void(bool)>& hold);
+  void show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events);
+  // The run has ended: goes on serving until the interrupt, unless --viewer-exit.
+  void serve_on(const Slam& slam, bool quiet);
+
+ private:
+  void save_if_asked(const Slam& slam);
+
+  const bool exit_;
+  const std::filesystem::path out_;
+  std::unique_ptr<Viewer> viewer_;
+};
+
+}  // namespace dkb

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/viewer/http_server.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <thread>
+#include <vector>
+
+namespace dkb {
+namespace {
+
+// Numbers the parts that it is asked for.
+class Service final : public HttpService {
+ public:
+  class Parts final : public HttpStream {
+   public:
+    std::string next() override { return std::string(part_++ < 3 ? 100000 : 0, 'x'); }
+
+   private:
+    int part_ = 0;
+  };
+  HttpAnswer answer(const HttpRequest& request) override {
+    HttpAnswer answer;
+    if (request.path == "/stream")
+      answer.stream = std::make_unique<Parts>();
+    else
+      answer.own_body = request.method + " " + request.path + " " + request.body;
+    return answer;
+  }
+  void tick(size_t) override {}
+};
+
+class HttpServerTest : public testing::Test {
+ protected:
+  static HttpServer::Limits limits() {
+    using std::chrono::milliseconds;
+    return {milliseconds(300), milliseconds(1000), milliseconds(500), milliseconds(200), milliseconds(5)};
+  }
+  ~HttpServerTest() override {
+    server_.stop();
+    thread_.join();
+  }
+  int connect_to() const {
+    const int fd = socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<uint16_t>(server_.port()));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    const timeval patience{10, 0};
+    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    return fd;
+  }
+  static std::string all_of(int fd) {
+    std::string all;
+    char buffer[65536];
+    for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) all.append(buffer, static_cast<size_t>(n));
+    close(fd);
+    return all;
+  }
+  std::string ask(const std::string& bytes) const {
+    const int fd = connect_to();
+    send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    return all_of(fd);
+  }
+  std::string get(const std::string& path) const { return ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n"); }
+
+  Service service_;
+  HttpServer server_{"127.0.0.1", 0, {}, service_, limits()};
+  std::thread thread_{[this] { server_.run(); }};
+};
+
+TEST_F(HttpServerTest, AnswersAndCloses) {
+  const std::string answer = get("/a");
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 OK\r\n")) << answer;
+  EXPECT_TRUE(answer.ends_with("\r\n\r\nGET /a ")) << answer;
+  for (const char* header : {"Content-Security-Policy: default-src 'none'", "Connection: close", "nosniff"})
+    EXPECT_NE(answer.find(header), std::string::npos) << header;
+}
+
+TEST_F(HttpServerTest, AnswersARefusalToAClientThatIsStillSending) {
+  const std::string head = "POST /a HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3000000\r\n\r\n";
+  EXPECT_TRUE(ask(head + std::string(3000000, 'x')).starts_with("HTTP/1.1 413 "));
+  EXPECT_TRUE(ask("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n").starts_with("HTTP/1.1 403 "));
+}
+
+TEST_F(HttpServerTest, StreamsPartAfterPart) {
+  const int fd = connect_to();
+  const std::string request = "GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  send(fd, request.data(), request.size(), MSG_NOSIGNAL);
+  const std::string all = all_of(fd);  // until the server gives a stream up that says nothing
+  EXPECT_EQ(all.size() - all.find("\r\n\r\n") - 4, 300000U);
+}
+
+TEST_F(HttpServerTest, GivesUpOnRequestsThatComeSlowly) {
+  const int fd = connect_to();
+  const timeval between{0, 30000};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &between, sizeof between);
+  size_t sent = 0;
+  ssize_t received = -1;
+  for (const char c : std::string("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")) {
+    if (send(fd, &c, 1, MSG_NOSIGNAL) != 1) break;
+    ++sent;
+    char answer;
+    received = recv(fd, &answer, 1, 0);
+    if (received >= 0) break;
+  }
+  close(fd);
+  EXPECT_LE(received, 0) << "there is no answer";
+  EXPECT_LT(sent, 30U);
+}
+
+TEST_F(HttpServerTest, ServesBesideAThousandIdleConnections) {
+  std::vector<int> idle;
+  for (int i = 0; i < 900; ++i) idle.push_back(connect_to());
+  EXPECT_TRUE(get("/b").starts_with("HTTP/1.1 200 "));
+  for (const int fd : idle) close(fd);
+  EXPECT_TRUE(get("/c").starts_with("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, HasAQuotaForStreams) {
+  std::vector<int> streams;
+  const std::string request = "GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  for (size_t i = 0; i < HttpServer::kMaxStreams; ++i) {
+    streams.push_back(connect_to());
+    send(streams.back(), request.data(), request.size(), MSG_NOSIGNAL);
+    char c;
+    EXPECT_EQ(recv(streams.back(), &c, 1, 0), 1);
+  }
+  EXPECT_TRUE(get("/stream").starts_with("HTTP/1.1 503 "));
+  EXPECT_TRUE(get("/d").starts_with("HTTP/1.1 200 "));
+  for (const int fd : streams) close(fd);
+}
+
+}  // namespace
+}  // namespace dkb

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/viewer/map_deltas.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dkb {
+namespace {
+
+constexpr size_t kEdges = 6;             // of a keyframe to earlier ones: more are a tangle
+constexpr int kSharedPoints = 20;        // of an edge that is shown
+constexpr double kPoseTolerance = 1e-5;  // [m], [rad]
+
+bool same_pose(const Rigid3& a, const Rigid3& b) {
+  return (a.translation - b.translation).norm() < kPoseTolerance &&
+         (a.rotation.coeffs() - b.rotation.coeffs()).norm() < kPoseTolerance;
+}
+
+}  // namespace
+
+void MapDeltas::clear() {
+  ++world_;
+  keyframes_.clear();
+  blocks_.clear();
+  loops_.clear();
+  loops_version_ = 0;
+  last_ = nullptr;
+}
+
+void MapDeltas::update(const MapSnapshot& snapshot) {
+  const std::shared_ptr<const Map>& map = snapshot.map();
+  if (map == nullptr || map == last_) return;
+  if (static_cast<size_t>(map->keyframe_count()) < keyframes_.size()) clear();
+  ++version_;
+  update_keyframes(*map);
+  update_points(*map);
+  if (snapshot.loops().size() != loops_.size()) {
+    loops_ = snapshot.loops();
+    loops_version_ = version_;
+  }
+  last_ = map;
+}
+
+void MapDeltas::update_keyframes(const Map& map) {
+  keyframes_.resize(static_cast<size_t>(map.keyframe_count()));
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
+    const dkb::Keyframe* given = map.keyframe(id);
+    if (given == nullptr) continue;
+    Keyframe& known = keyframes_[static_cast<size_t>(id)];
+    const Rigid3 pose = map.cam_from_world(id).inverse();
+    if (known.version == 0 || known.culled != given->culled || !same_pose(known.world_from_cam, pose)) {
+      known.version = version_;
+      known.frame = given->frame;
+      known.culled = given->culled;
+      known.world_from_cam = pose;
+      known.map = map.root(id);
+    }
+    if (last_ != nullptr && last_->keyframe(id) == given) continue;
+    std::vector<std::pair<uint32_t, uint32_t>> edges;
+    if (!given->culled)
+      for (const Covisible& c : given->covisible)
+        if (c.keyframe < id && c.shared_points >= kSharedPoints && edges.size() < kEdges)
+          edges.emplace_back(static_cast<uint32_t>(c.keyframe), static_cast<uint32_t>(c.shared_points));
+    if (edges == known.covisible) continue;
+    known.covisible = std::move(edges);
+    known.covisibility_version = version_;
+  }
+}
+
+void MapDeltas::update_points(const Map& map) {
+  blocks_.resize(static_cast<size_t>(map.keyframe_count()));
+  KeyframeId birth = kNoKeyframe;
+  Rigid3 cam_from_world;
+  for (const PointId id : map.live_points()) {
+    const MapPoint* point = map.point(id);
+    if (birth_keyframe(id) != birth) {
+      birth = birth_keyframe(id);
+      cam_from_world = keyframes_[static_cast<size_t>(birth)].world_from_cam.inverse();
+    }
+    Block& block = blocks_[static_cast<size_t>(birth)];
+    const auto index = static_cast<uint16_t>(birth_feature(id));
+    auto known = std::lower_bound(block.points.begin(), block.points.end(), index,
+                                  [](const Point& p, uint16_t i) { return p.index < i; });
+    const bool fresh = known == block.points.end() || known->index != index;
+    if (fresh) {
+      known = block.points.insert(known, Point{});
+      known->index = index;
+    }
+    known->seen = version_;
+    const Eigen::Vector3d p = cam_from_world * point->position / unit_;
+    const auto rounded = [](double v) { return static_cast<int16_t>(std::lround(std::clamp(v, -32767.0, 32767.0))); };
+    const auto moved = [](int16_t a, double b) { return std::abs(a - std::clamp(b, -32767.0, 32767.0)) > 1.5; };
+    if (!fresh && known->observations > 0 && !moved(known->x, p.x()) && !moved(known->y, p.y()) &&
+        !moved(known->z, p.z()))
+      continue;
+    known->x = rounded(p.x());
+    known->y = rounded(p.y());
+    known->z = rounded(p.z());
+    known->colour = point->colour;
+    known->observations = static_cast<uint8_t>(std::clamp<size_t>(point->observations.size(), 1, 255));
+    known->version = block.version = version_;
+  }
+  for (Block& block : blocks_) {
+    for (Point& point : block.points) {
+      if (point.seen == version_ || point.observations == 0) continue;
+      point.observations = 0;
+      point.version = block.version = version_;
+    }
+  }
+}
+
+bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
+  if (begun_anew(client)) {
+    client = {};
+    client.world = world_;
+  }
+  out.message(StreamMessage::keyframes, [&](StreamWriter& m) {
+    for (size_t id = 0; id < keyframes_.size(); ++id) {
+      const Keyframe& k = keyframes_[id];
+      if (k.version <= client.keyframes) continue;
+      m.put(static_cast<int32_t>(id));
+      m.put<int32_t>(k.frame);
+      m.put<int32_t>(k.map);
+      m.put<uint32_t>(k.culled ? 1 : 0);
+      for (int i = 0; i < 4; ++i) m.put(static_cast<float>(k.world_from_cam.rotation.coeffs()[i]));
+      for (int i = 0; i < 3; ++i) m.put(static_cast<float>(k.world_from_cam.translation[i]));
+    }
+  });
+  out.message(StreamMessage::covisibility, [&](StreamWriter& m) {
+    for (size_t id = 0; id < keyframes_.size(); ++id) {
+      const Keyframe& k = keyframes_[id];
+      if (k.covisibility_version <= client.keyframes) continue;
+      m.put(static_cast<uint32_t>(id));
+      m.put(static_cast<uint32_t>(k.covisible.size()));
+      for (const auto& [other, shared] : k.covisible) {
+        m.put(other);
+        m.put(shared);
+      }
+    }
+  });
+  client.keyframes = version_;
+  if (loops_version_ > client.loops) {
+    out.message(StreamMessage::loops, [&](StreamWriter& m) {
+      for (const LoopInfo& loop : loops_) {
+        m.put<int32_t>(loop.keyframe);
+        m.put<int32_t>(loop.earlier_keyframe);
+        m.put<int32_t>(loop.merge ? 1 : 0);
+      }
+    });
+    client.loops = loops_version_;
+  }
+  client.blocks.resize(blocks_.size(), 0);
+  // Goes round: a client with little room gets every block in turn.
+  const size_t start = out.size();
+  bool complete = true;
+  out.message(StreamMessage::points, [&](StreamWriter& m) {
+    for (size_t n = 0; n < blocks_.size(); ++n) {
+      const size_t at = (client.next_block + n) % blocks_.size();
+      const Block& block = blocks_[at];
+      uint64_t& known = client.blocks[at];
+      if (block.version <= known) continue;
+      if (m.size() - start > budget) {
+        client.next_block = at;
+        complete = false;
+        return;
+      }
+      const auto news = [&](const Point& p) { return p.version > known && (p.observations > 0 || known > 0); };
+      const auto count = static_cast<uint32_t>(std::count_if(block.points.begin(), block.points.end(), news));
+      if (count > 0) {
+        m.put(static_cast<uint32_t>(at));
+        m.put(count);
+        for (const Point& p : block.points) {
+          if (!news(p)) continue;
+          m.put(p.index);
+          for (const int16_t v : {p.x, p.y, p.z}) m.put(v);
+          for (const uint8_t v : {p.colour.r, p.colour.g, p.colour.b, p.observations}) m.put(v);
+        }
+      }
+      known = block.version;
+    }
+  });
+  return complete;
+}
+
+}  // namespace dkb

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/viewer/session_history.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace dkb {
+
+void SessionHistory::add(const FrameFact& fact) {
+  if (!first_stamp_) first_stamp_ = fact.stamp_ns;
+  facts_.push_back(fact);
+  if (facts_.size() > kFacts) {
+    facts_.pop_front();
+    ++facts_gone_;
+  }
+  if (fact.host == kNoKeyframe) {
+    if (!path_.empty() && path_.back().host != kNoKeyframe) path_.push_back({fact.frame, fact.stamp_ns});
+    return;
+  }
+  if (last_on_path_ && last_on_path_->host == fact.host && path_.back().host != kNoKeyframe &&
+      (last_on_path_->position_in_host - fact.position_in_host).norm() < spacing_)
+    return;
+  last_on_path_ = fact;
+  path_.push_back({fact.frame, fact.stamp_ns, fact.host, fact.position_in_host});
+  if (path_.size() < kPath) return;
+  // Every second point goes; where the path is broken it stays so.
+  size_t kept = 0;
+  for (size_t i = 0; i < path_.size(); ++i)
+    if (i % 2 == 0 || path_[i].host == kNoKeyframe) path_[kept++] = path_[i];
+  path_.resize(std::min(kept, kPath / 2));
+  spacing_ *= 2;
+  ++path_generation_;
+}
+
+void SessionHistory::add(SessionEvent event) {
+  events_.push_back(std::move(event));
+  if (events_.size() <= kEvents) return;
+  events_.pop_front();
+  ++events_gone_;
+}
+
+void SessionHistory::clear_path() {
+  path_.clear();
+  last_on_path_.reset();
+  ++path_generation_;
+}
+
+void SessionHistory::write(Client& client, StreamWriter& out) const {
+  out.message(StreamMessage::facts, [&](StreamWriter& m) {
+    client.facts = std::max(client.facts, facts_gone_);
+    for (; client.facts - facts_gone_ < facts_.size(); ++client.facts) {
+      const FrameFact& f = facts_[client.facts - facts_gone_];
+      m.put(static_cast<uint32_t>(f.frame));
+      m.put(f.tracking_ms);
+      m.put(f.waiting_ms);
+      m.put(static_cast<float>(static_cast<double>(f.stamp_ns - *first_stamp_) * 1e-9));
+      m.put(f.inliers);
+      m.put(static_cast<uint8_t>(f.state));
+      m.put<uint8_t>(f.made_keyframe ? 1 : 0);
+    }
+  });
+  if (client.path_generation != path_generation_) {
+    if (client.path_generation != 0) out.empty_message(StreamMessage::path_reset);
+    client.path_generation = path_generation_;
+    client.path = 0;
+  }
+  out.message(StreamMessage::path, [&](StreamWriter& m) {
+    for (; client.path < path_.size(); ++client.path) {
+      const PathPoint& p = path_[client.path];
+      m.put(static_cast<uint32_t>(p.frame));
+      m.put<int32_t>(p.host);
+      for (int i = 0; i < 3; ++i) m.put(static_cast<float>(p.position[i]));
+    }
+  });
+  client.events = std::max(client.events, events_gone_);
+  if (client.events - events_gone_ < events_.size()) {
+    nlohmann::json list = nlohmann::json::array();
+    for (; client.events - events_gone_ < events_.size(); ++client.events) {
+      const SessionEvent& e = events_[client.events - events_gone_];
+      list.push_back({{"kind", e.kind}, {"frame", e.frame}, {"text", e.text}});
+    }
+    out.message(StreamMessage::events, [&](StreamWriter& m) {
+      m.put_bytes(list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    });
+  }
+}
+
+std::optional<Rigid3> SessionHistory::world_from_truth(const Map& map,
+                                                       const std::vector<ViewerOptions::TruePosition>& truth) const {
+  constexpr int64_t kMaxDifference = 20'000'000;  // [ns]
+  std::vector<Eigen::Vector3d> from, to;
+  for (const PathPoint& p : path_) {
+    if (p.host == kNoKeyframe || p.host >= map.keyframe_count()) continue;
+    auto after = std::lower_bound(truth.begin(), truth.end(), p.stamp_ns,
+                                  [](const auto& t, int64_t stamp) { return t.stamp_ns < stamp; });
+    if (after != truth.begin() &&
+        (after == truth.end() || p.stamp_ns - std::prev(after)->stamp_ns < after->stamp_ns - p.stamp_ns))
+      --after;
+    if (after == truth.end() || std::abs(after->stamp_ns - p.stamp_ns) > kMaxDifference) continue;
+    from.push_back(after->position);
+    to.push_back(map.cam_from_world(p.host).inverse() * p.position);
+  }
+  if (from.size() < 10) return std::nullopt;
+  return align_umeyama(from, to, false).motion;
+}
+
+}  // namespace dkb

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// The current image with what became of its features, the movers' mask and boxes.
+import type { Mover } from "./view";
+
+export const features = ["used", "outlier", "dynamic", "unused"] as const;
+export type Feature = (typeof features)[number];
+const states: Feature[] = ["unused", "used", "outlier", "dynamic"]; // as numbers of the stream
+const reasons = ["", "on a mover", "moved", "disagrees"];
+
+export class Picture {
+  readonly shown = new Set<string>(["used", "outlier", "dynamic", "mask", "boxes"]);
+  depth = false;
+  counts: Record<string, number> = {};
+  private image: ImageBitmap | null = null;
+  private depthImage: ImageBitmap | null = null;
+  private width = 640;
+  private report: DataView | null = null;
+  private movers: Mover[] = [];
+  private boxes: { class: string; box: number[] }[] = [];
+  private waiting = false;
+
+  constructor(private canvas: HTMLCanvasElement) {}
+
+  begin(width: number, height: number): void {
+    this.width = width;
+    this.canvas.width = 640;
+    this.canvas.height = Math.round((640 * height) / width);
+    this.image?.close();
+    this.depthImage?.close();
+    this.image = this.depthImage = null;
+  }
+  async takeImage(data: DataView): Promise<void> {
+    const depth = data.getUint32(4, true) === 1;
+    const bitmap = await createImageBitmap(new Blob([new Uint8Array(data.buffer as ArrayBuffer, 8)], { type: "image/jpeg" }));
+    if (depth) {
+      this.depthImage?.close();
+      this.depthImage = bitmap;
+    } else {
+      this.image?.close();
+      this.image = bitmap;
+    }
+    this.refresh();
+  }
+  // `report`: features and mask of the frame's message.
+  take(report: DataView, movers: Mover[], boxes: { class: string; box: number[] }[]): void {
+    this.report = report;
+    this.movers = movers;
+    this.boxes = boxes;
+    const counts: Record<string, number> = {};
+    const n = report.getUint32(0, true);
+    for (let i = 0; i < n; i++) {
+      const state = states[report.getUint8(4 + 8 * i + 4)] ?? "unused";
+      counts[state] = (counts[state] ?? 0) + 1;
+      const reason = reasons[report.getUint8(4 + 8 * i + 5)];
+      if (reason) counts[reason] = (counts[reason] ?? 0) + 1;
+    }
+    this.counts = counts;
+    this.refresh();
+  }
+  refresh(): void {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.draw();
+    });
+  }
+  private draw(): void {
+    const g = this.canvas.getContext("2d")!;
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name: string) => style.getPropertyValue(name).trim();
+    g.fillStyle = "#111";
+    g.fillRect(0, 0, this.canvas.width, this.canvas.height);
+    const image = this.depth ? this.depthImage : this.image;
+    if (image) g.drawImage(image, 0, 0, this.canvas.width, this.canvas.height);
+    const report = this.report;
+    if (!report) return;
+    const s = this.canvas.width / this.width;
+    const n = report.getUint32(0, true);
+    if (this.shown.has("mask")) this.drawMask(g, report, 4 + 8 * n, s, colour("--mover"));
+    const shapes: Record<Feature, (x: number, y: number) => void> = {
+      used: (x, y) => { g.moveTo(x + 4.5, y); g.arc(x, y, 4.5, 0, 7); },
+      outlier: (x, y) => { g.moveTo(x - 4, y - 4); g.lineTo(x + 4, y + 4); g.moveTo(x + 4, y - 4); g.lineTo(x - 4, y + 4); },
+      dynamic: (x, y) => g.rect(x - 4, y - 4, 8, 8),
+      unused: (x, y) => g.rect(x - 1, y - 1, 2, 2),
+    };
+    g.lineWidth = 2;
+    for (const kind of features) {
+      if (!this.shown.has(kind)) continue;
+      g.beginPath();
+      for (let i = 0; i < n; i++) {
+        const at = 4 + 8 * i;
+        if (states[report.getUint8(at + 4)] !== kind) continue;
+        shapes[kind]((report.getUint16(at, true) / 16) * s, (report.getUint16(at + 2, true) / 16) * s);
+      }
+      g.strokeStyle = colour("--" + kind);
+      g.stroke();
+    }
+    if (!this.shown.has("boxes")) return;
+    g.font = "bold 15px system-ui, sans-serif";
+    const frame = (box: number[], text: string, dash: number[], stroke: string) => {
+      g.setLineDash(dash);
+      g.strokeStyle = stroke;
+      g.lineWidth = 2;
+      g.strokeRect(box[0] * s, box[1] * s, box[2] * s, box[3] * s);
+      g.setLineDash([]);
+      const y = Math.max(16, box[1] * s - 5), w = g.measureText(text).width;
+      g.fillStyle = "rgba(0, 0, 0, 0.65)";
+      g.fillRect(box[0] * s, y - 14, w + 6, 18);
+      g.fillStyle = "#fff";
+      g.fillText(text, box[0] * s + 3, y);
+    };
+    for (const b of this.boxes) frame(b.box, b.class, [6, 4], colour("--dynamic"));
+    for (const m of this.movers) frame(m.box, `${m.class} ${m.id}`, [], colour("--mover"));
+  }
+  private drawMask(g: CanvasRenderingContext2D, report: DataView, at: number, s: number, colour: string): void {
+    const cell = report.getUint32(at, true) * s, w = report.getUint32(at + 4, true), h = report.getUint32(at + 8, true);
+    g.fillStyle = colour;
+    g.globalAlpha = 0.35;
+    for (let y = 0; y < h; y++)
+      for (let x = 0; x < w; ) {
+        const set = (i: number) => (report.getUint8(at + 12 + (i >> 3)) >> (i & 7)) & 1;
+        let end = x;
+        while (end < w && set(y * w + end)) end++;
+        if (end > x) g.fillRect(x * cell, y * cell, (end - x) * cell, cell);
+        x = end + 1;
+      }
+    g.globalAlpha = 1;
+  }
+}

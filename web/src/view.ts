@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: Apache-2.0
+// The 3-D view.
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Cloud, HostedLines, Poses } from "./hosted";
+
+export type Mover = { id: number; class: string; position: number[]; velocity: number[]; size: number[]; box: number[] };
+export type Hello = {
+  version: string; source: string; realtime: boolean; budget_ms: number; unit: number;
+  camera: { width: number; height: number; fx: number; fy: number; cx: number; cy: number };
+};
+export type Mode = "follow" | "free" | "top";
+export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops"] as const;
+export type Layer = (typeof layers)[number];
+
+const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
+
+type Palette = { keyframe: string; covisibility: string; path: string; loop: string; truth: string; camera: string; mover: string };
+
+export class View {
+  readonly renderer: THREE.WebGLRenderer;
+  readonly camera = new THREE.PerspectiveCamera(60, 1, 0.02, 500);
+  readonly controls: OrbitControls;
+  mode: Mode = "follow";
+  onMode: () => void = () => {};
+  onMeasure: (text: string) => void = () => {};
+  private scene = new THREE.Scene();
+  private poses = new Poses();
+  private cloud = new Cloud(this.poses, 0.001);
+  private keyframes!: HostedLines;
+  private covisibility!: HostedLines;
+  private path!: HostedLines;
+  private loops!: HostedLines;
+  private truth = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+  private frustum = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+  private movers = new THREE.Group();
+  private marker = new THREE.Group();
+  private labels: HTMLDivElement[] = [];
+  private known = new Map<number, { frame: number; culled: boolean }>();
+  private edges = new Map<number, number[]>();
+  private pathFrames: { frame: number; host: number; p: [number, number, number] }[] = [];
+  private lastPath: { host: number; p: number[] } | null = null;
+  private staleKeyframes = false;
+  private staleEdges = false;
+  private cameraPose: THREE.Matrix4 | null = null;
+  private measured: THREE.Vector3[] = [];
+  private dirty = true;
+  private lastDrawn = 0;
+  private movedAt = 0;
+  private coarse = false; // what is seen is not the whole map
+  private budget = 200000; // points drawn while moving
+  private moverList: Mover[] = [];
+  private still = matchMedia("(prefers-reduced-motion: reduce)");
+  private hello: Hello | null = null;
+
+  constructor(private canvas: HTMLCanvasElement, private overlay: HTMLElement) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.camera.up.set(0, -1, 0); // the world's y is down
+    this.camera.position.set(1.2, -2, -3);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.target.set(0, 0, 1);
+    this.controls.enableDamping = !this.still.matches;
+    this.controls.addEventListener("start", () => this.setMode("free"));
+    this.controls.addEventListener("change", () => {
+      this.movedAt = performance.now();
+      this.dirty = true;
+    });
+    this.keyframes = new HostedLines(this.poses, "#888");
+    this.covisibility = new HostedLines(this.poses, "#888", 0.35);
+    this.path = new HostedLines(this.poses, "#888");
+    this.loops = new HostedLines(this.poses, "#888");
+    this.frustum.frustumCulled = this.truth.frustumCulled = false;
+    this.frustum.visible = false;
+    this.truth.matrixAutoUpdate = this.frustum.matrixAutoUpdate = false;
+    this.truth.visible = false;
+    this.scene.add(this.cloud.group, this.keyframes.object, this.covisibility.object, this.path.object,
+      this.loops.object, this.truth, this.frustum, this.movers, this.marker);
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    const loop = () => {
+      requestAnimationFrame(loop);
+      this.draw();
+    };
+    loop();
+  }
+
+  // --- what the stream tells
+  begin(hello: Hello): void {
+    this.hello = hello;
+    this.poses.clear();
+    this.scene.remove(this.cloud.group);
+    const shown = this.cloud.group.visible;
+    this.cloud.dispose();
+    this.cloud = new Cloud(this.poses, hello.unit);
+    this.cloud.group.visible = shown;
+    this.scene.add(this.cloud.group);
+    for (const lines of [this.keyframes, this.covisibility, this.path, this.loops]) lines.clear();
+    this.known.clear();
+    this.edges.clear();
+    this.clearPath();
+    this.truth.visible = false;
+    const c = hello.camera, z = 0.16;
+    const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
+    const corners = [corner(0, 0), corner(c.width, 0), corner(c.width, c.height), corner(0, c.height)];
+    const lines: number[] = [];
+    for (let i = 0; i < 4; i++) lines.push(0, 0, 0, ...corners[i], ...corners[i], ...corners[(i + 1) % 4]);
+    this.frustum.geometry.setAttribute("position", new THREE.Float32BufferAttribute(lines, 3));
+    this.dirty = true;
+  }
+  takeKeyframes(data: DataView): void {
+    const list: { id: number; q: number[]; t: number[] }[] = [];
+    let moved = 0;
+    for (let at = 0; at < data.byteLength; at += 44) {
+      const f = (i: number) => data.getFloat32(at + 16 + 4 * i, true);
+      const id = data.getInt32(at, true);
+      if (this.known.has(id)) moved++;
+      const culled = data.getUint32(at + 12, true) === 1;
+      const before = this.known.get(id);
+      if (!before || before.culled !== culled) this.staleKeyframes = this.staleEdges = true;
+      this.known.set(id, { frame: data.getInt32(at + 4, true), culled });
+      list.push({ id, q: [f(0), f(1), f(2), f(3)], t: [f(4), f(5), f(6)] });
+    }
+    // Local adjustment moves a few keyframes a little; more than a dozen at once is a correction of the map.
+    if (moved > 12 && !this.still.matches) this.poses.glide();
+    for (const k of list) this.poses.set(k.id, k.q, k.t);
+    this.dirty = true;
+  }
+  takePoints(data: DataView): void {
+    this.cloud.take(data);
+    this.dirty = true;
+  }
+  takeCovisibility(data: DataView): void {
+    for (let at = 0; at < data.byteLength; ) {
+      const id = data.getUint32(at, true), n = data.getUint32(at + 4, true);
+      const others: number[] = [];
+      for (let i = 0; i < n; i++) others.push(data.getUint32(at + 8 + 8 * i, true));
+      this.edges.set(id, others);
+      at += 8 + 8 * n;
+    }
+    this.staleEdges = true;
+    this.dirty = true;
+  }
+  takeLoops(data: DataView): number {
+    this.loops.clear();
+    for (let at = 0; at < data.byteLength; at += 12)
+      this.loops.add(data.getInt32(at, true), [0, 0, 0], data.getInt32(at + 4, true), [0, 0, 0]);
+    this.dirty = true;
+    return data.byteLength / 12;
+  }
+  clearPath(): void {
+    this.path.clear();
+    this.pathFrames = [];
+    this.lastPath = null;
+  }
+  takePath(data: DataView): void {
+    for (let at = 0; at < data.byteLength; at += 20) {
+      const host = data.getInt32(at + 4, true);
+      if (host < 0) {
+        this.lastPath = null;
+        continue;
+      }
+      const p: [number, number, number] = [data.getFloat32(at + 8, true), data.getFloat32(at + 12, true), data.getFloat32(at + 16, true)];
+      if (this.lastPath) this.path.add(this.lastPath.host, this.lastPath.p, host, p);
+      this.lastPath = { host, p };
+      this.pathFrames.push({ frame: data.getUint32(at, true), host, p });
+    }
+    this.dirty = true;
+  }
+  takeTruth(data: DataView): void {
+    const points: number[] = [];
+    for (let at = 0; at < data.byteLength; at += 16)
+      for (let k = 1; k < 4; k++) points.push(data.getFloat32(at + 4 * k, true));
+    this.truth.geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  }
+  private matrix(pose: number[]): THREE.Matrix4 {
+    return new THREE.Matrix4().compose(new THREE.Vector3(pose[4], pose[5], pose[6]),
+      new THREE.Quaternion(pose[0], pose[1], pose[2], pose[3]), new THREE.Vector3(1, 1, 1));
+  }
+  takeFrame(camera: number[] | undefined, movers: Mover[], worldFromTruth: number[] | undefined): void {
+    this.frustum.visible = camera !== undefined;
+    if (camera) {
+      this.cameraPose = this.matrix(camera);
+      this.frustum.matrix.copy(this.cameraPose);
+    }
+    if (worldFromTruth) {
+      this.truth.matrix.copy(this.matrix(worldFromTruth));
+      this.truth.visible = !this.hidden.has("truth");
+    }
+    this.moverList = movers;
+    this.movers.clear();
+    for (const m of movers) {
+      const size = m.size.map((s) => Math.max(0.1, s));
+      const box = new THREE.LineSegments(new THREE.EdgesGeometry(new THREE.BoxGeometry(size[0], size[1], size[2])),
+        new THREE.LineBasicMaterial({ color: this.palette.mover }));
+      box.position.fromArray(m.position);
+      if (this.cameraPose) box.quaternion.setFromRotationMatrix(this.cameraPose);
+      this.movers.add(box);
+      const v = new THREE.Vector3().fromArray(m.velocity);
+      if (v.length() > 0.05)
+        this.movers.add(new THREE.ArrowHelper(v.clone().normalize(), box.position, v.length(), this.palette.mover, 0.15, 0.08));
+    }
+    this.dirty = true;
+  }
+
+  // --- what the visitor asks for
+  private hidden = new Set<Layer>();
+  show(layer: Layer, on: boolean): void {
+    if (on) this.hidden.delete(layer);
+    else this.hidden.add(layer);
+    const objects: Record<Layer, THREE.Object3D> = {
+      points: this.cloud.group, keyframes: this.keyframes.object, covisibility: this.covisibility.object,
+      path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object,
+    };
+    objects[layer].visible = on;
+    this.dirty = true;
+  }
+  setMode(mode: Mode): void {
+    if (mode === "top") {
+      const { at, radius } = this.cloud.middle() ?? { at: new THREE.Vector3(0, 0, 1), radius: 1 };
+      const p = new THREE.Vector3();
+      const far = this.pathFrames.reduce((r, f) => Math.max(r, this.poses.toWorld(f.host, f.p, p).distanceTo(at)), radius);
+      const away = 2 * Math.max(0.5, far);
+      this.controls.target.copy(at);
+      this.camera.position.set(at.x, at.y - away, at.z - 0.01 * away);
+      this.controls.update();
+    }
+    if (mode === this.mode) return;
+    this.mode = mode;
+    this.dirty = true;
+    this.onMode();
+  }
+  // Shows where the camera was at a frame.
+  jumpTo(frame: number): void {
+    let best: (typeof this.pathFrames)[number] | null = null;
+    for (const p of this.pathFrames) if (!best || Math.abs(p.frame - frame) < Math.abs(best.frame - frame)) best = p;
+    if (!best) return;
+    const at = this.poses.toWorld(best.host, best.p, new THREE.Vector3());
+    const away = this.camera.position.clone().sub(this.controls.target).setLength(1.8);
+    this.controls.target.copy(at);
+    this.camera.position.copy(at).add(away);
+    this.setMode("free");
+    this.controls.update();
+    this.mark([at]);
+  }
+  private mark(points: THREE.Vector3[]): void {
+    this.marker.clear();
+    const material = new THREE.LineBasicMaterial({ color: this.palette.loop, depthTest: false });
+    for (const p of points) {
+      const s = 0.06;
+      const cross = [-s, 0, 0, s, 0, 0, 0, -s, 0, 0, s, 0, 0, 0, -s, 0, 0, s];
+      const lines = new THREE.LineSegments(new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(cross, 3)), material);
+      lines.position.copy(p);
+      this.marker.add(lines);
+    }
+    if (points.length === 2) this.marker.add(new THREE.Line(new THREE.BufferGeometry().setFromPoints(points), material));
+    this.dirty = true;
+  }
+  // A point for the measure, at a place of the screen (-1 ... 1).
+  measureAt(x: number, y: number): void {
+    const p = this.cloud.pick(x, y, this.camera);
+    if (!p) return this.onMeasure("no point there");
+    if (this.measured.length === 2) this.measured = [];
+    this.measured.push(p);
+    this.mark(this.measured);
+    this.onMeasure(this.measured.length === 2
+      ? `${this.measured[0].distanceTo(this.measured[1]).toFixed(3)} m` : "now the second point");
+  }
+  endMeasure(): void {
+    this.measured = [];
+    this.mark([]);
+  }
+  // The camera turned, moved or brought nearer, by keys.
+  turn(across: number, down: number): void {
+    this.setMode("free");
+    const away = this.camera.position.clone().sub(this.controls.target);
+    away.applyAxisAngle(this.camera.up, -across);
+    const side = new THREE.Vector3().crossVectors(this.camera.up, away).normalize();
+    const turned = away.clone().applyAxisAngle(side, down);
+    const angle = turned.angleTo(this.camera.up);
+    if (angle > 0.05 && angle < Math.PI - 0.05) away.copy(turned);
+    this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+  }
+  nearer(factor: number): void {
+    this.setMode("free");
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    this.controls.update();
+  }
+  picture(done: (blob: Blob) => void): void {
+    this.render(Infinity);
+    this.canvas.toBlob((blob) => blob && done(blob));
+  }
+
+  // --- drawing
+  private palette: Palette = { keyframe: "", covisibility: "", path: "", loop: "", truth: "", camera: "", mover: "" };
+  paint(): void {
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name: string) => style.getPropertyValue(name).trim();
+    this.palette = {
+      keyframe: colour("--keyframe"), covisibility: colour("--covisibility"), path: colour("--path"), loop: colour("--loop"),
+      truth: colour("--truth"), camera: colour("--camera"), mover: colour("--mover"),
+    };
+    this.scene.background = new THREE.Color(colour("--view"));
+    this.keyframes.colour = this.palette.keyframe;
+    this.covisibility.colour = this.palette.covisibility;
+    this.path.colour = this.palette.path;
+    this.loops.colour = this.palette.loop;
+    this.truth.material.color.set(this.palette.truth);
+    this.frustum.material.color.set(this.palette.camera);
+    this.dirty = true;
+  }
+  private resize(): void {
+    const box = this.canvas.parentElement!.getBoundingClientRect();
+    if (box.width < 1 || box.height < 1) return;
+    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    this.renderer.setSize(box.width, box.height, false);
+    this.camera.aspect = box.width / box.height;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+  private rebuild(): void {
+    if (this.staleKeyframes) {
+      this.keyframes.clear();
+      const c = this.hello?.camera ?? { width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240 };
+      const x = (kFrustum * c.cx) / c.fx, y = (kFrustum * c.cy) / c.fy;
+      const corners = [[-x, -y, kFrustum], [x, -y, kFrustum], [x, y, kFrustum], [-x, y, kFrustum]];
+      for (const [id, k] of this.known) {
+        if (k.culled) continue;
+        for (let i = 0; i < 4; i++) {
+          this.keyframes.add(id, [0, 0, 0], id, corners[i]);
+          this.keyframes.add(id, corners[i], id, corners[(i + 1) % 4]);
+        }
+      }
+    }
+    if (this.staleEdges) {
+      this.covisibility.clear();
+      for (const [id, others] of this.edges) {
+        if (this.known.get(id)?.culled) continue;
+        for (const other of others)
+          if (this.known.get(other)?.culled === false) this.covisibility.add(id, [0, 0, 0], other, [0, 0, 0]);
+      }
+    }
+    this.staleKeyframes = this.staleEdges = false;
+  }
+  private follow(): void {
+    if (this.mode !== "follow" || !this.cameraPose) return;
+    const at = new THREE.Vector3(0, 0, 1.0).applyMatrix4(this.cameraPose);
+    const behind = new THREE.Vector3(0, -0.8, -1.6).applyMatrix4(this.cameraPose);
+    const share = this.still.matches ? 1 : 0.12;
+    if (behind.distanceTo(this.camera.position) + at.distanceTo(this.controls.target) < 1e-3) return;
+    this.camera.position.lerp(behind, share);
+    this.controls.target.lerp(at, share);
+    this.dirty = true;
+  }
+  private draw(): void {
+    const now = performance.now();
+    if (now - this.lastDrawn < 15) return;
+    this.follow();
+    this.controls.update();
+    if (this.poses.step()) this.dirty = true;
+    const moving = now - this.movedAt < 250;
+    if (!this.dirty && (moving || !this.coarse)) return;
+    const interval = now - this.lastDrawn;
+    this.lastDrawn = now;
+    this.dirty = false;
+    this.coarse = moving && this.cloud.points > this.budget;
+    this.render(moving ? this.budget : Infinity);
+    // A coarser map where the machine does not keep up, a finer one where it does.
+    if (moving && interval > 40 && interval < 500) this.budget = Math.max(10000, this.budget * 0.9);
+    if (moving && interval < 25) this.budget = Math.min(4e6, this.budget * 1.03);
+  }
+  private render(points: number): void {
+    this.rebuild();
+    this.cloud.material.uniforms.size.value = this.renderer.getPixelRatio();
+    this.cloud.material.uniforms.lift.value = document.documentElement.dataset.theme === "dark" ? 0.18 : 0;
+    this.cloud.draw(points);
+    this.renderer.render(this.scene, this.camera);
+    this.label();
+    const data = this.canvas.dataset;
+    data.points = String(this.cloud.points);
+    data.cloudCalls = String(this.cloud.drawCalls);
+    data.calls = String(this.renderer.info.render.calls);
+    data.drawn = String(Number(data.drawn ?? 0) + 1);
+  }
+  private label(): void {
+    const box = this.canvas.parentElement!.getBoundingClientRect();
+    let used = 0;
+    const p = new THREE.Vector3();
+    if (!this.hidden.has("movers"))
+      for (const m of this.moverList) {
+        p.fromArray(m.position);
+        p.y -= m.size[1] / 2;
+        p.project(this.camera);
+        if (p.z > 1 || Math.abs(p.x) > 1 || Math.abs(p.y) > 1) continue;
+        let label = this.labels[used];
+        if (!label) {
+          label = document.createElement("div");
+          label.className = "label";
+          this.overlay.appendChild(label);
+          this.labels.push(label);
+        }
+        const speed = Math.hypot(...m.velocity);
+        label.textContent = `${m.class} ${m.id}  ${speed.toFixed(1)} m/s`;
+        label.style.transform = `translate(${((p.x + 1) / 2) * box.width}px, ${((1 - p.y) / 2) * box.height}px) translate(-50%, -110%)`;
+        label.hidden = false;
+        used++;
+      }
+    for (let i = used; i < this.labels.length; i++) this.labels[i].hidden = true;
+  }
+}

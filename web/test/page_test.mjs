@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// The live page in Debian's Chromium: page_test.mjs DKB_SLAM SEQUENCE WORK NPM. Says "skipped: ..." where there is no
+// Chromium or the packages cannot be fetched. Pictures are left in WORK.
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { copyFileSync, existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { delimiter, join } from "node:path";
+
+const [program, sequence, work, npm] = process.argv.slice(2);
+const web = new URL("..", import.meta.url).pathname;
+
+function skip(why) {
+  console.log("skipped: " + why);
+  process.exit(0);
+}
+const chromium = ["chromium-headless-shell", "chromium"]
+  .flatMap((name) => (process.env.PATH ?? "").split(delimiter).map((folder) => join(folder, name))).find(existsSync);
+if (!chromium) skip("no Chromium; apt-get install chromium-headless-shell");
+
+mkdirSync(work, { recursive: true });
+const lock = readFileSync(join(web, "package-lock.json"), "utf8");
+const fetched = join(work, "fetched");
+if (!existsSync(fetched) || readFileSync(fetched, "utf8") !== lock) {
+  for (const name of ["package.json", "package-lock.json"]) copyFileSync(join(web, name), join(work, name));
+  try {
+    execFileSync(npm, ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"], { cwd: work, timeout: 300000 });
+  } catch (error) {
+    skip("npm cannot fetch playwright-core: " + error.message.split("\n")[0]);
+  }
+  writeFileSync(fetched, lock);
+}
+const { chromium: launcher } = createRequire(join(work, "x.js"))("playwright-core");
+
+const run = spawn(program, ["run", sequence, "--viewer", "0", "--realtime", "--detector", "motion", "--quiet", "--out", join(work, "run")], { stdio: ["ignore", "inherit", "pipe"] });
+process.on("exit", () => run.kill("SIGKILL"));
+const url = await new Promise((found, failed) => {
+  let text = "";
+  run.stderr.on("data", (data) => {
+    text += data;
+    const match = /viewer: (\S+)\n/.exec(text);
+    if (match) found(match[1]);
+  });
+  run.on("exit", () => failed(new Error("the run ended: " + text)));
+});
+
+// Playwright's own waitForFunction evaluates strings, which the page's policy forbids.
+async function until(page, holds, argument = null, seconds = 30) {
+  for (const end = Date.now() + 1000 * seconds; !(await page.evaluate(holds, argument)); await page.waitForTimeout(50))
+    assert.ok(Date.now() < end, "never came: " + holds);
+}
+const errors = [], outside = [];
+const browser = await launcher.launch({ executablePath: chromium, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
+async function open(options) {
+  const page = await browser.newPage(options);
+  page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
+  page.on("pageerror", (e) => errors.push(String(e)));
+  page.on("request", (r) => new URL(r.url()).origin !== new URL(url).origin && !/^(blob|data):/.test(r.url()) && outside.push(r.url()));
+  const started = Date.now();
+  await page.goto(url);
+  await until(page, () => Number(document.getElementById("view")?.dataset.points ?? 0) > 100 || document.body.textContent.includes("no 3-D page"));
+  return { page, seconds: (Date.now() - started) / 1000 };
+}
+const shoot = (page, name) => page.screenshot({ path: join(work, name + ".png") });
+const points = (page) => page.evaluate(() => Number(document.getElementById("view").dataset.points));
+const frame = async (page) => Number(/frame (\d+)/.exec(await page.textContent("#count"))[1]);
+
+// The sequence is short: it waits for the browser.
+const order = (what) => fetch(url + "api/command", { method: "POST", body: JSON.stringify({ do: what }) });
+while ((await (await fetch(url + "api/state")).json()).frame < 5) await new Promise((r) => setTimeout(r, 10));
+await order("pause");
+const { page } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" });
+if (await page.evaluate(() => document.body.textContent.includes("no 3-D page"))) skip("the page is plain: it was built without node");
+
+// Step by key: the run stands still and goes on by one.
+await until(page, () => document.getElementById("badge").textContent === "paused");
+await page.waitForTimeout(500);
+const at = await frame(page), before = await points(page);
+assert.ok(at < 39, "paused before the end: " + at);
+await page.keyboard.press("n");
+await until(page, (f) => document.getElementById("count").textContent.startsWith(`frame ${f} `), at + 1);
+await shoot(page, "paused");
+
+// A picture of what is shown: overlays change it.
+const pixels = () => page.evaluate(() => {
+  const c = document.getElementById("picture"), d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+  let sum = 0;
+  for (let i = 0; i < d.length; i += 4) sum = (sum * 31 + d[i] + 7 * d[i + 1]) % 1000000007;
+  return { sum, colours: new Set(Array.from({ length: 4000 }, (_, k) => d[k * 300] * 256 + d[k * 300 + 1])).size };
+});
+const withFeatures = await pixels();
+assert.ok(withFeatures.colours > 100, "the image is there: " + withFeatures.colours);
+await page.click("#overlay-used");
+await page.waitForTimeout(200);
+assert.notEqual((await pixels()).sum, withFeatures.sum, "the overlay went");
+await page.click("#overlay-used");
+await page.click("#overlay-depth");
+await page.waitForTimeout(1500);
+assert.ok((await pixels()).colours > 20, "depth is there");
+await shoot(page, "depth");
+await page.click("#overlay-depth");
+
+// Camera by keys and buttons; a distance; a picture to keep.
+for (const [key, id] of [["t", "top"], ["g", "free"], ["f", "follow"]]) {
+  await page.keyboard.press(key);
+  assert.equal(await page.getAttribute("#" + id, "aria-pressed"), "true", id);
+}
+await page.keyboard.press("t");
+await page.waitForTimeout(500);
+await shoot(page, "top");
+await page.focus("#view");
+for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
+await page.keyboard.press("m");
+const box = await page.locator("#view").boundingBox();
+for (let i = 0, found = 0; i < 400 && found < 2; i++) {
+  await page.mouse.click(box.x + box.width * (0.35 + 0.3 * ((i * 0.618) % 1)), box.y + box.height * (0.3 + (0.4 * (i % 20)) / 20));
+  const text = await page.textContent("#measured");
+  if (found === 0 && text.includes("second")) found = 1;
+  if (found === 1 && / m$/.test(text)) found = 2;
+}
+assert.match(await page.textContent("#measured"), /^\d+\.\d{3} m$/);
+await shoot(page, "measure");
+await page.keyboard.press("m");
+const [saved] = await Promise.all([page.waitForEvent("download"), page.keyboard.press("p")]);
+assert.ok(statSync(await saved.path()).size > 5000, "the picture holds something");
+await page.keyboard.press("?");
+await shoot(page, "keys");
+await page.keyboard.press("Escape");
+
+// Light; then on: the map grows and the events come.
+await page.keyboard.press("l");
+await page.keyboard.press("f");
+await page.keyboard.press("Space");
+await until(page, () => document.getElementById("badge").textContent === "ended", null, 60);
+await page.waitForTimeout(1500);
+await shoot(page, "light");
+assert.ok((await points(page)) >= before, "points grow");
+assert.ok((await page.locator("#events li").count()) >= 2, "events are listed");
+await page.locator("#events button").last().click();
+assert.equal(await page.getAttribute("#free", "aria-pressed"), "true", "an event leads to its place");
+const { calls, cloud } = await page.evaluate(() => ({ calls: Number(document.getElementById("view").dataset.calls), cloud: Number(document.getElementById("view").dataset.cloudCalls) }));
+assert.ok(cloud <= 1 + (await points(page)) / 4096 && calls < cloud + 20, `one draw call a block: ${cloud}, ${calls} in all`);
+
+// Who comes late sees all at once; a phone, with motion reduced.
+const late = await open({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true, reducedMotion: "reduce" });
+await late.page.waitForTimeout(1000);
+assert.equal(await points(late.page), await points(page));
+assert.equal(await late.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, "no scrolling sideways");
+await late.page.screenshot({ path: join(work, "phone.png"), fullPage: true });
+await shoot(page, "event");
+
+assert.deepEqual(errors, []);
+assert.deepEqual(outside, []);
+await browser.close();
+run.removeAllListeners("exit");
+const code = await new Promise((ended) => {
+  run.on("exit", ended);
+  run.kill("SIGINT");
+});
+assert.equal(code, 0);
+console.log(`the page is as it should be; a late visitor saw the map after ${late.seconds.toFixed(1)} s`);
+process.exit(0);
