@@ -45,6 +45,7 @@ cat >"$work/params.yaml" <<PARAMETERS
     depth_factor: $depth_factor
     features.count: 900
     grid_period: 2.0
+    queue_size: 200  # no machine is too slow for the test
 PARAMETERS
 check() {
   # shellcheck disable=SC2086
