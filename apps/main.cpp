@@ -14,6 +14,7 @@
 #include "eval/eval_command.h"
 #include "export_command.h"
 #include "map_command.h"
+#include "record_command.h"
 #include "run_command.h"
 #include "simulate_command.h"
 
@@ -65,6 +66,9 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   try {
     dkb::register_run(app, exit_code);
+    dkb::register_live(app, exit_code);
+    dkb::register_record(app, exit_code);
+    dkb::register_sources(app, exit_code);
     dkb::register_eval(app, exit_code);
     dkb::register_simulate(app, exit_code);
     dkb::register_map(app, exit_code);

@@ -5,10 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -19,12 +18,15 @@
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/map/map_file.h"
+#include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
+#include "interrupt.h"
+#include "live_report.h"
 #include "report/run_report.h"
 #include "run_outputs.h"
 
@@ -45,14 +47,10 @@ struct RunArguments {
   std::string filter, disable;
   std::string load_map, prior_file;
   bool localize = false;
+  bool live = false;  // by the command `live`
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
        quiet = false;
 };
-
-std::atomic<bool> interrupted{false};
-void on_interrupt(int) {
-  interrupted = true;
-}
 
 // One line that renews itself on a terminal; plain lines now and then elsewhere.
 class Progress {
@@ -93,6 +91,7 @@ class Progress {
 
 std::string source_name(const fs::path& source) {
   const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
   return (fs::is_regular_file(source) ? name.stem() : name).string();
 }
 
@@ -125,7 +124,7 @@ Options options_of(const RunArguments& args) {
   if (args.has_seed) options.set("seed", std::to_string(args.seed), "--seed");
   if (args.final_ba) options.set("global_ba.final", "true", "--final-ba");
   options.threaded = args.threads != 1;
-  options.realtime = args.realtime;
+  options.realtime = args.realtime || is_live(args.source);
   options.dense_map = args.dense;
   options.check();
   return options;
@@ -215,61 +214,78 @@ int run(const RunArguments& args) {
   make_output_folder(out);
   if (!args.quiet) fmt::print("{}, results in {}\n", recording->description(), out.string());
 
-  interrupted = false;
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  const bool live = is_live(args.source);
   RunFacts facts;
   facts.writes_map = !args.localize;
   if (args.dump_features) facts.features_csv = "timestamp,x,y,state\n";
   report::RunLog log(recording->size());
   std::optional<PacedSource> paced;
-  if (args.realtime) paced.emplace(*recording);
+  if (args.realtime && !live) paced.emplace(*recording);
   Source& source = paced ? static_cast<Source&>(*paced) : *recording;
+  const Interrupt interrupt([&] { source.stop(); });
+  LiveReport report;
   Progress progress(recording->size(), args.quiet);
   const auto warn = [&] {
     for (const std::string& line : recording->take_warnings()) warnings.warn(line, line);
   };
   warn();
   const Stopwatch wall;
-  while (!interrupted) {
-    SourceFrame next = source.next();
-    warn();
-    if (next.state == SourceState::ended) break;
-    facts.offered = static_cast<int>(next.index) + 1;
-    if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
-    if (next.state != SourceState::frame) {
-      ++facts.skipped;
-      warnings.warn("frame skipped, an image cannot be read",
-                    "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
-      progress.frame(next.index + 1, nullptr);
-      continue;
+  std::exception_ptr failure;  // what was tracked until then is written all the same
+  const auto track_all = [&] {
+    while (!Interrupt::happened()) {
+      SourceFrame next = source.next();
+      warn();
+      if (next.state == SourceState::ended) break;
+      if (next.state != SourceState::unplugged) facts.offered = static_cast<int>(next.index) + 1;
+      if (facts.startup_s == 0) facts.startup_s = seconds_since_process_start() - loading_s;
+      report.add(next);
+      if (next.state == SourceState::unplugged) {
+        warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
+        continue;
+      }
+      if (next.state != SourceState::frame) {
+        ++facts.skipped;
+        warnings.warn("frame skipped, an image cannot be read",
+                      "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
+        progress.frame(next.index + 1, nullptr);
+        continue;
+      }
+      facts.stamps.push_back(next.stamp);
+      const FrameResult result = slam.process(next.frame);
+      for (const Mover& mover : result.movers)
+        facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+      log.frame(next.frame, result);
+      for (const Event& event : slam.take_events()) {
+        log.event(event);
+        if (event.kind == Event::Kind::warning)
+          warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+      }
+      if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
+      if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
+      progress.frame(next.index + 1, &result);
     }
-    facts.stamps.push_back(next.stamp);
-    const FrameResult result = slam.process(next.frame);
-    for (const Mover& mover : result.movers)
-      facts.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-    log.frame(next.frame, result);
-    for (const Event& event : slam.take_events()) {
-      log.event(event);
-      if (event.kind == Event::Kind::warning)
-        warnings.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
-    }
-    if (args.dump_features) append_features(facts.features_csv, next.stamp, result);
-    if (args.debug_log) append_frame(facts.debug_log, next.stamp, result);
-    progress.frame(next.index + 1, &result);
+  };
+  try {
+    track_all();
+  } catch (...) {
+    failure = std::current_exception();
   }
+  try {
+    slam.finish();
+  } catch (...) {
+    if (!failure) failure = std::current_exception();
+  }
+  if (failure && slam.statistics().tracked == 0) std::rethrow_exception(failure);
   progress.finish();
-  if (interrupted) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
-  if (paced) {
-    paced->stop();
-    facts.skipped += paced->dropped();
-  }
-  recording->stop();
-  slam.finish();
+  if (Interrupt::happened()) facts.offered = std::max(facts.offered, static_cast<int>(recording->size().value_or(0)));
+  source.stop();
+  if (paced || live) facts.skipped += static_cast<int>(source.counts().dropped);
+  // Nobody knows how many a camera could have given.
+  if (live) facts.offered = static_cast<int>(facts.stamps.size()) + facts.skipped;
   facts.wall_s = wall.ms() / 1000;
   facts.config_yaml = options.to_yaml();
   if (reader != nullptr) facts.times = reader->times();
-  if (args.dense) {
+  if (args.dense && !failure) {
     const Stopwatch building;
     const DenseMap map = slam.dense_map();
     facts.times.add("dense_build", building.ms());
@@ -280,17 +296,20 @@ int run(const RunArguments& args) {
   const report::ReportFacts reported = report_facts(args, *recording, options, slam, facts);
   write_file_atomically(out / "report.html",
                         report_html(log, reported, report::truth_beside(args.source, reported.trajectory)));
-  if (args.cv_orb && !interrupted) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
+  if (args.cv_orb && !Interrupt::happened()) write_cv_orb(out, cv_orb_of(args, opened, facts.offered));
   warnings.finish();
+  if (failure) std::rethrow_exception(failure);
 
   const Statistics s = slam.statistics();
   if (!args.quiet)
     fmt::print("{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", s.tracked,
                facts.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
-  if (const SourceCounts lost = recording->counts(); !args.quiet && lost.unpaired + lost.late > 0)
+  if (const std::string line = report.text(source.counts()); (live || args.live) && !args.quiet && !line.empty())
+    fmt::print("{}\n", line);
+  if (const SourceCounts lost = recording->counts(); !live && !args.quiet && lost.unpaired + lost.late > 0)
     fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
-  if (interrupted) return 130;
+  if (Interrupt::happened()) return 130;
   if (s.tracked > 0) return 0;
   if (args.localize)
     fmt::print(stderr, "error: the camera was never found in {}\n", args.load_map);
@@ -302,12 +321,11 @@ int run(const RunArguments& args) {
 
 }  // namespace
 
-void register_run(CLI::App& app, int& exit_code) {
-  auto args = std::make_shared<RunArguments>();
-  CLI::App* command = app.add_subcommand("run", "Track a recorded sequence: trajectory, map and statistics");
+namespace {
+
+// The options that `run` and `live` have in common.
+void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   SourceOptions& reading = args->reading;
-  command->add_option("source", args->source, "Folder in TUM layout, FILE.bag, FILE.mcap, FILE.db3 or its folder")
-      ->required();
   command->add_option("--camera", reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
   command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
   command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
@@ -344,15 +362,42 @@ void register_run(CLI::App& app, int& exit_code) {
                       "Wheel odometry in TUM format: guides tracking, and bridges what the images do not tell");
   command->add_flag("--localize", args->localize, "Track in that map without changing it");
   command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
-  command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
   command->add_flag("--debug-log", args->debug_log,
                     "Write debug.log: each frame's state, and why it became a keyframe or did not");
+  command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
+}
+
+}  // namespace
+
+void register_run(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<RunArguments>();
+  CLI::App* command = app.add_subcommand("run", "Track a recorded sequence: trajectory, map and statistics");
+  command
+      ->add_option("source", args->source,
+                   "Folder in TUM or another known layout, FILE.bag, FILE.mcap, FILE.db3 or its folder, FILE.oni")
+      ->required();
+  add_options(command, args);
+  command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--cv-orb", args->cv_orb,
                     "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
-  command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = run(*args); });
+}
+
+void register_live(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<RunArguments>();
+  CLI::App* command = app.add_subcommand("live", "Track what a camera sees, until Ctrl-C; results as those of run");
+  command
+      ->add_option("source", args->source,
+                   "openni2, realsense, orbbec, each with an optional :PLACE; v4l2:COLOUR,DEPTH; fake:FOLDER; "
+                   "`dkb-slam sources` lists them. A recording is played in real time")
+      ->required();
+  add_options(command, args);
+  command->callback([args, &exit_code] {
+    args->live = args->realtime = true;
+    exit_code = run(*args);
+  });
 }
 
 }  // namespace dkb

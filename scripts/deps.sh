@@ -25,6 +25,7 @@ packages=(
   libgtest-dev libbenchmark-dev libceres-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev libopencv-calib3d-dev
   libopencv-dnn-dev
+  libopenni2-dev  # optional for users: cameras of that kind
   python3-rosbag python3-sensor-msgs python3-nav-msgs python3-tf2-msgs  # bags as ROS itself writes and reads them
   "${python[@]}" python3-pip python3-venv
 )

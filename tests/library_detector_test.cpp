@@ -88,6 +88,18 @@ TEST_F(LibraryDetectors, APromptOneKeepsPeopleOut) {
   }
 }
 
+TEST_F(LibraryDetectors, OnesBoxesCountBesideAnothersMask) {
+  Detectors both = prompt(Gives::boxes);
+  both.prompt.push_back(std::make_shared<FunctionDetector>([](const DetectorInput& image) {
+    Detections nobody;
+    nobody.mask = GreyImage(image.depth.width, image.depth.height);
+    return nobody;
+  }));
+  Slam slam = slam_with(std::move(both));
+  run(slam, people);
+  EXPECT_EQ(leaked_points(slam), 0);
+}
+
 TEST_F(LibraryDetectors, ASlowOnesMasksCountAsWellAsItsBoxes) {
   for (const Gives gives : kGives) {
     Slam slam = slam_with(slow(gives, {.every = 2, .latency = 2}));
@@ -113,7 +125,8 @@ TEST_F(LibraryDetectors, WhatALateAnswerShowsIsRetracted) {
     slam.finish();
     EXPECT_GT(leaked_once, 0) << static_cast<int>(gives);
     EXPECT_GT(slam.statistics().points_retracted, 0) << static_cast<int>(gives);
-    // Silhouettes have a rim. A mask is taken as it was given: carried to a keyframe, it may be a pixel off at its edge.
+    // Silhouettes have a rim. A mask is taken as it was given: carried to a keyframe, it may be a pixel off at its
+    // edge.
     EXPECT_LE(leaked_points(slam), gives == Gives::boxes ? 0 : leaked_once / 3) << static_cast<int>(gives);
   }
 }

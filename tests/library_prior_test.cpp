@@ -149,6 +149,7 @@ TEST_F(LibraryPriors, ASuggestedPlaceTellsTwinsApart) {
   // The wall's picture repeats itself: many places explain the view.
   const int period = 144;
   const WallWorld twins(320, 240, period);
+  double odom_step = 0;  // [m] largest, of a robot that steers by it
   const auto found_at = [&](std::optional<int> suggested) -> std::optional<double> {
     Slam slam(twins.camera(), Options(), Detectors::none());
     for (int i = 0; i < 220; ++i) slam.process(twins.frame(i, {.shift = 2 * i}));
@@ -160,7 +161,13 @@ TEST_F(LibraryPriors, ASuggestedPlaceTellsTwinsApart) {
       slam.suggest_pose(pose, Matrix6d::Identity() * 0.01);
     }
     FrameResult r;
-    for (int i = 225; i < 235; ++i) r = slam.process(twins.frame(i, {.shift = 40 + period}));
+    std::optional<double> odom_x;
+    for (int i = 225; i < 235; ++i) {
+      r = slam.process(twins.frame(i, {.shift = 40 + period}));
+      if (!r.tracked()) continue;
+      if (odom_x) odom_step = std::max(odom_step, std::abs(r.odom_from_cam->translation.x() - *odom_x));
+      odom_x = r.odom_from_cam->translation.x();
+    }
     if (!r.tracked()) return std::nullopt;
     return r.world_from_cam->translation.x();
   };
@@ -168,7 +175,23 @@ TEST_F(LibraryPriors, ASuggestedPlaceTellsTwinsApart) {
     const auto x = found_at(place);
     ASSERT_TRUE(x) << place;
     EXPECT_NEAR(*x, twins.camera_x(place), 0.01) << place;
+    EXPECT_LT(odom_step, 0.01) << place;
   }
+}
+
+TEST_F(LibraryPriors, ASuggestionMovesTheMapAndNotOdometry) {
+  const int period = 144;
+  const WallWorld twins(320, 240, period);
+  Slam slam(twins.camera(), Options(), Detectors::none());
+  FrameResult before;
+  for (int i = 0; i < 220; ++i) before = slam.process(twins.frame(i, {.shift = 2 * i}));
+  Rigid3 elsewhere = *before.world_from_cam;
+  elsewhere.translation.x() -= twins.camera_x(period);
+  slam.suggest_pose(elsewhere, Matrix6d::Identity() * 0.001);
+  const FrameResult after = slam.process(twins.frame(220, {.shift = 438}));
+  ASSERT_TRUE(after.tracked());
+  EXPECT_NEAR(after.world_from_cam->translation.x(), twins.camera_x(438 - period), 0.02);
+  EXPECT_NEAR(after.odom_from_cam->translation.x(), before.odom_from_cam->translation.x(), 0.02);
 }
 
 TEST_F(LibraryPriors, ASuggestionThatIsNoPoseIsRefused) {

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Bags beside ROS' own library: rosbag_test.py DKB_SLAM. Says "skipped: ..." without python3-rosbag.
 

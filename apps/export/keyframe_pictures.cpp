@@ -17,9 +17,9 @@ namespace {
 
 // People who stand still are fit to track by, but no part of the still world: as for the dense map, whoever a detector
 // names is left out.
-GreyImage still_world(const FrameResult& result, const DepthImage& depth) {
+GreyImage still_world(const FrameResult& result, const DepthImage& depth, const Camera& camera) {
   MoverMask movers = result.mask;
-  unite(movers, silhouettes(depth, result.detections, {}), depth.width(), depth.height());
+  unite(movers, silhouettes(depth, result.detections, camera, {}), depth.width(), depth.height());
   GreyImage mask(depth.width(), depth.height(), 255);
   for (int y = 0; y < mask.height(); ++y)
     for (int x = 0; x < mask.width(); ++x)
@@ -48,7 +48,7 @@ int write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, Mas
     write_image_file(folder / "images" / picture->second,
                      image.colour.empty() ? encode_png(image.grey) : encode_png(image.colour));
     const std::string mask = picture->second + (names == MaskNames::with_ending ? ".png" : "");
-    write_image_file(folder / "masks" / mask, encode_png(still_world(result, image.depth)));
+    write_image_file(folder / "masks" / mask, encode_png(still_world(result, image.depth, slam.camera())));
     ++written;
   }
   if (written == 0)

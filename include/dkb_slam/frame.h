@@ -22,7 +22,7 @@ struct RgbdImage;  // the library's own
 /// What something else knows of the camera's motion since the frame before: wheels, an inertial unit, a planner. It
 /// guides the search for the frame's pose; the images have the last word.
 struct MotionPrior {
-  Rigid3 previous_from_current;                ///< camera axes; of the frames that process() was given last and now
+  Rigid3 previous_from_current;                ///< camera axes; of the frame that process() took last and this one
   bool rotation_only = false;                  ///< the translation is not known
   Matrix6d covariance = Matrix6d::Identity();  ///< right perturbation, [translation m, rotation rad], camera axes
 };
@@ -37,7 +37,7 @@ struct FrameInput {
   ImageView colour = {};  ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
   ImageView depth = {};   ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
   std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image; nothing = the colour image's
-  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion since the last frame given
+  std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion since the last frame taken
 };
 
 /// A pair of images, checked, copied and never changed again. Copies of it share the images. A frame may be made on

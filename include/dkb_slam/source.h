@@ -86,10 +86,11 @@ struct SourceOptions {
 /// device. Throws InputError saying what is wrong and what to do; a kind that was not built in is named as such.
 DKB_SLAM_API std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options = {});
 
-/// The folder `open_source` names, and nothing else. In the layout of the TUM RGB-D benchmark: associations.txt where
-/// it is there, else rgb.txt and depth.txt; colour as PNG or JPEG, depth as 16-bit PNG or 32-bit float. Throws
-/// InputError with file and line when the lists are wrong, when none of the first five pairs can be read, or when one
-/// that can has another size than the camera. A pair that cannot be read later on is skipped.
+/// The folder `open_source` names, and nothing else: in the layout of the TUM RGB-D benchmark (associations.txt where it
+/// is there, else rgb.txt and depth.txt) or in another that docs/sources.md lists, told apart by what lies in it; colour
+/// as PNG or JPEG, depth as 16-bit PNG or 32-bit float. Throws InputError with file and line when the lists are wrong,
+/// when none of the first five pairs can be read, or when one that can has another size than the camera. A pair that
+/// cannot be read later on is skipped.
 DKB_SLAM_API std::unique_ptr<Source> open_folder(const std::filesystem::path& folder,
                                                  const SourceOptions& options = {});
 

@@ -252,6 +252,7 @@ py::dict statistics(const PySlam& slam) {
        std::initializer_list<std::pair<const char*, int>>{{"frames", s.frames},
                                                           {"tracked", s.tracked},
                                                           {"lost", s.lost},
+                                                          {"predicted", s.predicted},
                                                           {"relocalisations", s.relocalisations},
                                                           {"keyframes", s.keyframes},
                                                           {"keyframes_inserted", s.keyframes_inserted},

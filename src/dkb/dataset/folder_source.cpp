@@ -7,14 +7,15 @@
 namespace dkb {
 namespace {
 
-TumDataset selected_pairs(const std::filesystem::path& folder, const SourceOptions& options) {
-  TumDataset dataset = open_tum_dataset(folder);
-  select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &dataset);
-  return dataset;
+FolderLayout selected_pairs(const std::filesystem::path& folder, const SourceOptions& options) {
+  FolderLayout layout = open_folder_layout(folder);
+  select_pairs({options.skip_pairs, options.start, options.end, options.max_frames}, &layout.dataset);
+  return layout;
 }
 
-CameraChoice camera_of(const std::filesystem::path& folder, const SourceOptions& options) {
+CameraChoice camera_of(const std::filesystem::path& folder, const FolderLayout& layout, const SourceOptions& options) {
   const bool told = !options.camera.empty() || std::filesystem::exists(folder / "camera.yaml");
+  if (!told && layout.camera) return *layout.camera;
   try {
     return choose_camera(options.camera, folder);
   } catch (const InputError&) {
@@ -30,16 +31,16 @@ std::string described(const TumDataset& dataset, const CameraChoice& camera) {
 }  // namespace
 
 FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOptions& options)
-    : dataset_(selected_pairs(folder, options)) {
-  const CameraChoice choice = camera_of(folder, options);
+    : layout_(selected_pairs(folder, options)) {
+  const CameraChoice choice = camera_of(folder, layout_, options);
   choice.camera.check();
-  description_ = described(dataset_, choice);
-  start(pairs_in_files(dataset_.pairs, choice.camera), choice.camera, options.threaded);
+  description_ = described(layout_.dataset, choice);
+  start(pairs_in_files(layout_.dataset.pairs, choice.camera, layout_.fit_colour), choice.camera, options.threaded);
 }
 
 std::vector<int64_t> FolderSource::stamps_ns() const {
   std::vector<int64_t> stamps;
-  for (const DatasetPair& pair : dataset_.pairs) stamps.push_back(pair.stamp_ns);
+  for (const DatasetPair& pair : layout_.dataset.pairs) stamps.push_back(pair.stamp_ns);
   return stamps;
 }
 

@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "dkb/dataset/folder_layouts.h"
 #include "dkb/dataset/reader_source.h"
 
 namespace dkb {
 
-// A folder in TUM layout as a source.
+// A folder in one of the known layouts as a source.
 class FolderSource final : public ReaderSource {
  public:
   FolderSource(const std::filesystem::path& folder, const SourceOptions& options);
 
-  std::optional<size_t> size() const override { return dataset_.pairs.size(); }
+  std::optional<size_t> size() const override { return layout_.dataset.pairs.size(); }
   std::string description() const override { return description_; }
   std::vector<int64_t> stamps_ns() const override;
 
-  const std::vector<DatasetPair>& pairs() const { return dataset_.pairs; }
+  const std::vector<DatasetPair>& pairs() const { return layout_.dataset.pairs; }
 
  private:
-  TumDataset dataset_;
+  FolderLayout layout_;
   std::string description_;
 };
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/image_codecs.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <vector>
 
 #include "dkb/dataset/image_formats.h"
 #include "dkb/util/errors.h"
@@ -109,6 +111,66 @@ Picture decode_picture(std::string_view bytes, const std::string& name) {
 
 Picture read_picture(const std::filesystem::path& path) {
   return decode_picture(read_file(path), path.string());
+}
+
+namespace {
+
+// What a pixel of the smaller image covers along one side of the larger one: the first pixel, and the share of each.
+struct Span {
+  int first = 0;
+  std::vector<float> shares;  // their sum is 1
+};
+
+std::vector<Span> spans_of(int size, int new_size) {
+  std::vector<Span> spans(static_cast<size_t>(new_size));
+  const double step = static_cast<double>(size) / new_size;
+  for (int i = 0; i < new_size; ++i) {
+    const double begin = i * step, end = std::min<double>(size, (i + 1) * step);
+    Span& span = spans[static_cast<size_t>(i)];
+    span.first = static_cast<int>(begin);
+    for (int k = span.first; k < end; ++k)
+      span.shares.push_back(static_cast<float>((std::min(end, k + 1.0) - std::max<double>(begin, k)) / step));
+  }
+  return spans;
+}
+
+template <class Pixel>
+Image<Pixel> area_means(const Image<Pixel>& in, int width, int height) {
+  constexpr size_t channels = sizeof(Pixel);
+  const std::vector<Span> columns = spans_of(in.width(), width), rows = spans_of(in.height(), height);
+  Image<Pixel> out(width, height);
+  std::vector<float> sums(static_cast<size_t>(in.width()) * channels);  // of the rows that an output row covers
+  for (int y = 0; y < height; ++y) {
+    const Span& row = rows[static_cast<size_t>(y)];
+    std::fill(sums.begin(), sums.end(), 0.0F);
+    for (size_t k = 0; k < row.shares.size(); ++k) {
+      const auto* bytes = reinterpret_cast<const uint8_t*>(in.row(row.first + static_cast<int>(k)));
+      for (size_t i = 0; i < sums.size(); ++i) sums[i] += row.shares[k] * static_cast<float>(bytes[i]);
+    }
+    auto* to = reinterpret_cast<uint8_t*>(out.row(y));
+    for (const Span& column : columns)
+      for (size_t c = 0; c < channels; ++c) {
+        float mean = 0;
+        for (size_t k = 0; k < column.shares.size(); ++k)
+          mean += column.shares[k] * sums[(static_cast<size_t>(column.first) + k) * channels + c];
+        *to++ = static_cast<uint8_t>(std::min(255.0F, mean + 0.5F));
+      }
+  }
+  return out;
+}
+
+}  // namespace
+
+Picture resampled(const Picture& picture, int width, int height) {
+  if (picture.grey.width() == width && picture.grey.height() == height) return picture;
+  Picture result;
+  if (picture.colour.empty()) {
+    result.grey = area_means(picture.grey, width, height);
+  } else {
+    result.colour = area_means(picture.colour, width, height);
+    result.grey = grey_from_colour(result.colour);
+  }
+  return result;
 }
 
 GreyImage read_grey(const std::filesystem::path& path) {

@@ -37,6 +37,9 @@ struct Picture {
 Picture decode_picture(std::string_view bytes, const std::string& name);
 Picture read_picture(const std::filesystem::path& path);
 
+// The picture at another size: each pixel the mean of the area that it covers.
+Picture resampled(const Picture& picture, int width, int height);
+
 // Grey of any picture (masks).
 GreyImage read_grey(const std::filesystem::path& path);
 

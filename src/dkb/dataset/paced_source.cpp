@@ -1,17 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/paced_source.h"
 
-#include <chrono>
+#include <deque>
+#include <utility>
 
 #include "dkb/image/skipped_motion.h"
 
 namespace dkb {
+namespace {
 
-PacedSource::PacedSource(Source& source) : source_(source), thread_([this] { run(); }) {}
+PacedSource::Due by_stamps() {
+  return [first = std::optional<int64_t>()](const SourceFrame& frame) mutable {
+    std::optional<std::chrono::nanoseconds> due;
+    if (frame.state != SourceState::frame) return due;
+    if (!first) first = frame.frame.stamp_ns();
+    due = std::chrono::nanoseconds(frame.frame.stamp_ns() - *first);
+    return due;
+  };
+}
+
+// A recording whose clock jumps would keep its consumer waiting: from so long a pause on, the pace begins anew.
+constexpr std::chrono::seconds kLongestPause{10};
+
+}  // namespace
+
+PacedSource::PacedSource(Source& source) : source_(source), due_(by_stamps()), thread_([this] { run(); }) {}
+
+PacedSource::PacedSource(std::unique_ptr<Source> source, Due due)
+    : owned_(std::move(source)), source_(*owned_), due_(std::move(due)), thread_([this] { run(); }) {}
+
+std::unique_ptr<PacedSource> PacedSource::of_device(std::unique_ptr<Source> device) {
+  return std::make_unique<PacedSource>(std::move(device), [](const SourceFrame&) { return std::nullopt; });
+}
 
 PacedSource::~PacedSource() {
   stop();
   thread_.join();
+}
+
+SourceFrame PacedSource::next() {
+  if (std::optional<SourceFrame> frame = queue_.pop()) return std::move(*frame);
+  const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  return {};
 }
 
 void PacedSource::stop() {
@@ -24,28 +55,57 @@ void PacedSource::stop() {
   queue_.close();
 }
 
+SourceCounts PacedSource::counts() const {
+  SourceCounts counts = source_.counts();
+  counts.dropped += dropped_;
+  counts.late += late_;
+  return counts;
+}
+
 void PacedSource::run() {
   using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> start;
-  int64_t first_stamp = 0;
-  for (SourceFrame frame = source_.next(); frame.state != SourceState::ended; frame = source_.next()) {
-    // A pair that cannot be read is told at once: it has no stamp to wait for.
-    if (frame.state == SourceState::frame) {
-      if (!start) {
-        start = Clock::now();
-        first_stamp = frame.frame.stamp_ns();
+  std::optional<int64_t> last_stamp;
+  SkippedMotion left_out;  // since the last frame that waits in the queue
+  const auto leave_motion = [&](const SourceFrame& dropped, std::deque<SourceFrame>& waiting) {
+    if (dropped.state != SourceState::frame) return;
+    SkippedMotion motion;
+    motion.skip(dropped.frame);
+    for (SourceFrame& next : waiting)
+      if (next.state == SourceState::frame) {
+        next.frame = motion.with_motion(std::move(next.frame));
+        return;
       }
-      const auto due = *start + std::chrono::nanoseconds(frame.frame.stamp_ns() - first_stamp);
-      std::unique_lock lock(mutex_);
-      if (wake_.wait_until(lock, due, [&] { return stopped_; })) break;
+    left_out.skip(dropped.frame);
+  };
+  try {
+    for (;;) {
+      SourceFrame frame = source_.next();
+      if (const auto due = due_(frame)) {
+        const Clock::time_point now = Clock::now();
+        // Compared as durations, so that no stamp overflows a time.
+        if (!start || *due > (now - *start) + kLongestPause || *due < (now - *start) - kLongestPause)
+          start = now - *due;
+        std::unique_lock lock(mutex_);
+        if (wake_.wait_until(lock, *start + *due, [&] { return stopped_; })) break;
+      }
+      if (frame.state == SourceState::ended) break;
+      if (frame.state == SourceState::frame) {
+        const int64_t stamp = frame.frame.stamp_ns();
+        if (last_stamp && stamp <= *last_stamp) {
+          ++late_;
+          left_out.skip(frame.frame);
+          continue;
+        }
+        last_stamp = stamp;
+        frame.frame = left_out.with_motion(std::move(frame.frame));
+        left_out = {};
+      }
+      dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
     }
-    const auto leave_motion = [](const SourceFrame& dropped, SourceFrame& next) {
-      if (dropped.state != SourceState::frame || next.state != SourceState::frame) return;
-      SkippedMotion skipped;
-      skipped.skip(dropped.frame);
-      next.frame = skipped.with_motion(std::move(next.frame));
-    };
-    dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
   }
   queue_.close();
 }

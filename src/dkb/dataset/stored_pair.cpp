@@ -27,14 +27,14 @@ OpenedImage open_image(const std::filesystem::path& path) {
 }
 
 // What is wrong with the type or the size of an image that may be sound in itself; empty when nothing is.
-std::string mismatch(const OpenedImage& image, bool is_depth, const CameraModel& camera) {
+std::string mismatch(const OpenedImage& image, bool is_depth, const CameraModel& camera, bool fit_colour) {
   const ImageHeader& h = image.header;
   const std::string other = is_depth ? why_not_depth(h) : why_not_picture(h);
   if (!other.empty())
     return image.name + ": is " + other +
            (is_depth ? "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY"
                      : "; colour images must be PNG or JPEG");
-  return size_mismatch(image.name, h.width, h.height, camera);
+  return fit_colour && !is_depth ? "" : size_mismatch(image.name, h.width, h.height, camera);
 }
 
 // Throws unless the pixels can be decoded, whatever the image is.
@@ -47,12 +47,12 @@ void decode_any(const OpenedImage& image, const CameraModel& camera) {
 
 // Headers tell type and size; where one is wrong the pixels are decoded as well, to tell a wrong dataset from a single
 // broken file. A wrong depth image counts for more than a broken colour image.
-std::string mismatch(const DatasetPair& pair, const CameraModel& camera) {
+std::string mismatch(const DatasetPair& pair, const CameraModel& camera, bool fit_colour) {
   std::optional<InputError> broken;
   for (const bool is_depth : {false, true}) {
     try {
       const OpenedImage image = open_image(is_depth ? pair.depth_path : pair.colour_path);
-      const std::string wrong = mismatch(image, is_depth, camera);
+      const std::string wrong = mismatch(image, is_depth, camera, fit_colour);
       if (wrong.empty()) continue;
       decode_any(image, camera);
       return wrong;
@@ -64,17 +64,18 @@ std::string mismatch(const DatasetPair& pair, const CameraModel& camera) {
   return "";
 }
 
-std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& camera) {
+std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& camera, bool fit_colour) {
   auto image = std::make_shared<RgbdImage>();
   image->timestamp = pair.timestamp, image->depth_timestamp = pair.depth_timestamp;
   const auto open = [&](const std::filesystem::path& path, bool is_depth) {
     OpenedImage opened = open_image(path);
-    const std::string wrong = mismatch(opened, is_depth, camera);
+    const std::string wrong = mismatch(opened, is_depth, camera, fit_colour);
     if (!wrong.empty()) throw InputError(wrong);
     return opened;
   };
   const OpenedImage colour = open(pair.colour_path, false), depth = open(pair.depth_path, true);
   Picture picture = decode_picture(colour.bytes, colour.name);
+  if (fit_colour) picture = resampled(picture, camera.width, camera.height);
   image->grey = std::move(picture.grey), image->colour = std::move(picture.colour);
   image->depth = decode_depth(depth.bytes, depth.name, camera);
   return image;
@@ -88,16 +89,16 @@ std::string size_mismatch(const std::string& name, int width, int height, const 
          "; give the camera of this dataset, and depth registered to colour";
 }
 
-PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera) {
+PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera, bool fit_colour) {
   const auto shared = std::make_shared<const std::vector<DatasetPair>>(std::move(pairs));
-  return [shared, camera, next = size_t{0}]() mutable -> std::optional<StoredPair> {
+  return [shared, camera, fit_colour, next = size_t{0}]() mutable -> std::optional<StoredPair> {
     if (next >= shared->size()) return std::nullopt;
     const DatasetPair& pair = (*shared)[next++];
     StoredPair stored;
     stored.timestamp = pair.timestamp, stored.stamp = pair.stamp;
     stored.stamp_ns = pair.stamp_ns, stored.depth_stamp_ns = pair.depth_stamp_ns;
-    stored.mismatch = [shared, &pair, camera] { return mismatch(pair, camera); };
-    stored.decode = [shared, &pair, camera] { return decode(pair, camera); };
+    stored.mismatch = [shared, &pair, camera, fit_colour] { return mismatch(pair, camera, fit_colour); };
+    stored.decode = [shared, &pair, camera, fit_colour] { return decode(pair, camera, fit_colour); };
     return stored;
   };
 }

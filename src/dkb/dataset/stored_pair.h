@@ -30,8 +30,9 @@ struct StoredPair {
 // Answers pair by pair, colour stamps rising; nothing at the end. Called by one thread at a time.
 using PairStream = std::function<std::optional<StoredPair>()>;
 
-// The pairs of files that the lists of a folder name.
-PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera);
+// The pairs of files that the lists of a folder name. `fit_colour`: colour images of another size are resampled to the
+// camera's, to which depth belongs.
+PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera, bool fit_colour = false);
 
 // Empty when an image has the camera's size; else what is wrong, for people.
 std::string size_mismatch(const std::string& name, int width, int height, const CameraModel& camera);

@@ -21,6 +21,11 @@ void require_columns(const std::vector<std::string_view>& columns, size_t wanted
                      " columns; a row must be `" + form + "`");
 }
 
+// ICL-NUIM and some tools write the depth image first.
+bool names_depth(std::string_view path) {
+  return path.substr(0, path.find('/')).find("depth") != std::string_view::npos;
+}
+
 // Checks that each stamp lies after the one of the row before.
 class RisingStamps {
  public:
@@ -79,11 +84,13 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
   RisingStamps rising;
   for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
     DatasetPair pair;
-    pair.timestamp = read_number(columns[0], place, "timestamp");
+    read_number(columns[0], place, "timestamp");
     require_columns(columns, 4, "rgb_timestamp rgb_file depth_timestamp depth_file", place);
-    pair.depth_timestamp = read_number(columns[2], place, "depth timestamp");
-    pair.stamp = columns[0], pair.depth_stamp = columns[2];
-    pair.colour_path = folder / columns[1], pair.depth_path = folder / columns[3];
+    const size_t c = names_depth(columns[1]) && !names_depth(columns[3]) ? 2 : 0, d = 2 - c;
+    pair.timestamp = read_number(columns[c], place, "timestamp");
+    pair.depth_timestamp = read_number(columns[d], place, "depth timestamp");
+    pair.stamp = columns[c], pair.depth_stamp = columns[d];
+    pair.colour_path = folder / columns[c + 1], pair.depth_path = folder / columns[d + 1];
     rising.add(pair.timestamp, pair.stamp, place);
     pairs.push_back(std::move(pair));
   });
@@ -136,7 +143,15 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   for (const fs::path& list : {rgb, depth})
     if (!fs::exists(list, ec))
       throw InputError(list.string() + ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt");
-  dataset.list = "rgb.txt and depth.txt";
+  return pair_image_lists(folder, "rgb.txt", "depth.txt", options);
+}
+
+TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list,
+                            const AssociationOptions& options) {
+  TumDataset dataset;
+  dataset.folder = folder;
+  dataset.list = colour_list + " and " + depth_list;
+  const fs::path rgb = folder / colour_list, depth = folder / depth_list;
   const std::vector<ListRow> colour_rows = parse_image_list(read_file(rgb), rgb.string());
   const std::vector<ListRow> depth_rows = parse_image_list(read_file(depth), depth.string());
   std::vector<double> colour_stamps, depth_stamps;
@@ -147,7 +162,7 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
     dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
   }
   if (dataset.pairs.empty())
-    throw InputError(rgb.string() + ": no colour image has a depth image of depth.txt within " +
+    throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
                      std::to_string(options.max_difference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
   set_exact_stamps(dataset.pairs, rgb.string());

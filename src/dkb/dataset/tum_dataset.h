@@ -36,11 +36,15 @@ struct TumDataset {
 };
 
 // Reads the lists of a folder in TUM layout (no image is opened): the rows of associations.txt as they are
-// (`rgb_stamp rgb_path depth_stamp depth_path`) when it is there, else rgb.txt and depth.txt (`stamp path`), paired one
-// to one, nearest stamps first. Comments, blank lines and CRLF are fine. Throws InputError with file:line: folder or
-// lists missing or empty; a row malformed, with too few columns, with a stamp that is not finite, repeated or out of
-// order; nothing pairs. In associations.txt depth stamps may repeat.
+// (`rgb_stamp rgb_path depth_stamp depth_path`, or depth first: told by the folders' names) when it is there, else
+// rgb.txt and depth.txt (`stamp path`), paired one to one, nearest stamps first. Comments, blank lines and CRLF are
+// fine. Throws InputError with file:line: folder or lists missing or empty; a row malformed, with too few columns, with
+// a stamp that is not finite, repeated or out of order; nothing pairs. In associations.txt depth stamps may repeat.
 TumDataset open_tum_dataset(const std::filesystem::path& folder, const AssociationOptions& options = {});
+
+// Likewise by two lists of these names alone.
+TumDataset pair_image_lists(const std::filesystem::path& folder, const std::string& colour_list,
+                            const std::string& depth_list, const AssociationOptions& options = {});
 
 // The rows of one list, parsed from text; `name` opens the messages.
 struct ListRow {

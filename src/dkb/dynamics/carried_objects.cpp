@@ -31,8 +31,8 @@ void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
     }
 }
 
-CarriedObjects::CarriedObjects(const Camera& camera, const CarriedObjectsOptions& options)
-    : camera_(camera), options_(options), flow_(options.flow) {}
+CarriedObjects::CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options)
+    : camera_(camera), noise_(noise), options_(options), flow_(options.flow) {}
 
 std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const ImagePyramid& to,
                                                  const std::vector<Detection>& boxes) const {
@@ -97,7 +97,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
       if (!p.keyframe || detections.boxes.empty()) continue;
       const Detections there = carry_to(*source, *p.pyramid, detections, std::abs(p.frame - from));
       LateMask mask{p.frame, silhouettes(p.image->depth, there.mask.empty() ? there.boxes : std::vector<Detection>(),
-                                         options_.silhouette)};
+                                         camera_, noise_, options_.silhouette)};
       if (!p.still_score.empty()) clear_still(mask.mask, p.still_score, score_cell);
       if (!there.mask.empty()) unite(mask.mask, {1, there.mask}, camera_.width, camera_.height);
       late.push_back(std::move(mask));

@@ -28,7 +28,7 @@ struct LateMask {
 // What a slow detector has said, carried by optical flow to the newest image. Deterministic.
 class CarriedObjects {
  public:
-  CarriedObjects(const Camera& camera, const CarriedObjectsOptions& options);
+  CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options);
 
   // One frame on, from the newest of `past` to the image of `pyramid`.
   void follow(const PastFrames& past, const ImagePyramid& pyramid);
@@ -51,6 +51,7 @@ class CarriedObjects {
   Detections carry_to(const PastFrame& from, const ImagePyramid& to, const Detections& detections, int frames) const;
 
   Camera camera_;
+  SensorNoise noise_;
   CarriedObjectsOptions options_;
   OpticalFlow flow_;
   std::vector<Carried> carried_;

@@ -80,7 +80,7 @@ class CarriedObjectsTest : public ::testing::Test {
   SquareWorld world{320, 240, 300, 8};
   Camera camera;
   CarriedObjectsOptions options;
-  CarriedObjects carried{small_camera(), options};
+  CarriedObjects carried{small_camera(), {}, options};
   PastFrames past;
   PastFrame now;
 

@@ -50,7 +50,7 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       noise_(noise),
       options_(options),
       rays_(camera, options.cell),
-      smoothing_(camera, options.cell, options.smoothing) {
+      smoothing_(camera, noise, options.cell, options.smoothing) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
@@ -173,7 +173,10 @@ void MotionSegmenter::compare(MotionDepthGrid& view) {
   const float interior_weight = trust * kInterior;
   const auto slope = kSlope, revision = kRevision;
   // From this much farther on, the surface behind does not hang together with the one in front.
-  const auto beyond = [](float z, float tolerance) { return z + 2.0f * tolerance + 0.03f * z; };
+  const auto beyond = [this](float z) {
+    constexpr int kAcross = 2;  // [cells] `farthest` is that of the cells beside
+    return z + static_cast<float>(noise_.max_depth_jump(z, kAcross * options_.cell, camera_.fx));
+  };
   for (size_t i = 0; i < current_->depth.size(); ++i) {
     const float z = current_->depth.data()[i];
     const bool hole = !(z > 0);
@@ -196,10 +199,10 @@ void MotionSegmenter::compare(MotionDepthGrid& view) {
       score_then += revision * (current_->score.data()[i] - score_then);
       if (score_then >= kUnmarked) continue;
       agreements_.data()[i] += trust;
-      const bool outline = current_->farthest.data()[i] > beyond(z, tolerance);
+      const bool outline = current_->farthest.data()[i] > beyond(z);
       if (!outline)
         still_.data()[i] += interior_weight;
-      else if (farthest > beyond(depth_there, tolerance))
+      else if (farthest > beyond(depth_there))
         still_.data()[i] += contour_weight;
     }
   }

@@ -14,8 +14,12 @@ constexpr float kCreaseLink = 0.3f;  // share of what is said that crosses such 
 
 }  // namespace
 
-MotionSmoothing::MotionSmoothing(const CameraModel& camera, int cell, const MotionSmoothingOptions& options)
-    : options_(options), fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.distance))) {
+MotionSmoothing::MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell,
+                                 const MotionSmoothingOptions& options)
+    : noise_(noise),
+      focal_(camera.fx),
+      cell_(cell),
+      fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.distance))) {
   const int width = (camera.width + cell - 1) / cell, height = (camera.height + cell - 1) / cell;
   for (Image<float>* i : {&inverse_, &damping_, &left_, &up_}) *i = Image<float>(width, height);
 }
@@ -43,11 +47,10 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
 void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t>& open) {
   find_creases(depth);
   const auto near = static_cast<float>(kNearRange);
-  const auto base = static_cast<float>(options_.depth_jump_base), slope = static_cast<float>(options_.depth_jump_slope);
   const auto link = [&](size_t a, size_t b) {
     const float za = depth.data()[a], zb = depth.data()[b];
     const float low = std::min(za, zb), high = std::max(za, zb);
-    const bool joined = high - low < base + slope * low;
+    const bool joined = high - low < static_cast<float>(noise_.max_depth_jump(low, cell_, focal_));
     const bool too_near = (high < near) & ((za > 0) | (open.data()[a] != 0)) & ((zb > 0) | (open.data()[b] != 0));
     const float strength =
         low > 0 ? (joined ? std::min(damping_.data()[a], damping_.data()[b]) : 0.0f) : (too_near ? 1.0f : 0.0f);

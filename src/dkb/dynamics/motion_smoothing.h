@@ -2,6 +2,7 @@
 #pragma once
 
 #include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/image.h"
 
 namespace dkb {
@@ -10,9 +11,7 @@ namespace dkb {
 constexpr double kNearRange = 0.55;
 
 struct MotionSmoothingOptions {
-  double distance = 0.4;           // [m] along the surface over which cells of one object speak for each other, > 0
-  double depth_jump_base = 0.015;  // [m] depth step between neighbouring cells of one surface: this ...
-  double depth_jump_slope = 0.02;  // ... plus this share of their depth, >= 0
+  double distance = 0.4;  // [m] along the surface over which cells of one object speak for each other, > 0
 };
 
 // Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)
@@ -21,7 +20,7 @@ struct MotionSmoothingOptions {
 // viewer.
 class MotionSmoothing {
  public:
-  MotionSmoothing(const CameraModel& camera, int cell, const MotionSmoothingOptions& options);
+  MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, const MotionSmoothingOptions& options);
 
   // `depth`: of the cells' middles [m], 0 = none. `open`: 255 where missing depth may be a surface too near for the
   // sensor. Sets what smooth() stops at.
@@ -32,7 +31,9 @@ class MotionSmoothing {
  private:
   void find_creases(const Image<float>& depth);
 
-  MotionSmoothingOptions options_;
+  SensorNoise noise_;
+  double focal_;
+  int cell_;                        // [px]
   float fade_ = 0;                  // [1 / m of depth] of a link per cell
   Image<float> inverse_, damping_;  // 1 / depth; crease_link in folds, else 1
   Image<float> left_, up_;          // link to the neighbour, 0 ... 1

@@ -88,8 +88,8 @@ struct Cell {
 // What hangs together in depth within a range of cells. Each cell is given out once.
 class Surfaces {
  public:
-  Surfaces(const Image<float>& depth, const CellRange& cells, float depth_jump)
-      : range(cells), depth_(depth), depth_jump_(depth_jump), seen_(depth.width(), depth.height()) {}
+  Surfaces(const Image<float>& depth, const CellRange& cells, const Camera& camera, const SensorNoise& noise)
+      : range(cells), depth_(depth), focal_(camera.fx), noise_(noise), seen_(depth.width(), depth.height()) {}
 
   // The seeds and all that hangs together with them and is `wanted`.
   std::vector<Cell> grow(std::vector<Cell> cells, const auto& wanted) {
@@ -99,8 +99,9 @@ class Surfaces {
       const float d = depth_(x, y);
       for (const auto& [dx, dy] : kBeside) {
         const Cell n{x + dx, y + dy};
-        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || std::fabs(depth_(n.x, n.y) - d) > depth_jump_ * d)
-          continue;
+        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y)) continue;
+        const double z = depth_(n.x, n.y);
+        if (std::abs(z - d) > noise_.max_depth_jump(std::min<double>(z, d), kCell, focal_)) continue;
         seen_(n.x, n.y) = 1;
         cells.push_back(n);
       }
@@ -115,7 +116,8 @@ class Surfaces {
 
  private:
   const Image<float>& depth_;
-  float depth_jump_;
+  double focal_;
+  SensorNoise noise_;
   Image<uint8_t> seen_;
 };
 
@@ -146,7 +148,8 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
 
 }  // namespace
 
-MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const SilhouetteOptions& options) {
+MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
+                      const SensorNoise& noise, const SilhouetteOptions& options) {
   MoverMask mask;
   mask.cell = kCell;
   if (boxes.empty()) return mask;
@@ -166,7 +169,7 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
       continue;
     }
     Image<uint8_t> mine(columns, rows);
-    Surfaces surfaces{grid, range, static_cast<float>(options.depth_jump)};
+    Surfaces surfaces{grid, range, camera, noise};
     const auto near_layer = [&](int x, int y, double tolerance) {
       return grid(x, y) > 0 && std::fabs(grid(x, y) - layer) <= static_cast<float>(tolerance);
     };

@@ -5,11 +5,12 @@
 
 #include "dkb/detection/detection.h"
 #include "dkb/dynamics/mover_mask.h"
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
 
 namespace dkb {
 
 struct SilhouetteOptions {
-  double depth_jump = 0.02;       // [1] depth step between neighbouring cells of one surface, relative to depth, > 0
   double max_depth_offset = 0.6;  // [m] parts of the object lie at most so far before or behind its layer, > 0
   int rim = 1;                    // [cells] the silhouette is widened by, >= 0
 };
@@ -18,6 +19,7 @@ struct SilhouetteOptions {
 // fills a good part of the box's core, all that hangs together with it in depth within the box, and limbs: surfaces in
 // reach beside it that end within the box. Cells without depth follow their neighbours. A box whose core has no depth
 // at all is taken whole.
-MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const SilhouetteOptions& options);
+MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
+                      const SensorNoise& noise, const SilhouetteOptions& options = {});
 
 }  // namespace dkb

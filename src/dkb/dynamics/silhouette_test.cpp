@@ -21,7 +21,7 @@ DepthImage person_before_wall() {
 }
 
 MoverMask silhouette_in(const DepthImage& depth, const Box& box, const SilhouetteOptions& options = {}) {
-  return silhouettes(depth, std::vector<Detection>{{"person", box, 1}}, options);
+  return silhouettes(depth, std::vector<Detection>{{"person", box, 1}}, {}, {}, options);
 }
 
 TEST(Silhouette, HoldsThePersonAndARimButNotTheWallBesideIt) {
@@ -126,7 +126,7 @@ TEST(Silhouette, ABoxWithoutDepthIsTakenWhole) {
 }
 
 TEST(Silhouette, NoBoxesNoMask) {
-  EXPECT_TRUE(silhouettes(person_before_wall(), {}, {}).empty());
+  EXPECT_TRUE(silhouettes(person_before_wall(), {}, {}, {}).empty());
 }
 
 TEST(Silhouette, BoxesBeyondTheImageAreHarmless) {
@@ -140,7 +140,7 @@ TEST(Silhouette, TheMasksOfSeveralBoxesAreUnited) {
   DepthImage depth = person_before_wall();
   fill(&depth, 110, 20, 140, 100, 2.0f);
   const std::vector<Detection> boxes = {{"person", {60, 20, 40, 80}, 1}, {"person", {110, 20, 30, 80}, 1}};
-  const MoverMask mask = silhouettes(depth, boxes, {});
+  const MoverMask mask = silhouettes(depth, boxes, {}, {});
   EXPECT_TRUE(mask.at(80, 60));
   EXPECT_TRUE(mask.at(125, 60));
   EXPECT_FALSE(mask.at(30, 60));

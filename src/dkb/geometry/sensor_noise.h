@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -47,6 +48,18 @@ struct SensorNoise {
   double surface_tolerance(double z) const {
     constexpr double kPoseError = 0.02;  // [m]
     return kPoseError + 6 * flat_depth_sigma(z);
+  }
+  // Whether two depths [m] of one place, measured at different times, may be of one surface.
+  bool same_surface(double z1, double z2) const { return std::abs(z1 - z2) <= surface_tolerance(std::max(z1, z2)); }
+  // What the depth of a corner may differ by from that of the map point which it shows [m]: three standard deviations.
+  double point_tolerance(double z) const { return 3 * depth_sigma(z); }
+  // The largest step [m] between depths around z that lie `pixels` apart on one surface. A surface that is seen at 75
+  // degrees from its normal, beyond which a structured-light sensor sees little of it, falls away by tan 75 of the
+  // distance across. To it comes the difference of two depths, exceeded by one in twenty.
+  double max_depth_jump(double z, double pixels, double focal) const {
+    constexpr double kSteepest = 3.73;    // tan 75 degrees
+    constexpr double kDifference = 2.77;  // 1.96 sqrt(2)
+    return kDifference * flat_depth_sigma(z) + kSteepest * pixels / focal * z;
   }
 };
 

@@ -186,7 +186,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
         5.991 * tolerance * tolerance * sigma * sigma)
       continue;
-    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > 3 * tolerance * noise_.depth_sigma(kp.depth)) continue;
+    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > tolerance * noise_.point_tolerance(kp.depth)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];
     if (there == kNoPoint) {
       map_.observe(id, keyframe, m.feature);

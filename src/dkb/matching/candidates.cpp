@@ -36,8 +36,9 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
 }
 
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
-                                                 const MatchableFeatures& matchable, const CameraModel& camera, const Rigid3& cam_from_world,
-                                                 double scale_factor, int levels, const ProjectionMatchOptions& options,
+                                                 const MatchableFeatures& matchable, const CameraModel& camera,
+                                                 const Rigid3& cam_from_world, double scale_factor, int levels,
+                                                 const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
   const RgbdFeatures& features = matchable.features;
   const Eigen::Matrix3f rotation = cam_from_world.matrix3().cast<float>();
@@ -76,7 +77,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
       if (k.octave < level - 1 || k.octave > level + 1) return;
       if (matchable.on_mover(static_cast<size_t>(f)) &&
-          (!c.established || (k.depth > 0 && std::fabs(k.depth - p.z()) > options.suspect_depth_gate * p.z())))
+          (!c.established || (k.depth > 0 && !options.noise.same_surface(k.depth, p.z()))))
         return;
       if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;
       const int d = hamming_distance(c.descriptor, features.descriptors[static_cast<size_t>(f)]);

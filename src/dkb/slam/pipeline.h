@@ -49,7 +49,10 @@ class Pipeline {
   void finish();
 
   void localize_only(bool on) { localize_only_ = on; }
-  void suggest_pose(const PosePrediction& pose) { tracker_.suggest(pose); }
+  void suggest_pose(const PosePrediction& pose) {
+    tracker_.suggest(pose);
+    odometry_.lost();  // how the camera came there is not known
+  }
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
   const TrackingMap& map() const { return tracker_.map(); }
   // From the keyframes so far. Throws InputError when dense mapping is off.

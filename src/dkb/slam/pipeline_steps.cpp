@@ -194,8 +194,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
     if (!scene.mask.at(at.x(), at.y())) continue;
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
-    const double surface = depth(x, y);
-    if (std::abs(surface - point.depth) < 0.05 * surface + 0.05 &&
+    if (options_.noise.same_surface(depth(x, y), point.depth) &&
         !std::binary_search(matched.begin(), matched.end(), point.id))
       on_mover.push_back(point.id);
   }
@@ -267,8 +266,9 @@ void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
     // People who stand still are fit to track by, but no part of the map.
     MoverMask movers = scene.mask;
     const RgbdImage& image = scene.extracted.image();
-    unite(movers, silhouettes(image.depth, scene.boxes, options_.dynamics.carried.silhouette), image.depth.width(),
-          image.depth.height());
+    unite(movers,
+          silhouettes(image.depth, scene.boxes, context_.camera, options_.noise, options_.dynamics.carried.silhouette),
+          image.depth.width(), image.depth.height());
     dense_->add_keyframe(tracked.index, image, movers);
     record_.add_time("dense_keyframe", watch.ms());
   }
@@ -328,7 +328,8 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 }
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
-  if (tracked.starts_map) note(Event::Kind::new_map);
+  // Where a prior tells how the camera came there, the old map goes on.
+  if (tracked.starts_map && !tracked.predicted_cam_from_world) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));

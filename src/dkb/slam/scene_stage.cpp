@@ -17,11 +17,12 @@ constexpr int kSupportCell = 4;  // [px] cells of the motion segmentation when i
 SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options,
                        const Detectors& detectors, bool threaded, bool realtime)
     : camera_(camera),
+      noise_(noise),
       options_(options),
       schedule_(detectors.schedule),
       prompt_(detectors.prompt),
       slow_(detectors.slow),
-      carried_(camera, options.carried) {
+      carried_(camera, noise, options.carried) {
   options_.rivals.flow = options_.carried.flow;
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
@@ -52,7 +53,9 @@ void SceneStage::learn(const FrameOutcome& before) {
   if (motion_) motion_->move_world(before.new_world_from_old);
 }
 
-MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes) {
+// `boxes` grows by all that were found, `unmasked` by those whose detector gave no mask with them.
+MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes,
+                                           std::vector<Detection>& unmasked) {
   MoverMask given;
   for (const auto& detector : prompt_) {
     Detections found;
@@ -65,7 +68,10 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
     }
     if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
     boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());
-    if (!found.mask.empty()) unite(given, {1, std::move(found.mask)}, camera_.width, camera_.height);
+    if (found.mask.empty())
+      unmasked.insert(unmasked.end(), found.boxes.begin(), found.boxes.end());
+    else
+      unite(given, {1, std::move(found.mask)}, camera_.width, camera_.height);
   }
   return given;
 }
@@ -88,9 +94,9 @@ MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_f
   return moving;
 }
 
-MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& boxes, const MoverMask& given,
+MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                               const MoverMask& moving) const {
-  MoverMask mask = given.empty() ? silhouettes(image.depth, boxes, options_.carried.silhouette) : MoverMask{};
+  MoverMask mask = silhouettes(image.depth, unmasked, camera_, noise_, options_.carried.silhouette);
   if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
   unite(mask, given, camera_.width, camera_.height);
   if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);
@@ -127,7 +133,9 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(scene.late_masks));
   }
   scene.boxes = carried_.boxes();
-  MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes);
+  std::vector<Detection> unmasked;
+  if (carried_.mask().empty()) unmasked = scene.boxes;
+  MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
   const MoverMask moving = segment_motion(image, expected.cam_from_world, scene.boxes);
   times_.add("flow", watch.ms());
@@ -141,7 +149,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
-    scene.mask = mask_of(image, scene.boxes, given, moving);
+    scene.mask = mask_of(image, unmasked, given, moving);
     for (size_t i = 0; i < corners.size(); ++i)
       if (scene.mask.at(corners[i].x, corners[i].y)) scene.rejected[i] = FeatureReason::on_mover;
   }

@@ -62,13 +62,14 @@ class SceneStage {
 
  private:
   void learn(const FrameOutcome& before);
-  MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes);
+  MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
   MoverMask segment_motion(const RgbdImage& image, const Rigid3& cam_from_world, std::vector<Detection>& boxes);
-  MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& boxes, const MoverMask& given,
+  MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                     const MoverMask& moving) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
 
   Camera camera_;
+  SensorNoise noise_;
   DynamicsOptions options_;
   DetectionSchedule schedule_;
   std::vector<std::shared_ptr<Detector>> prompt_;

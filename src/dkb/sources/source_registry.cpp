@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/sources/source_registry.h"
 
+#include <algorithm>
 #include <filesystem>
 
+#include "dkb/devices/fake_device.h"
+#include "dkb/devices/module_device.h"
+#include "dkb/devices/oni_file.h"
+#include "dkb/devices/v4l2_device.h"
 #include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
 
@@ -39,6 +44,44 @@ SourceKind rosbag2_kind() {
   return kind;
 }
 
+SourceKind oni_kind() {
+  SourceKind kind;
+  kind.name = "oni", kind.form = "FILE.oni";
+  kind.fits = [](const std::string& where) { return where.ends_with(".oni"); };
+  kind.open = [](const std::string& where, const SourceOptions& options) { return open_oni_file(where, options); };
+  return kind;
+}
+
+SourceKind live_kind(const std::string& name, const std::string& place) {
+  SourceKind kind;
+  kind.name = name, kind.form = name + place, kind.live = true;
+  kind.fits = [name](const std::string& where) { return where == name || where.starts_with(name + ":"); };
+  return kind;
+}
+
+SourceKind module_kind(const DeviceModule& module, const std::string& place) {
+  SourceKind kind = live_kind(module.scheme, place);
+  kind.open = [&module](const std::string& where, const SourceOptions& options) {
+    return open_module_device(module, where, options);
+  };
+  kind.why_not = [&module] { return why_no_module(module); };
+  kind.devices = [&module] { return devices_of(module); };
+  return kind;
+}
+
+SourceKind v4l2_kind() {
+  SourceKind kind = live_kind("v4l2", ":COLOUR,DEPTH");
+  kind.open = [](const std::string& where, const SourceOptions& options) { return open_v4l2_device(where, options); };
+  kind.devices = v4l2_devices;
+  return kind;
+}
+
+SourceKind fake_kind() {
+  SourceKind kind = live_kind("fake", ":FOLDER[?drop=0.1&...]");
+  kind.open = [](const std::string& where, const SourceOptions& options) { return open_fake_device(where, options); };
+  return kind;
+}
+
 SourceKind folder_kind() {
   SourceKind kind;
   kind.name = "folder", kind.form = "FOLDER";
@@ -50,7 +93,22 @@ SourceKind folder_kind() {
 }  // namespace
 
 std::vector<SourceKind> source_kinds() {
-  return {recording_kind("bag", "FILE.bag"), recording_kind("mcap", "FILE.mcap"), rosbag2_kind(), folder_kind()};
+  return {fake_kind(),
+          v4l2_kind(),
+          module_kind(openni2_module(), "[:URI]"),
+          module_kind(realsense_module(), "[:SERIAL]"),
+          module_kind(orbbec_module(), "[:SERIAL]"),
+          recording_kind("bag", "FILE.bag"),
+          recording_kind("mcap", "FILE.mcap"),
+          rosbag2_kind(),
+          oni_kind(),
+          folder_kind()};
+}
+
+bool is_live(const std::string& where) {
+  const std::vector<SourceKind> kinds = source_kinds();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SourceKind& k) { return k.fits(where); });
+  return kind != kinds.end() && kind->live;
 }
 
 std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options) {

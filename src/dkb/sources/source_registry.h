@@ -28,4 +28,7 @@ struct SourceKind {
 // In the order in which they are asked; folders are last.
 std::vector<SourceKind> source_kinds();
 
+// Whether `where` names a live device.
+bool is_live(const std::string& where);
+
 }  // namespace dkb

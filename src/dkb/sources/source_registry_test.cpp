@@ -28,6 +28,26 @@ TEST(SourceRegistry, WhatIsNotThereIsNamed) {
   }
 }
 
+TEST(SourceRegistry, LiveDevicesAreKnownByTheirScheme) {
+  for (const char* where : {"fake:folder", "v4l2:0,1", "openni2", "openni2:uri", "realsense:12", "orbbec"})
+    EXPECT_TRUE(is_live(where)) << where;
+  for (const char* where : {"folder", "openni2.oni", "fake", "a.bag", "/data/realsense"})
+    EXPECT_EQ(is_live(where), std::string(where) == "fake") << where;
+}
+
+TEST(SourceRegistry, ACameraThatIsNotBuiltInIsNamedWithTheRemedy) {
+  for (const SourceKind& kind : source_kinds()) {
+    if (kind.why_not().empty()) continue;
+    try {
+      open_source(kind.name + ":1");
+      FAIL() << "it was opened";
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()), kind.name + ":1: " + kind.why_not());
+      EXPECT_NE(kind.why_not().find("build again"), std::string::npos);
+    }
+  }
+}
+
 const SourceKind& kind_of(const std::vector<SourceKind>& kinds, const std::string& where) {
   for (const SourceKind& kind : kinds)
     if (kind.fits(where)) return kind;

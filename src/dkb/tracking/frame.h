@@ -37,7 +37,8 @@ struct TrackedFrame {
   std::vector<int> source;           // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;
   Rigid3 cam_from_reference;
-  Rigid3 cam_from_world;                       // by the map as tracking knew it at the time
+  Rigid3 seen_cam_from_cam;  // the camera that saw the features, from this one; identity unless it is predicted
+  Rigid3 cam_from_world;     // by the map as tracking knew it at the time
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
   int inliers = 0;                             // among `points`
 

@@ -124,6 +124,7 @@ std::optional<Rigid3> Relocaliser::coarse_pose(const Map& map, KeyframeId id, co
 bool Relocaliser::search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,
                          PoseProposal& proposal) const {
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = radius;
   const auto matches = match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_,
                                            match, nullptr, nullptr);

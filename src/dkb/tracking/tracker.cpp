@@ -16,6 +16,7 @@ constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map poin
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
 constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth
+constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, which is exact by definition
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
 // A place farther from where the camera was lost than this is one that it cannot have come to ...
@@ -185,6 +186,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = kMatchRatio;
@@ -351,6 +353,7 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   }
   frame.inliers = with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : start_;
+  frame.covariance = Matrix6d::Identity() * (kStartSd * kStartSd);
   if (expected != nullptr) {
     frame.cam_from_world = expected->cam_from_world;
     frame.covariance = expected->covariance;
@@ -388,6 +391,10 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     if (!followed) {
       finish(frame);
       unconfirmed_ = frame;
+      // The pose is not this frame's yet, and neither is what it explains.
+      frame.points.assign(frame.points.size(), kNoPoint);
+      frame.outlier.assign(frame.outlier.size(), 0);
+      frame.odometry.assign(frame.odometry.size(), std::nullopt);
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
       go_on_unseen(predicted, frame);
       return frame;
@@ -402,6 +409,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     }
     frame.state = state_ = TrackingState::tracking;
     lost_since_.reset();
+    suggested_.reset();
     last_ = frame;
     last_seen_ = frame.timestamp;
     return frame;

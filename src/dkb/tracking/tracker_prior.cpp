@@ -30,6 +30,7 @@ double guessed_position_sd(double seconds) {
 
 std::optional<PosePrediction> Tracker::predict(FrameIndex index, double timestamp, const MotionPrior* prior) const {
   if (prior == nullptr || !last_ || last_->index + 1 != index || state_ == TrackingState::lost) return std::nullopt;
+  if (timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
   MotionPrior step = *prior;
   if (step.rotation_only) {
     if (!velocity_) return std::nullopt;
@@ -70,6 +71,7 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   tangent << step.translation, vector_from_rotation(step.rotation);
   velocity_ = tangent / (frame.timestamp - last_->timestamp);
   // What was seen last is still what the camera may see next.
+  last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;
   last_->timestamp = frame.timestamp;
   last_->cam_from_world = frame.cam_from_world;
@@ -121,6 +123,8 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected, c
 
 void Tracker::suggest(const PosePrediction& pose) {
   reset_motion();
+  unconfirmed_.reset();
+  lost_since_.reset();
   suggested_ = pose;
 }
 

@@ -22,7 +22,9 @@ constexpr int kMinMatches = 20;            // with the last frame that make a po
 std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius,
                                                 const MatchableFeatures& features, std::vector<PointId>& points) const {
   std::vector<Candidate> candidates;
-  const Eigen::Vector3d centre = centre_in_world(last_->cam_from_world);
+  // What was seen last may have been seen from elsewhere: scale and orientation are of that view.
+  const Eigen::Vector3d centre = centre_in_world(last_->seen_cam_from_cam * last_->cam_from_world);
+  const bool seen_from_here = last_->state != TrackingState::predicted;
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
     if (id == kNoPoint || is_retracted(id)) continue;
@@ -30,10 +32,12 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (!at) continue;
     Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), scale_factor_);
     c.id = id;
+    if (!seen_from_here) c.angle = -1;
     c.established = established(id, last_->timestamp);
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = 0.9f;

@@ -25,24 +25,24 @@ class BoundedQueue {
     not_empty_.notify_one();
     return true;
   }
-  // Never waits: when full, the oldest item is dropped, and `leave_to(dropped, next)` may hand what it held to the one
-  // after it. Returns how many were dropped (0 or 1).
+  // Never waits: when full, the oldest item is dropped, and `leave_to(dropped, waiting)` may hand what it held to those
+  // that wait, the oldest first. Returns how many were dropped (0 or 1).
   template <class LeaveTo>
   size_t push_dropping_oldest(T value, const LeaveTo& leave_to) {
     std::unique_lock lock(mutex_);
     size_t dropped = 0;
-    if (items_.size() >= capacity_) {
-      T oldest = std::move(items_.front());
+    if (!closed_) items_.push_back(std::move(value));
+    if (items_.size() > capacity_) {
+      const T oldest = std::move(items_.front());
       items_.pop_front();
-      leave_to(oldest, items_.empty() ? value : items_.front());
+      leave_to(oldest, items_);
       dropped = 1;
     }
-    if (!closed_) items_.push_back(std::move(value));
     not_empty_.notify_one();
     return dropped;
   }
   size_t push_dropping_oldest(T value) {
-    return push_dropping_oldest(std::move(value), [](const T&, T&) {});
+    return push_dropping_oldest(std::move(value), [](const T&, std::deque<T>&) {});
   }
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <exception>
+#include <memory>
+
+#include "dkb/image/rgbd_image.h"
+#include "dkb/recordings/pair_writer.h"
+#include "dkb/sources/source_registry.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/log.h"
+#include "interrupt.h"
+#include "live_report.h"
+
+namespace dkb {
+namespace {
+
+struct RecordArguments {
+  std::string source, out;
+  SourceOptions reading;
+  bool quiet = false;
+};
+
+// Quick enough to keep up with a camera.
+PairWriterOptions quick_options(const std::string& out) {
+  PairWriterOptions options;
+  options.png_level = 1;
+  try {
+    if (out.ends_with(".mcap") || out.ends_with(".bag")) options.compression = compression_named("lz4");
+  } catch (const InputError&) {  // this build has none
+  }
+  return options;
+}
+
+int record(const RecordArguments& args) {
+  WarningLog warnings([](const std::string& line) { fmt::print(stderr, "warning: {}\n", line); });
+  const std::unique_ptr<Source> source = open_source(args.source, args.reading);
+  const auto writer = write_pairs(args.out, source->camera(), source->camera().to_yaml(), quick_options(args.out));
+  if (!args.quiet) fmt::print("{}, into {}; Ctrl-C ends it\n", source->description(), args.out);
+  const Interrupt interrupt([&] { source->stop(); });
+  const bool terminal = isatty(STDERR_FILENO) != 0 && !args.quiet;
+  LiveReport report;
+  size_t kept = 0;
+  std::exception_ptr failure;  // what was kept so far is not lost by it
+  const auto keep_all = [&] {
+    for (SourceFrame next = source->next(); next.state != SourceState::ended; next = source->next()) {
+      for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
+      report.add(next);
+      if (next.state == SourceState::unplugged)
+        warnings.warn("unplugged", "the camera is gone; waiting for it to come back");
+      if (next.state == SourceState::skipped) warnings.warn("skipped", next.note + "; left out");
+      if (next.state != SourceState::frame) continue;
+      const RgbdImage& image = *next.frame.image();
+      const Picture picture{image.grey, image.colour};
+      writer->add({next.frame.stamp_ns(), next.frame.depth_stamp_ns(), {}, &picture, &image.depth});
+      if (++kept % 30 == 0 && terminal) fmt::print(stderr, "\r\033[K{} frames", kept);
+    }
+  };
+  try {
+    keep_all();
+  } catch (const OutputError&) {  // the disk is full: what is there cannot be completed
+    throw;
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  if (terminal) fmt::print(stderr, "\n");
+  for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
+  source->stop();
+  warnings.finish();
+  if (kept == 0) {
+    if (failure) std::rethrow_exception(failure);
+    fmt::print(stderr, "error: {} gave no frame; nothing was written\n", args.source);
+    return Interrupt::happened() ? 130 : 1;
+  }
+  writer->close();
+  if (!args.quiet) fmt::print("{}: {}\n", args.out, report.text(source->counts()));
+  if (failure) std::rethrow_exception(failure);
+  return Interrupt::happened() ? 130 : 0;
+}
+
+void list_sources() {
+  for (const SourceKind& kind : source_kinds()) {
+    const std::string missing = kind.why_not();
+    fmt::print("{:<44}{}{}\n", kind.form, kind.live ? "live" : "recorded",
+               missing.empty() ? "" : "; not available: " + missing);
+    if (!missing.empty()) continue;
+    try {
+      for (const std::string& device : kind.devices()) fmt::print("    {}\n", device);
+    } catch (const InputError& e) {
+      fmt::print("    {}\n", e.what());
+    }
+  }
+}
+
+}  // namespace
+
+void register_record(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<RecordArguments>();
+  CLI::App* command = app.add_subcommand("record", "Keep what a camera sees, without loss");
+  command->add_option("source", args->source, "A camera, or any other source; `dkb-slam sources` lists them")
+      ->required();
+  command->add_option("--out", args->out, "New folder in TUM layout, FILE.mcap or FILE.bag")->required();
+  command->add_option("--camera", args->reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
+  command->add_option("--max-frames", args->reading.max_frames, "Frames at most");
+  command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
+  command->callback([args, &exit_code] { exit_code = record(*args); });
+}
+
+void register_sources(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("sources", "List the kinds of sources, whether they can be used, and the cameras seen");
+  command->callback([&exit_code] {
+    list_sources();
+    exit_code = 0;
+  });
+}
+
+}  // namespace dkb

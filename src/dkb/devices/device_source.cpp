@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/devices/device_source.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "dkb/util/errors.h"
+#include "dkb/util/stamps.h"
+
+namespace dkb {
+namespace {
+
+constexpr int kPollMs = 100;  // so long may stop() have to wait
+constexpr std::chrono::milliseconds kReopenEvery{500};
+
+}  // namespace
+
+DeviceSource::DeviceSource(std::unique_ptr<ImageDevice> device, const Camera& camera, const SourceOptions& options)
+    : device_(std::move(device)), camera_(camera), options_(options) {}
+
+void DeviceSource::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  wake_.notify_all();
+}
+
+SourceCounts DeviceSource::counts() const {
+  SourceCounts counts;
+  counts.unpaired = unpaired_;
+  counts.late = late_;
+  return counts;
+}
+
+std::vector<std::string> DeviceSource::take_warnings() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(warnings_, {});
+}
+
+std::string DeviceSource::description() const {
+  return device_->description();
+}
+
+bool DeviceSource::wait_until_back() {
+  do {
+    std::unique_lock lock(mutex_);
+    if (wake_.wait_for(lock, kReopenEvery, [&] { return stopped_; })) return false;
+  } while (!device_->reopen());
+  pairs_.restart();
+  return true;
+}
+
+void DeviceSource::add(DeviceImage image, bool is_depth) {
+  if (gone_since_) {
+    if (image.stamp_ns + shift_ns_ <= last_stamp_)
+      shift_ns_ = last_stamp_ - image.stamp_ns +
+                  std::chrono::nanoseconds(std::chrono::steady_clock::now() - *gone_since_).count();
+    gone_since_.reset();
+  }
+  image.stamp_ns += shift_ns_;
+  last_stamp_ = std::max(last_stamp_, image.stamp_ns);
+  pairs_.add(image, is_depth);
+}
+
+std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {
+  const size_t index = seen_++;
+  if (static_cast<int64_t>(index) < options_.skip_pairs) return std::nullopt;
+  if (!first_stamp_) first_stamp_ = pair.colour.stamp_ns;
+  const double t = static_cast<double>(pair.colour.stamp_ns - *first_stamp_) / 1e9;
+  if (t < options_.start) return std::nullopt;
+  SourceFrame frame;
+  if (t > options_.end || (options_.max_frames && taken_ >= *options_.max_frames)) {
+    ended_ = true;
+    return frame;
+  }
+  ++taken_;
+  frame.index = index;
+  frame.stamp = stamp_text(pair.colour.stamp_ns);
+  try {
+    frame.frame = Frame(camera_, {pair.colour.stamp_ns, pair.colour.view, pair.depth.view, pair.depth.stamp_ns, {}});
+    frame.state = SourceState::frame;
+  } catch (const InputError& e) {
+    frame.state = SourceState::skipped;
+    frame.note = e.what();
+  }
+  return frame;
+}
+
+SourceFrame DeviceSource::next() {
+  SourceFrame none;
+  for (;;) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopped_ || ended_) return none;
+    }
+    if (unplugged_) {
+      if (!wait_until_back()) return none;
+      unplugged_ = false;
+    }
+    while (const std::optional<ImagePair> pair = pairs_.take()) {
+      std::optional<SourceFrame> frame = frame_of(*pair);
+      if (frame) return *frame;
+    }
+    DeviceImages images;
+    const DeviceState state = device_->next(kPollMs, &images);
+    if (std::vector<std::string> lines = device_->take_warnings(); !lines.empty()) {
+      const std::lock_guard lock(mutex_);
+      warnings_.insert(warnings_.end(), lines.begin(), lines.end());
+    }
+    if (state == DeviceState::ended) return none;
+    if (state == DeviceState::unplugged) {
+      unplugged_ = true;
+      gone_since_ = std::chrono::steady_clock::now();
+      none.state = SourceState::unplugged;
+      return none;
+    }
+    if (images.colour) add(*images.colour, false);
+    if (images.depth) add(*images.depth, true);
+    unpaired_ = pairs_.unpaired(), late_ = pairs_.late();
+    if (!images.broken.empty()) {
+      SourceFrame skipped;
+      skipped.state = SourceState::skipped;
+      skipped.index = seen_++;
+      skipped.note = images.broken;
+      return skipped;
+    }
+  }
+}
+
+}  // namespace dkb

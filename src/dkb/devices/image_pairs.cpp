@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/devices/image_pairs.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+namespace dkb {
+namespace {
+
+constexpr int64_t kMaxDifference = 20'000'000;  // [ns] between the images of a pair
+constexpr size_t kMostWaiting = 8;              // images of a stream whose other stream is silent
+
+}  // namespace
+
+KeptImage::KeptImage(const DeviceImage& image) : view(image.view), stamp_ns(image.stamp_ns) {
+  const size_t row = view.row_bytes();
+  bytes.resize(row * static_cast<size_t>(view.height));
+  for (int y = 0; y < view.height; ++y)
+    std::memcpy(bytes.data() + static_cast<size_t>(y) * row, image.view.row(y), row);
+  view.data = bytes.data();
+  view.stride = row;
+}
+
+void ImagePairs::add(const DeviceImage& image, bool is_depth) {
+  Stream& stream = is_depth ? depth_ : colour_;
+  if (stream.last) {
+    if (image.stamp_ns <= *stream.last) {
+      ++late_;
+      return;
+    }
+    stream.interval = image.stamp_ns - *stream.last;
+  }
+  stream.last = image.stamp_ns;
+  if (stream.waiting.size() >= kMostWaiting) drop_front(stream);
+  stream.waiting.emplace_back(image);
+}
+
+std::optional<ImagePair> ImagePairs::take() {
+  std::deque<KeptImage>&colours = colour_.waiting, &depths = depth_.waiting;
+  const auto apart = [](const KeptImage& a, const KeptImage& b) { return std::abs(a.stamp_ns - b.stamp_ns); };
+  while (!colours.empty() && !depths.empty()) {
+    const KeptImage& colour = colours.front();
+    while (depths.size() > 1 && apart(colour, depths[1]) <= apart(colour, depths[0])) drop_front(depth_);
+    const int64_t difference = apart(colour, depths.front());
+    // What comes later is one interval further on at least, so half of it is near enough not to wait.
+    const bool depth_settled = depths.size() > 1 || depths.front().stamp_ns >= colour.stamp_ns ||
+                               (depth_.interval > 0 && 2 * difference <= depth_.interval);
+    if (difference > kMaxDifference) {
+      if (depths.front().stamp_ns > colour.stamp_ns)
+        drop_front(colour_);
+      else
+        drop_front(depth_);
+      continue;
+    }
+    if (!depth_settled) return std::nullopt;
+    // The depth image may suit the next colour image better.
+    const bool colour_settled = colours.size() > 1 || colour.stamp_ns >= depths.front().stamp_ns ||
+                                (colour_.interval > 0 && 2 * difference <= colour_.interval);
+    if (colours.size() > 1 && apart(colours[1], depths.front()) < difference) {
+      drop_front(colour_);
+      continue;
+    }
+    if (!colour_settled) return std::nullopt;
+    ImagePair pair{std::move(colours.front()), std::move(depths.front())};
+    colours.pop_front(), depths.pop_front();
+    return pair;
+  }
+  return std::nullopt;
+}
+
+void ImagePairs::restart() {
+  for (Stream* stream : {&colour_, &depth_}) {
+    unpaired_ += static_cast<int64_t>(stream->waiting.size());
+    *stream = {};
+  }
+}
+
+}  // namespace dkb

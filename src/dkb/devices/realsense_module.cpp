@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Intel RealSense, by librealsense2.
+#include <algorithm>
+#include <librealsense2/rs.hpp>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "dkb/devices/device_module.h"
+
+namespace {
+
+constexpr int kWidth = 640, kHeight = 480, kFps = 30;
+
+class Device {
+ public:
+  explicit Device(const std::string& serial) {
+    rs2::config config;
+    if (!serial.empty()) config.enable_device(serial);
+    config.enable_stream(RS2_STREAM_COLOR, kWidth, kHeight, RS2_FORMAT_RGB8, kFps);
+    config.enable_stream(RS2_STREAM_DEPTH, kWidth, kHeight, RS2_FORMAT_Z16, kFps);
+    try {
+      profile_ = pipeline_.start(config);
+    } catch (const rs2::error& e) {
+      throw std::runtime_error(std::string("librealsense2 cannot start it (") + e.what() +
+                               "); is it plugged in? `dkb-slam sources` lists the cameras");
+    }
+    serial_ = profile_.get_device().get_info(RS2_CAMERA_INFO_SERIAL_NUMBER);
+    for (const rs2::sensor& sensor : profile_.get_device().query_sensors())
+      if (sensor.is<rs2::depth_sensor>()) metres_per_unit_ = rs2::depth_sensor(sensor).get_depth_scale();
+  }
+  ~Device() {
+    try {
+      pipeline_.stop();
+    } catch (const rs2::error&) {  // it is gone already
+    }
+  }
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  void describe(DkbDeviceCamera* camera) const {
+    const rs2_intrinsics in = profile_.get_stream(RS2_STREAM_COLOR).as<rs2::video_stream_profile>().get_intrinsics();
+    camera->width = in.width, camera->height = in.height, camera->fps = kFps;
+    camera->depth_factor = 1 / static_cast<double>(metres_per_unit_);
+    const bool straight = std::all_of(in.coeffs, in.coeffs + 5, [](float k) { return k == 0; });
+    // Other models than this one have other coefficients; the user must calibrate then.
+    if (!straight && in.model != RS2_DISTORTION_BROWN_CONRADY) return;
+    camera->fx = in.fx, camera->fy = in.fy, camera->cx = in.ppx, camera->cy = in.ppy;
+    camera->k1 = in.coeffs[0], camera->k2 = in.coeffs[1], camera->p1 = in.coeffs[2], camera->p2 = in.coeffs[3];
+    camera->k3 = in.coeffs[4];
+  }
+
+  int next(int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth) {
+    rs2::frameset frames;
+    if (!pipeline_.try_wait_for_frames(&frames, static_cast<unsigned>(timeout_ms)))
+      return gone() ? dkb_unplugged : dkb_waiting;
+    frames_ = align_.process(frames);
+    give(frames_.get_color_frame(), dkb_rgb8, colour);
+    give(frames_.get_depth_frame(), dkb_depth_u16, depth);
+    return dkb_images;
+  }
+
+ private:
+  bool gone() {
+    for (const rs2::device& device : context_.query_devices())
+      if (device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER) == serial_) return false;
+    return true;
+  }
+
+  static void give(const rs2::video_frame& frame, int pixels, DkbDeviceImage* image) {
+    if (!frame) return;
+    *image = {frame.get_data(),
+              frame.get_width(),
+              frame.get_height(),
+              static_cast<size_t>(frame.get_stride_in_bytes()),
+              pixels,
+              static_cast<int64_t>(frame.get_timestamp() * 1e6)};
+  }
+
+  rs2::context context_;
+  rs2::pipeline pipeline_{context_};
+  rs2::pipeline_profile profile_;
+  rs2::align align_{RS2_STREAM_COLOR};
+  rs2::frameset frames_;
+  std::string serial_;
+  float metres_per_unit_ = 0.001F;
+};
+
+int list_devices(char* lines, size_t lines_size, char* error, size_t error_size) {
+  return dkb::module::guarded(-1, error, error_size, [&] {
+    const rs2::context context;
+    std::string text;
+    int count = 0;
+    for (const rs2::device& device : context.query_devices()) {
+      text += std::string(device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER)) + "\n";
+      ++count;
+    }
+    std::snprintf(lines, lines_size, "%s", text.c_str());
+    return count;
+  });
+}
+
+void* open_device(const char* place, char* error, size_t error_size) {
+  return dkb::module::guarded<void*>(nullptr, error, error_size, [&] { return new Device(place); });
+}
+
+void describe_device(void* device, DkbDeviceCamera* camera) {
+  static_cast<Device*>(device)->describe(camera);
+}
+
+int next_images(void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error,
+                size_t error_size) {
+  return dkb::module::guarded<int>(dkb_failed, error, error_size,
+                                   [&] { return static_cast<Device*>(device)->next(timeout_ms, colour, depth); });
+}
+
+void close_device(void* device) {
+  delete static_cast<Device*>(device);
+}
+
+}  // namespace
+
+extern "C" const DkbDeviceApi* dkb_device_api_1() {
+  static const DkbDeviceApi api{list_devices, open_device, describe_device, next_images, close_device};
+  return &api;
+}
