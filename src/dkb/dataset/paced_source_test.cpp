@@ -71,6 +71,22 @@ TEST(PacedSource, WhatIsDroppedLeavesItsMotionToTheNextFrameAlsoPastOneThatCanno
   EXPECT_EQ(source->counts().dropped, 30);
 }
 
+TEST(PacedSource, HandsNothingOverWhileItsClockIsHeld) {
+  ScriptedSource scripted;
+  for (const int64_t ms : {0, 20, 40}) scripted.add_frame(1 + ms * 1'000'000);
+  PacedSource source(scripted);
+  EXPECT_EQ(source.next().state, SourceState::frame);
+  source.hold(true);
+  auto rest = std::async(std::launch::async, [&] {
+    int frames = 0;
+    while (source.next().state == SourceState::frame) ++frames;
+    return frames;
+  });
+  EXPECT_EQ(rest.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  source.hold(false);
+  EXPECT_EQ(rest.get(), 2);
+}
+
 TEST(PacedSource, WhatComesLateLeavesItsMotionToTheNextFrame) {
   auto scripted = std::make_unique<ScriptedSource>();
   for (const int64_t stamp : {10, 20, 15, 20, 30, 40}) scripted->add_frame(stamp);
