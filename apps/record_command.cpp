@@ -38,7 +38,9 @@ PairWriterOptions quick_options(const std::string& out) {
 
 int record(const RecordArguments& args) {
   WarningLog warnings([](const std::string& line) { fmt::print(stderr, "warning: {}\n", line); });
-  const std::unique_ptr<Source> source = open_source(args.source, args.reading);
+  SourceOptions reading = args.reading;
+  reading.depth_limits = false;  // those are for whoever reads the recording
+  const std::unique_ptr<Source> source = open_source(args.source, reading);
   const auto writer = write_pairs(args.out, source->camera(), source->camera().to_yaml(), quick_options(args.out));
   if (!args.quiet) fmt::print("{}, into {}; Ctrl-C ends it\n", source->description(), args.out);
   const Interrupt interrupt([&] { source->stop(); });

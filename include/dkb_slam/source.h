@@ -79,6 +79,7 @@ struct SourceOptions {
   bool threaded = true;                                  ///< decode ahead on a thread; the frames are the same
   /// Of recordings with several topics of a kind; empty = the only one there is.
   std::string colour_topic, depth_topic, info_topic, odom_topic, imu_topic;
+  bool depth_limits = true;                ///< depth outside the camera's depth_min ... depth_max counts as missing
   PriorKind prior = PriorKind::automatic;  ///< of recordings that hold one
 };
 

@@ -36,7 +36,8 @@ FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOpti
   const CameraChoice choice = choose_folder_camera(folder, layout_, options);
   choice.camera.check();
   description_ = described(layout_.dataset, choice);
-  start(pairs_in_files(layout_.dataset.pairs, choice.camera, layout_.fit_colour), choice.camera, options.threaded);
+  const Camera reading = options.depth_limits ? choice.camera : without_limits(choice.camera);
+  start(pairs_in_files(layout_.dataset.pairs, reading, layout_.fit_colour), choice.camera, options.threaded);
 }
 
 std::vector<int64_t> FolderSource::stamps_ns() const {

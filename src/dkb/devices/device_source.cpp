@@ -105,7 +105,8 @@ std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {
   frame.index = index;
   frame.stamp = stamp_text(pair.colour.stamp_ns);
   try {
-    frame.frame = Frame(camera_, {pair.colour.stamp_ns, pair.colour.view, pair.depth.view, pair.depth.stamp_ns, {}});
+    frame.frame = Frame(options_.depth_limits ? camera_ : without_limits(camera_),
+                        {pair.colour.stamp_ns, pair.colour.view, pair.depth.view, pair.depth.stamp_ns, {}});
     frame.state = SourceState::frame;
   } catch (const InputError& e) {
     frame.state = SourceState::skipped;

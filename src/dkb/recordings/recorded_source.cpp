@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "dkb/dataset/camera_file.h"
+
 namespace dkb {
 namespace {
 
@@ -40,8 +42,10 @@ RecordedSource::RecordedSource(std::unique_ptr<MessageStream> stream, const std:
   const RecordingContents contents = look_into(*stream, options, name);
   description_ = described(contents);
   size_ = pairs_at_most(*stream, contents, options);
+  RecordingContents reading = contents;
+  if (!options.depth_limits) reading.camera = without_limits(contents.camera);
   pairs_ = std::make_unique<RecordedPairs>(
-      std::move(stream), contents, DatasetSelection{options.skip_pairs, options.start, options.end, options.max_frames},
+      std::move(stream), reading, DatasetSelection{options.skip_pairs, options.start, options.end, options.max_frames},
       name);
   start([pairs = pairs_.get()] { return pairs->next(); }, contents.camera, options.threaded);
 }
