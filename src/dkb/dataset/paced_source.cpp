@@ -9,18 +9,22 @@
 namespace dkb {
 namespace {
 
+// A recording whose clock jumps would keep its consumer waiting: what comes after so long a pause comes at once.
+constexpr int64_t kLongestPauseNs = 10'000'000'000;
+
 PacedSource::Due by_stamps() {
-  return [first = std::optional<int64_t>()](const SourceFrame& frame) mutable {
+  return [last = std::optional<int64_t>(), at = std::chrono::nanoseconds(0)](const SourceFrame& frame) mutable {
     std::optional<std::chrono::nanoseconds> due;
     if (frame.state != SourceState::frame) return due;
-    if (!first) first = frame.frame.stamp_ns();
-    due = std::chrono::nanoseconds(frame.frame.stamp_ns() - *first);
+    const int64_t stamp = frame.frame.stamp_ns();
+    // As an unsigned difference, which does not overflow.
+    const uint64_t pause = last && stamp > *last ? static_cast<uint64_t>(stamp) - static_cast<uint64_t>(*last) : 0;
+    if (pause < static_cast<uint64_t>(kLongestPauseNs)) at += std::chrono::nanoseconds(pause);
+    if (!last || stamp > *last) last = stamp;
+    due = at;
     return due;
   };
 }
-
-// A recording whose clock jumps would keep its consumer waiting: from so long a pause on, the pace begins anew.
-constexpr std::chrono::seconds kLongestPause{10};
 
 }  // namespace
 
@@ -112,8 +116,7 @@ void PacedSource::run() {
           const std::lock_guard lock(mutex_);
           return now();
         }();
-        // Compared as durations, so that no stamp overflows a time.
-        if (!start || *due > (at - *start) + kLongestPause || *due < (at - *start) - kLongestPause) start = at - *due;
+        if (!start) start = at - *due;
         if (!wait_until(*start + *due)) break;
       }
       if (frame.state == SourceState::ended) break;

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_session.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "bench/bench_cv_orb.h"
+#include "dkb/dataset/detector_choice.h"
+#include "dkb/dataset/folder_source.h"
+#include "dkb/dataset/odometry_track.h"
+#include "dkb/dataset/paced_source.h"
+#include "dkb/map/map_file.h"
+#include "dkb/sources/source_registry.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/files.h"
+#include "dkb/util/log.h"
+#include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
+#include "dkb_slam/slam.h"
+#include "interrupt.h"
+
+namespace dkb {
+namespace fs = std::filesystem;
+namespace {
+
+// One line that renews itself on a terminal; plain lines now and then elsewhere.
+class Progress {
+ public:
+  // `total`: about how many frames there are.
+  Progress(std::optional<size_t> total, bool quiet)
+      : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+  void frame(size_t done, const FrameResult* result) {
+    if (quiet_) return;
+    const double ms = watch_.ms();
+    if (done != total_ && ms - last_ms_ < (terminal_ ? 100 : 5000)) return;
+    last_ms_ = ms;
+    const double rate = ms > 0 ? 1000.0 * static_cast<double>(done) / ms : 0;
+    std::string line = fmt::format("frame {}", done);
+    if (total_) line += fmt::format("/{}", std::max(*total_, done));
+    line += fmt::format("  {:.0f} frames/s", rate);
+    if (total_ && rate > 0)
+      line += fmt::format("  ETA {:.0f} s", static_cast<double>(*total_ - std::min(*total_, done)) / rate);
+    if (result != nullptr) line += fmt::format("  {} {} inliers", name_of(result->state), result->inliers);
+    if (terminal_)
+      fmt::print(stderr, "\r\033[K{}", line);
+    else
+      fmt::print(stderr, "{}\n", line);
+    std::fflush(stderr);
+    open_line_ = terminal_;
+  }
+  void finish() {
+    if (open_line_) fmt::print(stderr, "\n");
+    open_line_ = false;
+  }
+
+ private:
+  std::optional<size_t> total_;
+  bool quiet_, terminal_, open_line_ = false;
+  double last_ms_ = -1e9;
+  Stopwatch watch_;
+};
+
+std::string source_name(const fs::path& source) {
+  if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
+  const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  return (fs::is_regular_file(source) ? name.stem() : name).string();
+}
+
+fs::path default_output(const fs::path& source) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  localtime_r(&now, &parts);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
+  return fs::path("dkb-out") / (source_name(source) + "-" + stamp);
+}
+
+void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
+  for (const FeatureReport& f : result.features)
+    csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
+}
+
+void append_frame(std::string& log, const std::string& stamp, const FrameResult& result) {
+  log += fmt::format("{} frame {} {}", stamp, result.frame, name_of(result.state));
+  if (result.tracked()) log += fmt::format(", {} points; {}", result.inliers, result.keyframe_explanation);
+  log += '\n';
+}
+
+Options options_of(const RunArguments& args) {
+  Options options(args.preset);
+  if (!args.config.empty()) options.load(args.config);
+  for (const std::string& assignment : args.set) options.assign(assignment, "--set");
+  if (!args.filter.empty()) options.set("dynamics.filter", args.filter, "--filter");
+  options.disable(args.disable);
+  if (args.has_seed) options.set("seed", std::to_string(args.seed), "--seed");
+  if (args.final_ba) options.set("global_ba.final", "true", "--final-ba");
+  options.threaded = args.threads != 1;
+  options.realtime = args.realtime || is_live(args.source);
+  options.dense_map = args.dense;
+  options.check();
+  return options;
+}
+
+std::unique_ptr<Source> open_source(const RunArguments& args, bool threaded) {
+  SourceOptions options = args.reading;
+  options.threaded = threaded;
+  // What is given is not to be mixed with what the recording holds.
+  options.prior = args.prior_file.empty() ? prior_kind_named(args.prior, "--prior") : PriorKind::none;
+  try {
+    return open_source(args.source, options);
+  } catch (const InputError&) {
+    if (args.load_map.empty() || !options.camera.empty()) throw;
+    // A source that does not tell its camera takes the map's.
+    options.fallback_camera = load_map(args.load_map).context.camera;
+    return open_source(args.source, options);
+  }
+}
+
+// Of up to 60 images, evenly spread over the `pairs` that the run was given.
+std::optional<double> cv_orb_of(const RunArguments& args, const Source& source, int pairs) {
+  if (const auto* folder = dynamic_cast<const FolderSource*>(&source))
+    return measure_cv_orb(folder->pairs(), folder->camera());
+  const std::unique_ptr<Source> again = open_source(args, false);
+  return measure_cv_orb(*again, static_cast<size_t>(pairs));
+}
+
+DetectorChoice detector_choice(const RunArguments& args, const Options& options, const ReaderSource* source) {
+  DetectorChoice choice = args.detection;
+  if (source != nullptr) choice.stamps_ns = source->stamps_ns();
+  return choice_beside(options, args.disable, std::move(choice));
+}
+
+report::ReportFacts report_facts(const RunArguments& args, const Source& source, const Options& options,
+                                 const Slam& slam, const RunFacts& facts) {
+  report::ReportFacts r;
+  r.name = source_name(args.source);
+  r.source = source.description();
+  r.version = version();
+  r.camera = source.camera();
+  r.realtime = options.realtime;
+  r.offered = facts.offered;
+  r.skipped = facts.skipped;
+  r.wall_s = facts.wall_s;
+  r.statistics = statistics_with(slam, facts);
+  r.trajectory = trajectories_by_map(slam.trajectory(), facts.stamps).front();
+  r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
+  r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
+  r.seed = options.seed;
+  r.choices = {{"source", args.source},
+               {"camera", fmt::format("{} x {}, fx {:g}, fy {:g}, cx {:g}, cy {:g}", r.camera.width, r.camera.height,
+                                      r.camera.fx, r.camera.fy, r.camera.cx, r.camera.cy)},
+               {"detector", r.statistics.detector},
+               {"preset", options.preset()},
+               {"pace", options.realtime ? "real time" : "as fast as it goes, waiting for mapping"}};
+  if (!args.load_map.empty()) r.choices.emplace_back(args.localize ? "localised in" : "went on in", args.load_map);
+  if (!args.prior_file.empty()) r.choices.emplace_back("motion prior", args.prior_file);
+  return r;
+}
+
+Options checked(const RunArguments& args) {
+  Options options = options_of(args);
+  if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  return options;
+}
+
+std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr<Source> source) {
+  if (args.prior_file.empty()) return source;
+  return with_prior(std::move(source), read_odometry(args.prior_file));
+}
+
+}  // namespace
+
+RunSession::RunSession(const RunArguments& args)
+    : args_(args),
+      warnings_([](const std::string& line) { fmt::print(stderr, "{}\n", line); }),
+      options_(checked(args)),
+      recording_(open_source(args, args.threads != 1 || args.realtime)),
+      opened_(*recording_),
+      reader_(dynamic_cast<const ReaderSource*>(recording_.get())),
+      live_(is_live(args.source)) {
+  recording_ = with_priors_of(args, std::move(recording_));
+  const Stopwatch loading;
+  Detectors detectors = make_detectors(detector_choice(args, options_, reader_), recording_->camera());
+  loading_s_ = loading.ms() / 1000;
+  slam_.emplace(recording_->camera(), options_, std::move(detectors));
+  if (!args.load_map.empty()) slam_->load_map(args.load_map);
+  slam_->localize_only(args.localize);
+  slam_->explain_keyframes(args.debug_log || args.viewer.on);
+  out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
+  make_output_folder(out_);
+  if (!args.quiet) fmt::print("{}, results in {}\n", recording_->description(), out_.string());
+
+  facts_.writes_map = !args.localize;
+  if (args.dump_features) facts_.features_csv = "timestamp,x,y,state\n";
+  log_.emplace(recording_->size());
+  if (args.realtime && !live_) paced_.emplace(*recording_);
+  source_ = paced_ ? static_cast<Source*>(&*paced_) : recording_.get();
+  if (args.viewer.on) viewer_ = std::make_unique<RunViewer>(args.viewer, *recording_, args.source, options_, out_);
+}
+
+int RunSession::run() {
+  const Interrupt interrupt([&] { source_->stop(); });
+  Progress progress(recording_->size(), args_.quiet);
+  progress_ = [&](size_t done, const FrameResult* result) { progress.frame(done, result); };
+  warn_of_source();
+  const Stopwatch wall;
+  try {
+    track();
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+  try {
+    slam_->finish();
+  } catch (...) {
+    if (!failure_) failure_ = std::current_exception();
+  }
+  if (failure_ && slam_->statistics().tracked == 0) std::rethrow_exception(failure_);
+  progress.finish();
+  source_->stop();
+  write(wall.ms() / 1000);
+  warnings_.finish();
+  if (failure_) std::rethrow_exception(failure_);
+  return tell_the_end();
+}
+
+void RunSession::track() {
+  const auto hold = [&](bool on) {
+    if (paced_) paced_->hold(on);
+  };
+  while (!Interrupt::happened()) {
+    if (viewer_) viewer_->wait_turn(*slam_, hold);
+    SourceFrame next = source_->next();
+    warn_of_source();
+    if (next.state == SourceState::ended) break;
+    if (next.state != SourceState::unplugged) facts_.offered = static_cast<int>(next.index) + 1;
+    if (facts_.startup_s == 0) facts_.startup_s = seconds_since_process_start() - loading_s_;
+    camera_.add(next);
+    if (next.state == SourceState::unplugged) {
+      warnings_.warn("unplugged", "the camera is gone; waiting for it to come back");
+    } else if (next.state != SourceState::frame) {
+      ++facts_.skipped;
+      warnings_.warn("frame skipped, an image cannot be read",
+                     "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
+      progress_(next.index + 1, nullptr);
+    } else {
+      facts_.stamps.push_back(next.stamp);
+      show(next, slam_->process(next.frame));
+    }
+  }
+}
+
+// A frame's result to all who want to know of it.
+void RunSession::show(const SourceFrame& next, FrameResult result) {
+  for (const Mover& mover : result.movers)
+    facts_.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+  log_->frame(next.frame, result);
+  std::vector<Event> events = slam_->take_events();
+  for (const Event& event : events) {
+    log_->event(event);
+    if (event.kind == Event::Kind::warning)
+      warnings_.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+  }
+  if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
+  if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
+  progress_(next.index + 1, &result);
+  if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
+}
+
+void RunSession::write(double seconds) {
+  if (Interrupt::happened()) {
+    interrupted_ = fmt::format("interrupted after {} frames; ", facts_.offered);
+    facts_.offered = std::max(facts_.offered, static_cast<int>(recording_->size().value_or(0)));
+  }
+  if (paced_ || live_) facts_.skipped += static_cast<int>(source_->counts().dropped);
+  // Nobody knows how many a camera could have given.
+  if (live_) facts_.offered = static_cast<int>(facts_.stamps.size()) + facts_.skipped;
+  facts_.wall_s = seconds;
+  facts_.config_yaml = options_.to_yaml();
+  if (reader_ != nullptr) facts_.times = reader_->times();
+  if (args_.dense && !failure_) {
+    const Stopwatch building;
+    const DenseMap map = slam_->dense_map();
+    facts_.times.add("dense_build", building.ms());
+    const std::string line = write_dense_map(out_, map, building.ms() / 1000);
+    if (!args_.quiet) fmt::print("{}\n", line);
+  }
+  write_outputs(out_, *slam_, facts_);
+  const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, facts_);
+  write_file_atomically(out_ / "report.html",
+                        report_html(*log_, reported, report::truth_beside(args_.source, reported.trajectory)));
+  if (args_.cv_orb && interrupted_.empty()) write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
+}
+
+int RunSession::tell_the_end() {
+  const Statistics s = slam_->statistics();
+  if (!args_.quiet)
+    fmt::print("{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_,
+               s.tracked, facts_.offered, s.keyframes, s.map_points,
+               s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+  if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !args_.quiet && !line.empty())
+    fmt::print("{}\n", line);
+  if (const SourceCounts lost = recording_->counts(); !live_ && !args_.quiet && lost.unpaired + lost.late > 0)
+    fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
+  const bool cut_short = Interrupt::happened();
+  if (viewer_) viewer_->serve_on(*slam_, args_.quiet);
+  if (cut_short) return 130;
+  if (s.tracked > 0) return 0;
+  if (args_.localize)
+    fmt::print(stderr, "error: the camera was never found in {}\n", args_.load_map);
+  else
+    fmt::print(stderr,
+               "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
+               "units of the camera's depth_factor ({} per metre)?\n",
+               options_.tracking.initial_points, opened_.camera().depth_factor);
+  return 1;
+}
+
+void RunSession::warn_of_source() {
+  for (const std::string& line : recording_->take_warnings()) warnings_.warn(line, line);
+}
+
+}  // namespace dkb

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dkb/dataset/paced_source.h"
+#include "dkb/util/log.h"
+#include "dkb/util/timing.h"
+#include "dkb_slam/slam.h"
+#include "dkb_slam/source.h"
+#include "live_report.h"
+#include "report/run_report.h"
+#include "run_outputs.h"
+#include "run_viewer.h"
+
+namespace dkb {
+
+class ReaderSource;
+
+// What the options of `run` and `live` say.
+struct RunArguments {
+  std::string source, preset = "default", out;
+  std::vector<std::string> set;
+  std::string config;
+  SourceOptions reading;
+  std::string prior = "auto";
+  uint64_t seed = 1;
+  bool has_seed = false;
+  int threads = 0;
+  DetectorChoice detection;
+  std::string filter, disable;
+  std::string load_map, prior_file;
+  ViewerArguments viewer;
+  bool localize = false;
+  bool live = false;  // by the command `live`
+  bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
+       quiet = false;
+};
+
+// One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
+class RunSession {
+ public:
+  // Opens the source and makes what tracks it. Throws InputError; nothing is written then.
+  explicit RunSession(const RunArguments& args);
+
+  // The process's exit code. When the source or a stage fails in between, what was tracked until then is written all
+  // the same, and the error is thrown after that.
+  int run();
+
+ private:
+  void track();
+  void show(const SourceFrame& next, FrameResult result);
+  void write(double seconds);
+  int tell_the_end();
+  void warn_of_source();
+
+  RunArguments args_;
+  WarningLog warnings_;
+  Options options_;
+  std::unique_ptr<Source> recording_;
+  const Source& opened_;        // without the priors of a file
+  const ReaderSource* reader_;  // the same, where it is a recording; else null
+  bool live_;
+  double loading_s_ = 0;  // of the detectors
+  std::optional<Slam> slam_;
+  std::filesystem::path out_;
+  std::optional<PacedSource> paced_;  // in real time
+  Source* source_ = nullptr;          // that frames are taken from
+  std::unique_ptr<RunViewer> viewer_;
+
+  RunFacts facts_;
+  std::optional<report::RunLog> log_;
+  LiveReport camera_;
+  std::function<void(size_t done, const FrameResult* result)> progress_;
+  std::exception_ptr failure_;
+  std::string interrupted_;  // after how many frames; empty when it was not
+};
+
+}  // namespace dkb
