@@ -60,8 +60,15 @@ def call(name, kind, *arguments):
 
 
 def play(bag):
-    subprocess.run(["rosbag", "play", "--quiet", "--delay=1", bag], check=True, stdin=subprocess.DEVNULL,
-                   stdout=subprocess.DEVNULL)
+    """rosbag's player now and then begins as if it were paused; nothing has been published then."""
+    for _ in range(3):
+        try:
+            subprocess.run(["rosbag", "play", "--quiet", "--delay=1", bag], check=True, stdin=subprocess.DEVNULL,
+                           stdout=subprocess.DEVNULL, timeout=60)
+            return
+        except subprocess.TimeoutExpired:
+            print("rosbag play stood still: once more")
+    sys.exit("FAILED: rosbag play stood still three times")
 
 
 def main():
