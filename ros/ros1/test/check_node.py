@@ -5,6 +5,7 @@
 Writes OUT_FOLDER/odom.txt, the odometry in TUM format, and OUT_FOLDER/figures.txt, the last diagnostics.
 """
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -62,12 +63,17 @@ def call(name, kind, *arguments):
 def play(bag):
     """rosbag's player now and then begins as if it were paused; nothing has been published then."""
     for _ in range(3):
+        # In a session of its own: what it starts must end with it.
+        player = subprocess.Popen(["rosbag", "play", "--quiet", "--delay=1", bag], stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.DEVNULL, start_new_session=True)
         try:
-            subprocess.run(["rosbag", "play", "--quiet", "--delay=1", bag], check=True, stdin=subprocess.DEVNULL,
-                           stdout=subprocess.DEVNULL, timeout=60)
+            if player.wait(timeout=30):
+                sys.exit("FAILED: rosbag play")
             return
         except subprocess.TimeoutExpired:
             print("rosbag play stood still: once more")
+            os.killpg(player.pid, signal.SIGKILL)
+            player.wait()
     sys.exit("FAILED: rosbag play stood still three times")
 
 
