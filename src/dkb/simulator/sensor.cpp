@@ -36,19 +36,23 @@ bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int half_wi
 
 }  // namespace
 
-ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, double grey_noise, uint64_t seed) {
+ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, const Exposure& exposure, uint64_t seed) {
   ColourImage out(width, height);
   // Noise common to the channels and of each channel, so that 0.299 r + 0.587 g + 0.114 b has the wanted spread.
-  const auto own = static_cast<float>(0.8 * grey_noise);
-  const auto common = static_cast<float>(
+  const double grey_noise = exposure.grey_noise;
+  const auto all_own = static_cast<float>(0.8 * grey_noise);
+  const auto all_common = static_cast<float>(
       std::sqrt(std::max(0.0, 1 - 0.64 * (0.299 * 0.299 + 0.587 * 0.587 + 0.114 * 0.114))) * grey_noise);
   const float cx = static_cast<float>(width - 1) / 2, cy = static_cast<float>(height - 1) / 2, r2 = cx * cx + cy * cy;
   for (int y = 0; y < height; ++y) {
     const uint64_t* row = sum.data() + static_cast<size_t>(y) * static_cast<size_t>(width);
     Rgb* target = out.row(y);
     const float dy = static_cast<float>(y) - cy;
+    const float light = exposure.row_gain.empty() ? 1.0F : exposure.row_gain[static_cast<size_t>(y)];
+    const float own = all_own * std::max(1.0F, light), common = all_common * std::max(1.0F, light);
     for (int x = 0; x < width; ++x) {
-      const float dx = static_cast<float>(x) - cx, gain = (1.0F - 0.16F * (dx * dx + dy * dy) / r2) * (1.0F / 256.0F);
+      const float dx = static_cast<float>(x) - cx;
+      const float gain = (1.0F - 0.16F * (dx * dx + dy * dy) / r2) * (1.0F / 256.0F) * light;
       const uint64_t h = hash64(seed ^ (static_cast<uint64_t>(y) << 32 | static_cast<uint64_t>(x)));
       const uint64_t g = hash64(h);
       const float n = common * normal_from_bits(h);
