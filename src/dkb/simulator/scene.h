@@ -23,6 +23,8 @@ struct Scene {
   double start_stamp = 1700000000.0;  // [s] of the first frame
   int frames = 300;                   // at 30 Hz
   double exposure = 0.014;            // [s]
+  double brightness = 1;              // of the pictures
+  double photon_noise = 0;            // see Exposure
   std::vector<std::string> notes;
 };
 
@@ -38,6 +40,9 @@ struct SceneRequest {
 
 // A scene by name, with its own camera path; the name is valid.
 Scene build_scene(const SceneRequest& request);
+
+// The larger ones of them.
+Scene build_corridor(const SceneRequest& request);
 
 // A room furnished around a given camera path (poses in any frame whose up is z or, failing that, the pictures' average
 // up), so that the camera sees furnished things 0.6 ... 3 m away.

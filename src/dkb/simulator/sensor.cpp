@@ -49,6 +49,7 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, cons
     Rgb* target = out.row(y);
     const float dy = static_cast<float>(y) - cy;
     const float light = exposure.row_gain.empty() ? 1.0F : exposure.row_gain[static_cast<size_t>(y)];
+    const float photons = static_cast<float>(exposure.photon_noise) * std::max(1.0F, light);
     const float own = all_own * std::max(1.0F, light), common = all_common * std::max(1.0F, light);
     for (int x = 0; x < width; ++x) {
       const float dx = static_cast<float>(x) - cx;
@@ -63,9 +64,18 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, cons
                (2.4494897F / 1024.0F);
       };
       const uint64_t c = row[x];
-      target[x].r = byte(static_cast<float>(c & 0xFFFF) * gain + n + pair(0));
-      target[x].b = byte(static_cast<float>((c >> 16) & 0xFFFF) * gain + n + pair(20));
-      target[x].g = byte(static_cast<float>((c >> 32) & 0xFFFF) * gain + n + pair(40));
+      const float red = static_cast<float>(c & 0xFFFF) * gain, blue = static_cast<float>((c >> 16) & 0xFFFF) * gain,
+                  green = static_cast<float>((c >> 32) & 0xFFFF) * gain;
+      target[x].r = byte(red + n + pair(0));
+      target[x].b = byte(blue + n + pair(20));
+      target[x].g = byte(green + n + pair(40));
+      if (photons <= 0) continue;
+      const auto counted = [&](float level, uint64_t channel) {
+        return std::sqrt(photons * level) * normal_from_bits(hash64(g ^ channel));
+      };
+      target[x].r = byte(red + n + pair(0) + counted(red, 1));
+      target[x].b = byte(blue + n + pair(20) + counted(blue, 2));
+      target[x].g = byte(green + n + pair(40) + counted(green, 3));
     }
   }
   return out;

@@ -12,6 +12,7 @@ namespace dkb::sim {
 struct Exposure {
   double grey_noise = 0;        // [grey levels] standard deviation of the electronics' noise in the grey image
   std::vector<float> row_gain;  // brightness of each row; above 1 the noise is amplified as well. Empty: 1
+  double photon_noise = 0;      // [grey levels] variance of each channel per level of light
 };
 
 // Colour image from sums as Rasteriser::add_colour leaves them after eight calls: vignetting, then noise, then

@@ -51,8 +51,8 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
 }  // namespace
 
 const std::vector<std::string>& simulator_scenes() {
-  static const std::vector<std::string> names{"room",     "crowd", "loop",  "spin", "rush",
-                                              "straight", "cover", "chair", "twins"};
+  static const std::vector<std::string> names{"room",  "crowd", "loop",  "spin",     "rush", "straight",
+                                              "cover", "chair", "twins", "corridor", "dim"};
   return names;
 }
 
@@ -129,10 +129,12 @@ struct Simulator::Impl {
   sim::Exposure exposure_at(double t) const {
     sim::Exposure out;
     out.grey_noise = options.grey_noise;
-    if (!flicker) return out;
-    for (int y = 0; y < camera.height; ++y)
-      out.row_gain.push_back(
-          static_cast<float>(flicker->gain(t) * flicker->lamps(t + row_delay({y, y + 1}), exposure)));
+    out.photon_noise = scene.photon_noise;
+    if (!flicker && scene.brightness == 1) return out;
+    for (int y = 0; y < camera.height; ++y) {
+      const double lamps = flicker ? flicker->gain(t) * flicker->lamps(t + row_delay({y, y + 1}), exposure) : 1;
+      out.row_gain.push_back(static_cast<float>(scene.brightness * lamps));
+    }
     return out;
   }
 };

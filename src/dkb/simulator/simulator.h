@@ -17,7 +17,7 @@ namespace dkb {
 struct SimulatorOptions {
   std::string scene = "room";  // a name of simulator_scenes(), or a YAML scene file (anything with a '.' or a '/')
   std::string path;            // trajectory file in TUM format that the camera follows; empty: the scene's own path
-  int frames = 0;              // >= 0; 0: as many as the scene needs (300 at 30 Hz; loop and twins 900)
+  int frames = 0;              // >= 0; 0: as many as the scene needs (300 at 30 Hz; loop, twins, corridor 900)
   double rate = 30;            // [Hz] 1 ... 60; the motion is the same in seconds
   double dropouts = 0;         // 0 ... 0.9, share of the frames that is missing, singly and in bursts; never the first
   bool flicker = false;        // exposure jumps, lamps at 100 Hz
@@ -40,7 +40,7 @@ struct SimulatorOptions {
   void check() const;  // throws InvalidOption
 };
 
-// room crowd loop spin rush straight cover chair twins
+// room crowd loop spin rush straight cover chair twins corridor dim
 const std::vector<std::string>& simulator_scenes();
 
 // What moves by itself, as seen in one frame.
