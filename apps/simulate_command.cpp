@@ -46,8 +46,9 @@ void register_simulate(CLI::App& app, int& exit_code) {
   command->add_option("--path", o.path,
                       "trajectory (TUM format) that the camera follows, the room furnished around it");
   command
-      ->add_option("--frames", o.frames,
-                   "frames at --rate; 0: as many as the scene needs (at 30 Hz 300; loop, twins, corridor 900)")
+      ->add_option(
+          "--frames", o.frames,
+          "frames at --rate; 0: as many as the scene needs (at 30 Hz 300; loop, twins, corridor 900; building 6000)")
       ->capture_default_str();
   command->add_option("--rate", o.rate, "frames a second, 1 ... 60; the motion is the same in seconds")
       ->capture_default_str();

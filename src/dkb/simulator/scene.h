@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dkb/simulator/camera_path.h"
+#include "dkb/simulator/cells.h"
 #include "dkb/simulator/furniture.h"
 #include "dkb/simulator/movers.h"
 
@@ -16,6 +17,8 @@ namespace dkb::sim {
 struct Scene {
   Materials materials;
   Furnishing furnishing;
+  std::vector<Cell> cells;  // of large scenes, which have their furnishing here
+  Surfaces glass;           // panes that only the depth sensor notices
   std::vector<Mover> movers;
   Footprint inside;  // walls of the room where people walk
   CameraPath path;   // scene_from_cam over seconds from the first frame
@@ -43,6 +46,7 @@ Scene build_scene(const SceneRequest& request);
 
 // The larger ones of them.
 Scene build_corridor(const SceneRequest& request);
+Scene build_building(const SceneRequest& request);
 
 // A room furnished around a given camera path (poses in any frame whose up is z or, failing that, the pictures' average
 // up), so that the camera sees furnished things 0.6 ... 3 m away.

@@ -414,6 +414,7 @@ Scene build_scene(const SceneRequest& request) {
   if (request.name == "chair") return build_chair(request);
   if (request.name == "twins") return build_twins(request);
   if (request.name == "corridor") return build_corridor(request);
+  if (request.name == "building") return build_building(request);
   if (request.name == "dim") return build_dim(request);
   throw std::logic_error("no scene of the name " + request.name);
 }

@@ -92,6 +92,15 @@ DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& cam
   return out;
 }
 
+void look_through(const Image<float>& pane_inverse_depth, const Image<float>& pane_cosine,
+                  const Image<float>& inverse_depth, Image<float>* grey) {
+  for (size_t i = 0; i < grey->size(); ++i) {
+    if (pane_inverse_depth.data()[i] <= inverse_depth.data()[i]) continue;
+    const float c = pane_cosine.data()[i];
+    grey->data()[i] *= c > 0.995F ? 0.0F : 0.6F * std::clamp((c - 0.3F) / 0.4F, 0.0F, 1.0F);
+  }
+}
+
 DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine,
                        const CameraModel& camera, uint64_t seed) {
   const int width = inverse_depth.width(), height = inverse_depth.height();

@@ -25,6 +25,11 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, cons
 DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine,
                        const CameraModel& camera, uint64_t seed);
 
+// Takes from `grey` (of what stands behind) what panes of glass take from the projector's light on its way there and
+// back: a good deal where it passes straight, all of it where it passes at a slant or is thrown back to the camera.
+void look_through(const Image<float>& pane_inverse_depth, const Image<float>& pane_cosine,
+                  const Image<float>& inverse_depth, Image<float>* grey);
+
 // Only rounded to the file's units and cut to the range.
 DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& camera);
 

@@ -52,7 +52,7 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
 
 const std::vector<std::string>& simulator_scenes() {
   static const std::vector<std::string> names{"room",  "crowd", "loop",  "spin",     "rush", "straight",
-                                              "cover", "chair", "twins", "corridor", "dim"};
+                                              "cover", "chair", "twins", "corridor", "dim",  "building"};
   return names;
 }
 
@@ -103,9 +103,13 @@ struct Simulator::Impl {
   struct MoverSurfaces {
     std::vector<sim::Surfaces> parts;
   };
-  MoverSurfaces movers_at(double t) const {
+  // `seen`: which cells are; empty where the scene has none.
+  MoverSurfaces movers_at(double t, const std::vector<bool>& seen) const {
     MoverSurfaces m;
-    for (const sim::Mover& mover : scene.movers) m.parts.push_back(mover.surfaces(t));
+    for (const sim::Mover& mover : scene.movers) {
+      const bool hidden = !seen.empty() && !seen[sim::cell_at(scene.cells, mover.track.at(t).position)];
+      m.parts.push_back(hidden ? sim::Surfaces() : mover.surfaces(t));
+    }
     return m;
   }
   static sim::DrawList with(const sim::DrawList& still, const MoverSurfaces& movers) {
@@ -317,7 +321,12 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
     slack = std::max({slack, motion.translation.norm(), vector_from_rotation(motion.rotation).norm()});
   }
   sim::DrawList still;
-  still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), 1.5 * slack + 0.02);
+  slack = 1.5 * slack + 0.02;
+  still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), slack);
+  std::vector<bool> seen;
+  if (!m.scene.cells.empty()) seen = sim::visible_cells(m.scene.cells, m.camera, middle, slack);
+  for (size_t i = 0; i < seen.size(); ++i)
+    if (seen[i]) still.add_visible(m.scene.cells[i].furnishing.surfaces, m.camera, middle.inverse(), slack);
 
   std::vector<sim::Rasteriser::Rows> bands;
   const int band = m.readout > 0 ? kBandRows : m.camera.height;
@@ -326,7 +335,7 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   sim::GeometryImage geometry;
   const uint64_t seed = sim::hash64(m.options.seed, 0x5EED, m.shot(index));
   {
-    const auto movers = m.movers_at(t);
+    const auto movers = m.movers_at(t, seen);
     const sim::DrawList list = Impl::with(still, movers);
     for (const auto& rows : bands)
       rasteriser.draw(list, m.scene.path(t + m.row_delay(rows)).inverse(), Eigen::Vector2d::Zero(), rows, &geometry);
@@ -344,7 +353,7 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   std::vector<uint64_t> sum(static_cast<size_t>(m.camera.width) * static_cast<size_t>(m.camera.height), 0);
   for (size_t k = 0; k < kRays.size(); ++k) {
     const double at = t + m.exposure * ((static_cast<double>(k) + 0.5) / kRays.size() - 0.5);
-    const auto movers = m.movers_at(at);
+    const auto movers = m.movers_at(at, seen);
     const sim::DrawList list = Impl::with(still, movers);
     const Eigen::Vector2d offset = kLensBlur / 16.0 * Eigen::Vector2d(kRays[k][0], kRays[k][1]);
     // The mip level is dithered in an order of its own.
@@ -357,12 +366,21 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   frame.image.colour = sim::expose(sum, m.camera.width, m.camera.height, m.exposure_at(t), sim::hash64(seed, 1));
   frame.image.grey = grey_from_colour(frame.image.colour);
   {
-    const auto movers = m.movers_at(depth_t);
+    const auto movers = m.movers_at(depth_t, seen);
     const sim::DrawList list = Impl::with(still, movers);
     rasteriser.draw(list, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
     if (m.options.depth_noise) {
       Image<float> grey, cosine;
       rasteriser.reflectance(list, m.scene.materials, geometry, &grey, &cosine);
+      sim::DrawList glass;
+      glass.add_visible(m.scene.glass, m.camera, middle.inverse(), slack);
+      if (!glass.patches.empty()) {
+        sim::GeometryImage panes;
+        Image<float> pane_grey, pane_cosine;
+        rasteriser.draw(glass, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &panes);
+        rasteriser.reflectance(glass, m.scene.materials, panes, &pane_grey, &pane_cosine);
+        sim::look_through(panes.inverse_depth, pane_cosine, geometry.inverse_depth, &grey);
+      }
       frame.image.depth = sim::sense_depth(geometry.inverse_depth, grey, cosine, m.camera, sim::hash64(seed, 2));
     } else {
       frame.image.depth = sim::round_depth(geometry.inverse_depth, m.camera);
