@@ -45,8 +45,18 @@ void register_simulate(CLI::App& app, int& exit_code) {
   command->add_option("--scene", o.scene, scenes + ", or a YAML scene file")->capture_default_str();
   command->add_option("--path", o.path,
                       "trajectory (TUM format) that the camera follows, the room furnished around it");
-  command->add_option("--frames", o.frames, "frames at 30 Hz; 0: as many as the scene needs (300; loop and twins 900)")
+  command
+      ->add_option(
+          "--frames", o.frames,
+          "frames at --rate; 0: as many as the scene needs (at 30 Hz 300; loop, twins, corridor 900; building 6000)")
       ->capture_default_str();
+  command->add_option("--rate", o.rate, "frames a second, 1 ... 60; the motion is the same in seconds")
+      ->capture_default_str();
+  command->add_option("--dropouts", o.dropouts,
+                      "share of the frames that is missing, 0 ... 0.9, singly and in bursts; never the first");
+  command->add_flag("--flicker", o.flicker, "exposure jumps, and lamps flicker at 100 Hz");
+  command->add_option("--stand-still", o.stand_still,
+                      "seconds that people stand from the start, half of them in view, before they walk off");
   command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)");
   command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")->capture_default_str();
   command->add_option("--blackout", arguments->blackout, "START,SECONDS: colour and depth are black from there on")

@@ -18,6 +18,14 @@ Rigid3 camera_pose(const Eigen::Vector3d& position, double yaw, double pitch, do
   return {(q * rotation_from_vector(Eigen::Vector3d(0, 0, roll))).normalized(), position};
 }
 
+double eased(double s, double ramp) {
+  s = std::clamp(s, 0.0, 1.0);
+  const double v = 1 / (1 - ramp);
+  if (s < ramp) return 0.5 * v * s * s / ramp;
+  if (s > 1 - ramp) return 1 - 0.5 * v * (1 - s) * (1 - s) / ramp;
+  return v * (s - 0.5 * ramp);
+}
+
 Tremor hand_tremor(double t, double metres, double radians, uint64_t seed) {
   const auto wave = [&](uint64_t channel, double size) {
     double sum = 0;
@@ -35,6 +43,11 @@ Tremor hand_tremor(double t, double metres, double radians, uint64_t seed) {
   out.pitch = wave(5, radians);
   out.roll = wave(6, radians);
   return out;
+}
+
+Rigid3 shaken(const Eigen::Vector3d& position, double yaw, double pitch, double t, double strength, uint64_t seed) {
+  const Tremor h = hand_tremor(t, 0.006 * strength, 0.008 * strength, seed);
+  return camera_pose(position + h.shift, yaw + h.yaw, pitch + h.pitch, h.roll);
 }
 
 CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {

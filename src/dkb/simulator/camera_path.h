@@ -17,12 +17,17 @@ using CameraPath = std::function<Rigid3(double)>;
 // right side turned down by `roll`; z of the world is up.
 Rigid3 camera_pose(const Eigen::Vector3d& position, double yaw, double pitch, double roll = 0);
 
+// 0 ... 1 with smooth start and end; `ramp` is the share of the time spent on each.
+double eased(double s, double ramp);
+
 // Tremor of a hand: smooth, zero on average, about `metres` and `radians` in size, 0.4 ... 4 Hz.
 struct Tremor {
   Eigen::Vector3d shift{0, 0, 0};
   double yaw = 0, pitch = 0, roll = 0;
 };
 Tremor hand_tremor(double t, double metres, double radians, uint64_t seed);
+// camera_pose() with such a tremor of 6 mm and 8 mrad, times `strength`.
+Rigid3 shaken(const Eigen::Vector3d& position, double yaw, double pitch, double t, double strength, uint64_t seed);
 
 // A path through stamped poses (stamps rising): interpolated, then smoothed by a Gaussian of `sigma` [s], so that
 // velocities are steady and the noise of a motion-capture system does not shake the pictures.

@@ -335,6 +335,22 @@ void paint_plain(Canvas& c, Material material, Random& random) {
       for (int i = 0; i < 80; ++i) shapes(c, 0, 0, c.width_m(), c.height_m(), 1, random);
       c.grain(0.03, 0.03, 0.35F, 3, random.next());
       break;
+    case Material::paint:
+      c.fill(pale(random));
+      c.grain(2.5, 2.5, 0.04F, 1, random.next());
+      break;
+    case Material::linoleum: {
+      const auto v = static_cast<float>(random.uniform(150, 172));
+      c.fill({v, v + 4, v + 1});
+      c.grain(1.5, 1.5, 0.05F, 2, random.next());
+      break;
+    }
+    case Material::lacquer: {
+      const auto v = static_cast<float>(random.uniform(120, 190));
+      c.fill({v, v * 0.94F, v * 0.84F});
+      c.grain(0.8, 0.8, 0.04F, 1, random.next());
+      break;
+    }
     case Material::denim:
       c.fill(dark(random));
       c.stain(0.2, vivid(random), 0.5F, random.next());
@@ -406,6 +422,10 @@ void paint(Canvas& c, Material material, Random& random) {
 // [texels per metre]: a little finer than the camera resolves from where such things are usually seen.
 double density(Material material) {
   switch (material) {
+    case Material::paint:
+    case Material::linoleum:
+    case Material::lacquer:
+      return 40;
     case Material::plaster:
       return 180;
     case Material::planks:
@@ -436,10 +456,10 @@ int texels(double metres, double per_metre) {
 }  // namespace
 
 const std::vector<std::string>& material_names() {
-  static const std::vector<std::string> names{"plaster", "planks", "carpet", "wood",       "poster",   "picture",
-                                              "page",    "cover",  "spine",  "carton",     "keyboard", "screen",
-                                              "fabric",  "denim",  "skin",   "face",       "hair",     "metal",
-                                              "plastic", "rubber", "door",   "whiteboard", "drawers",  "leaves"};
+  static const std::vector<std::string> names{
+      "plaster", "planks",   "carpet", "wood",       "poster",  "picture", "page",  "cover",    "spine",
+      "carton",  "keyboard", "screen", "fabric",     "denim",   "skin",    "face",  "hair",     "metal",
+      "plastic", "rubber",   "door",   "whiteboard", "drawers", "leaves",  "paint", "linoleum", "lacquer"};
   return names;
 }
 

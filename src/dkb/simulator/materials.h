@@ -38,7 +38,10 @@ enum class Material {
   door,
   whiteboard,
   drawers,
-  leaves
+  leaves,
+  paint,     // of a blank wall
+  linoleum,  // of a blank floor
+  lacquer    // of a plain door
 };
 
 // Names as used in scene files, in the order of the enum.

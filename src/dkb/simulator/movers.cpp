@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/simulator/camera_path.h"
 #include "dkb/simulator/noise.h"
 
 namespace dkb::sim {
@@ -37,13 +38,20 @@ class Planner {
  public:
   Planner(const WalkArea& area, double duration, uint64_t seed) : area_(area), duration_(duration), random_(seed) {}
 
-  std::vector<Stretch> plan(const std::vector<std::vector<Stretch>>& others) {
+  // `in_view`: who stands still from the start stands where the camera sees it.
+  std::vector<Stretch> plan(const std::vector<std::vector<Stretch>>& others, bool in_view) {
     others_ = &others;
     std::vector<Stretch> out;
-    Eigen::Vector2d here = start();
     double t = -2;
+    const bool stands = area_.stand_still > 0;
+    const double leave = stands ? area_.stand_still + random_.uniform(0, 0.6) : -1.5;
+    Eigen::Vector2d here = start(stands && in_view ? area_.first_place : nullptr, leave);
+    if (stands) {
+      out.push_back({here, here, t, leave});
+      t = leave;
+    }
     while (t < duration_ + 1) {
-      Stretch next = choose(here, t);
+      Stretch next = choose(here, t, stands && out.size() == 1);
       out.push_back(next);
       here = next.b;
       t = next.end;
@@ -81,16 +89,16 @@ class Planner {
     }
     return true;
   }
-  Eigen::Vector2d start() {
-    Eigen::Vector2d p = propose();
-    for (int i = 0; i < 400; ++i, p = propose()) {
-      Stretch stand{p, p, -2, -1.5};
-      if (may_stand(p) && clear(stand)) return p;
+  Eigen::Vector2d start(const std::function<Eigen::Vector2d(Random&)>& place, double end) {
+    Eigen::Vector2d p;
+    for (int i = 0; i <= 400; ++i) {
+      p = place && i < 200 ? place(random_) : propose();
+      if (may_stand(p) && clear({p, p, -2, end})) break;
     }
     return p;
   }
-  Stretch choose(const Eigen::Vector2d& here, double t) {
-    if (random_.uniform() < area_.pause_chance) {
+  Stretch choose(const Eigen::Vector2d& here, double t, bool walk_off) {
+    if (!walk_off && random_.uniform() < area_.pause_chance) {
       Stretch stand{here, here, t, t + random_.uniform(0.4, std::max(0.5, area_.pause_max))};
       if (clear(stand)) return stand;
     }
@@ -111,13 +119,13 @@ class Planner {
 };
 
 // Heading, gait and speed from positions.
-Track finish(const std::function<Eigen::Vector2d(double)>& where, double duration) {
+Track finish(const std::function<Eigen::Vector2d(double)>& where, double duration, bool standing) {
   Track track;
   MoverState s;
   const double dt = Track::kStep;
   const Eigen::Vector2d ahead = where(duration) - where(0);
   s.heading = ahead.norm() > 0.1 ? std::atan2(ahead.y(), ahead.x()) : 0;
-  bool moving = false;
+  bool moving = standing;
   for (double t = 0; t < duration + dt; t += dt) {
     s.position = where(t);
     s.velocity = (where(t + dt / 2) - where(t - dt / 2)) / dt;
@@ -150,7 +158,15 @@ MoverState Track::at(double t) const {
   s.heading = a.heading + w * wrapped(b.heading - a.heading);
   s.phase = a.phase + w * (b.phase - a.phase);
   s.stride = a.stride + w * (b.stride - a.stride);
+  s.tilt = a.tilt + w * (b.tilt - a.tilt);
   return s;
+}
+
+void Track::add_sway(uint64_t seed) {
+  for (size_t i = 0; i < states_.size(); ++i) {
+    const Tremor wave = hand_tremor(0.3 * kStep * static_cast<double>(i), 0, 0.003, seed);
+    states_[i].tilt = (1 - std::min(1.0, states_[i].stride)) * Eigen::Vector2d(0.6 * wave.yaw, wave.pitch);
+  }
 }
 
 std::vector<Track> plan_walks(const WalkArea& area, int count, double duration, uint64_t seed) {
@@ -158,7 +174,7 @@ std::vector<Track> plan_walks(const WalkArea& area, int count, double duration, 
   std::vector<Track> tracks;
   for (int i = 0; i < count; ++i) {
     Planner planner(area, duration, hash64(seed, static_cast<uint64_t>(i), 0x3A1C));
-    plans.push_back(planner.plan(plans));
+    plans.push_back(planner.plan(plans, i % 2 == 0));
     const std::vector<Stretch>& plan = plans.back();
     tracks.push_back(finish(
         [&plan](double t) {
@@ -166,12 +182,12 @@ std::vector<Track> plan_walks(const WalkArea& area, int count, double duration, 
             if (t < s.end) return s.at(t);
           return plan.back().b;
         },
-        duration));
+        duration, area.stand_still > 0));
   }
   return tracks;
 }
 
-Track track_along(const std::vector<Waypoint>& points, double duration) {
+Track track_along(const std::vector<Waypoint>& points, double duration, bool standing) {
   return finish(
       [&points](double t) -> Eigen::Vector2d {
         if (t <= points.front().time) return points.front().position;
@@ -180,7 +196,7 @@ Track track_along(const std::vector<Waypoint>& points, double duration) {
             return Stretch{points[i - 1].position, points[i].position, points[i - 1].time, points[i].time}.at(t);
         return points.back().position;
       },
-      duration);
+      duration, standing);
 }
 
 }  // namespace dkb::sim

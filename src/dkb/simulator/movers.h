@@ -29,6 +29,7 @@ struct MoverState {
   double heading = 0;              // [rad] of its front, from +x towards +y
   double phase = 0;                // [rad] of the gait
   double stride = 0;               // 0 stands, 1 walks, up to 1.6 runs
+  Eigen::Vector2d tilt{0, 0};      // [rad] of the whole body about its feet: to its left, forward
 };
 
 // A motion over time: evenly spaced states, interpolated; before the first and after the last they stay.
@@ -36,6 +37,8 @@ class Track {
  public:
   static constexpr double kStep = 0.02;  // [s]
   void push(const MoverState& s) { states_.push_back(s); }
+  // Lets a person sway about the feet as people do who stand: 3 mrad (5 mm at the head), up to 1 Hz; less in a stride.
+  void add_sway(uint64_t seed);
   MoverState at(double t) const;
   double duration() const { return kStep * static_cast<double>(states_.size()); }
   bool empty() const { return states_.empty(); }
@@ -67,17 +70,21 @@ struct WalkArea {
   std::function<Eigen::Vector2d(Random&)> next_target;  // proposes where to go; may be empty: anywhere
   double speed_min = 0.7, speed_max = 1.4;              // [m/s]
   double pause_chance = 0.4, pause_max = 2.0;           // [s] stand between two walks
+  double stand_still = 0;                               // [s] all stand from the start, then walk off
+  // Where every second one of those stands, so that the camera sees it; the others as by `next_target`.
+  std::function<Eigen::Vector2d(Random&)> first_place;
 };
 
 // Tracks of `count` people for `duration` seconds: straight walks with smooth starts, stops and turns, which keep clear
 // of walls, furniture, the camera and each other.
 std::vector<Track> plan_walks(const WalkArea& area, int count, double duration, uint64_t seed);
 
-// A track along waypoints (position, time of arrival [s]), smooth in between; heading along the motion.
+// A track along waypoints (position, time of arrival [s]), smooth in between; heading along the motion. `standing`: who
+// starts to walk turns before, as everybody else does on the way.
 struct Waypoint {
   Eigen::Vector2d position;
   double time = 0;
 };
-Track track_along(const std::vector<Waypoint>& points, double duration);
+Track track_along(const std::vector<Waypoint>& points, double duration, bool standing = false);
 
 }  // namespace dkb::sim

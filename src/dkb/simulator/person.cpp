@@ -103,6 +103,8 @@ Surfaces person_surfaces(const PersonLook& look, const MoverState& state) {
 
   Rigid3 pose(Eigen::Quaterniond(Eigen::AngleAxisd(state.heading, Vector3d::UnitZ())),
               Vector3d(state.position.x(), state.position.y(), 0));
+  if (!state.tilt.isZero(0))
+    pose.rotation = pose.rotation * rotation_from_vector(Vector3d(state.tilt.x(), state.tilt.y(), 0));
   return s.moved(pose);
 }
 

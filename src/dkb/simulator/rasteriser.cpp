@@ -76,11 +76,27 @@ bool sphere_visible(const Eigen::Vector3d& c, double radius, const CameraModel& 
   return !outside(-c.x(), left) && !outside(c.x(), right) && !outside(-c.y(), top) && !outside(c.y(), bottom);
 }
 
+// Rows in which a sphere may be seen.
+Rows rows_of_sphere(const Eigen::Vector3d& c, double radius, const CameraModel& camera, double slack) {
+  const double r = radius + slack + slack * c.norm(), distance = std::hypot(c.y(), c.z());
+  if (r >= distance) return {};
+  const double middle = std::atan2(c.y(), c.z()), half = std::asin(r / distance);
+  constexpr double kSteepest = 1.4;  // [rad]
+  Rows rows;
+  if (middle - half > -kSteepest)
+    rows.first = static_cast<int>(std::floor(camera.cy + camera.fy * std::tan(std::min(middle - half, kSteepest)))) - 3;
+  if (middle + half < kSteepest)
+    rows.end = static_cast<int>(std::ceil(camera.cy + camera.fy * std::tan(std::max(middle + half, -kSteepest)))) + 4;
+  return rows;
+}
+
 }  // namespace
 
 void DrawList::add(const Surfaces& surfaces) {
   for (const Patch& p : surfaces.patches) patches.push_back(&p);
   for (const Quadric& q : surfaces.quadrics) quadrics.push_back(&q);
+  patch_rows.resize(patches.size());
+  quadric_rows.resize(quadrics.size());
 }
 
 void DrawList::add_visible(const Surfaces& surfaces, const CameraModel& camera, const Rigid3& cam_from_world,
@@ -91,13 +107,18 @@ void DrawList::add_visible(const Surfaces& surfaces, const CameraModel& camera, 
     if (away.dot(p.origin - eye) < -slack * away.norm()) continue;  // seen from behind
     const Eigen::Vector3d centre = cam_from_world * (p.origin + 0.5 * (p.u + p.v));
     const double radius = 0.5 * std::max((p.u + p.v).norm(), (p.u - p.v).norm());
-    if (sphere_visible(centre, radius, camera, slack)) patches.push_back(&p);
+    if (!sphere_visible(centre, radius, camera, slack)) continue;
+    patches.push_back(&p);
+    patch_rows.push_back(rows_of_sphere(centre, radius, camera, slack));
   }
   for (const Quadric& q : surfaces.quadrics) {
     const Eigen::Matrix3d from_local = q.to_local.inverse();
     const Eigen::Vector3d middle = q.tube ? Eigen::Vector3d(q.centre + 0.5 * from_local.col(2)) : q.centre;
     const double radius = from_local.norm() * (q.tube ? std::max(1.0, 1.0 + q.taper) : 1.0);
-    if (sphere_visible(cam_from_world * middle, radius, camera, slack)) quadrics.push_back(&q);
+    const Eigen::Vector3d centre = cam_from_world * middle;
+    if (!sphere_visible(centre, radius, camera, slack)) continue;
+    quadrics.push_back(&q);
+    quadric_rows.push_back(rows_of_sphere(centre, radius, camera, slack));
   }
 }
 
@@ -250,8 +271,10 @@ void Rasteriser::draw(const DrawList& list, const Rigid3& cam_from_world, const 
   quadric_views_.resize(list.quadrics.size());
   const Eigen::Matrix3d r = cam_from_world.matrix3(), r_inverse = r.transpose();
   int id = 0;
-  for (const Patch* p : list.patches) draw_patch(*p, id++, cam_from_world, r, out);
-  for (const Quadric* q : list.quadrics) draw_quadric(*q, id++, cam_from_world, r_inverse, out);
+  for (size_t i = 0; i < list.patches.size(); ++i, ++id)
+    if (list.patch_rows[i].meets(rows)) draw_patch(*list.patches[i], id, cam_from_world, r, out);
+  for (size_t i = 0; i < list.quadrics.size(); ++i, ++id)
+    if (list.quadric_rows[i].meets(rows)) draw_quadric(*list.quadrics[i], id, cam_from_world, r_inverse, out);
 }
 
 [[gnu::always_inline]] inline Rasteriser::Hit Rasteriser::hit(const Quadric& quadric, const QuadricView& view, int x,

@@ -14,10 +14,17 @@
 
 namespace dkb::sim {
 
+// Rows first ... end - 1 of an image.
+struct Rows {
+  int first = 0, end = 1 << 30;
+  bool meets(const Rows& other) const { return first < other.end && other.first < end; }
+};
+
 // What one view draws: pointers into surfaces that outlive it. A primitive's id is its index, patches first.
 struct DrawList {
   std::vector<const Patch*> patches;
   std::vector<const Quadric*> quadrics;
+  std::vector<Rows> patch_rows, quadric_rows;  // where each may be seen; as many as there are primitives
 
   void add(const Surfaces& surfaces);
   // Only what may be seen from a pose within `slack` [m, and rad] of the given one.
@@ -36,11 +43,9 @@ class Rasteriser {
  public:
   explicit Rasteriser(const CameraModel& camera, Simd simd = best_simd()) : camera_(camera), simd_(simd) {}
 
-  // Draws rows.first ... rows.end - 1. Rays go through pixel centre + `offset` [px]. `out` is resized if need be, and
+  // Draws some rows. Rays go through pixel centre + `offset` [px]. `out` is resized if need be, and
   // its other rows are kept. The functions below are for the rows of the last draw().
-  struct Rows {
-    int first = 0, end = 0;
-  };
+  using Rows = sim::Rows;
   void draw(const DrawList& list, const Rigid3& cam_from_world, const Eigen::Vector2d& offset, Rows rows,
             GeometryImage* out);
 

@@ -97,9 +97,6 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
   scene.start_stamp = start;
   const int available = static_cast<int>(std::floor(duration * request.fps + 1e-6)) + 1;
   scene.frames = std::min(request.frames > 0 ? request.frames : 300, available);
-  if (request.frames > available)
-    scene.notes.push_back("the path lasts " + std::to_string(available) + " frames; " + std::to_string(request.frames) +
-                          " were asked for");
   const double used = (scene.frames - 1) / request.fps;
 
   std::vector<TimedPose> samples;
@@ -142,7 +139,7 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
   scene.inside = room;
   scene.world_from_scene = scene_from_world.inverse();
   scene.path = [scene_from_world, world_path](double t) { return scene_from_world * world_path(t); };
-  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, used, request.seed);
+  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, used, request);
   return scene;
 }
 

@@ -208,7 +208,8 @@ void read_path(const std::string& file, const Section& top, uint64_t seed, Scene
   };
 }
 
-void read_movers(const std::string& file, const Section& top, double duration, uint64_t seed, Scene* scene) {
+void read_movers(const std::string& file, const Section& top, double duration, const SceneRequest& request,
+                 Scene* scene) {
   if (!top.has("movers")) return;
   for (const auto& node : top.list("movers")) {
     const Section m(file, node, "movers", {"class", "waypoints"});
@@ -220,8 +221,11 @@ void read_movers(const std::string& file, const Section& top, double duration, u
       if (points.size() > 1 && points.back().time <= points[points.size() - 2].time)
         w.fail(w.child("time"), "time must be later than that of the entry before");
     }
-    add_mover(scene, m.choice("class", {"person", "chair"}, "person"), track_along(points, duration),
-              hash64(seed, static_cast<uint64_t>(scene->movers.size()), 3));
+    const std::string kind = m.choice("class", {"person", "chair"}, "person");
+    const double later = kind == "person" ? request.stand_still : 0;
+    for (Waypoint& w : points) w.time += later;
+    add_mover(scene, kind, track_along(points, duration, later > 0),
+              hash64(request.seed, static_cast<uint64_t>(scene->movers.size()), 3));
   }
 }
 
@@ -245,9 +249,9 @@ Scene read_scene_file(const std::string& file, const SceneRequest& request) {
     read_room(file, top, request.seed, &scene);
     read_objects(file, top, request.seed, &scene);
     read_path(file, top, hash64(request.seed, 12), &scene);
-    read_movers(file, top, duration, request.seed, &scene);
+    read_movers(file, top, duration, request, &scene);
     const int people = request.people >= 0 ? request.people : top.whole("people", 0, 30, 0);
-    if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request.seed);
+    if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request);
     return scene;
   } catch (const YAML::Exception& e) {
     throw InputError(file + ":" + std::to_string(std::max(0, e.mark.line) + 1) + ": " + e.msg);

@@ -15,20 +15,6 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.141592653589793;
 
-// 0 ... 1 with smooth start and end; `ramp` is the share of the time spent on each.
-double eased(double s, double ramp) {
-  s = std::clamp(s, 0.0, 1.0);
-  const double v = 1 / (1 - ramp);
-  if (s < ramp) return 0.5 * v * s * s / ramp;
-  if (s > 1 - ramp) return 1 - 0.5 * v * (1 - s) * (1 - s) / ramp;
-  return v * (s - 0.5 * ramp);
-}
-
-Rigid3 shaken(const Vector3d& position, double yaw, double pitch, double t, double strength, uint64_t seed) {
-  const Tremor h = hand_tremor(t, 0.006 * strength, 0.008 * strength, seed);
-  return camera_pose(position + h.shift, yaw + h.yaw, pitch + h.pitch, h.roll);
-}
-
 Rigid3 looking_at(const Vector3d& eye, const Vector3d& target, double t, double strength, uint64_t seed) {
   const Vector3d d = target - eye;
   return shaken(eye, std::atan2(d.y(), d.x()), std::atan2(d.z(), std::hypot(d.x(), d.y())), t, strength, seed);
@@ -90,12 +76,25 @@ Scene open_hall(const SceneRequest& request, double sway) {
   return scene;
 }
 
+// The same room at 2 % of the light. A long exposure (and with it the blur of motion) and an amplification of 10, the
+// most that such sensors do, bring back 43 % of the contrast. The picture is made of so few electrons (6000 would be
+// white, were nothing amplified) that they can be seen one by one: their variance is the level x 10 x 255 / 6000.
+Scene build_dim(const SceneRequest& request) {
+  constexpr double kLight = 0.02, kAmplification = 10, kWell = 6000;
+  Scene scene = build_room(request);
+  const double usual = scene.exposure;
+  scene.exposure = 0.030;
+  scene.brightness = kLight * kAmplification * scene.exposure / usual;
+  scene.photon_noise = kAmplification * 255 / kWell;
+  return scene;
+}
+
 Scene build_crowd(const SceneRequest& request) {
   Scene scene = open_hall(request, 1);
   WalkArea area;
   area.no_stop.push_back({-0.9, -2.6, 0.9, -1.0});
   area.camera_distance = 0.9;
-  add_walkers(&scene, area, people_of(request, 6), scene.frames / request.fps, request.seed);
+  add_walkers(&scene, area, people_of(request, 6), scene.frames / request.fps, request);
   return scene;
 }
 
@@ -114,7 +113,7 @@ Scene build_spin(const SceneRequest& request) {
     return shaken({0.15 * std::cos(0.8 * t), 0.15 * std::sin(0.8 * t), 1.4}, yaw, -0.2 + 0.08 * std::sin(0.9 * t), t,
                   0.7, seed);
   };
-  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request.seed);
+  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request);
   return scene;
 }
 
@@ -137,7 +136,12 @@ Scene build_rush(const SceneRequest& request) {
     const double lane = people > 1 ? -1.0 + 1.9 * i / (people - 1) : 0.0;
     std::vector<Waypoint> points;
     double side = random.below(2) == 0 ? -1 : 1, t = -random.uniform(0.5, 2.5);
-    points.push_back({{side * 3.2, lane}, t});
+    if (request.stand_still > 0) {
+      t = request.stand_still + random.uniform(0, 0.6);
+      points.push_back({{random.uniform(-1.0, 1.0), lane}, t});
+    } else {
+      points.push_back({{side * 3.2, lane}, t});
+    }
     while (t < duration) {
       t += 6.4 / random.uniform(2.0, 3.4);
       side = -side;
@@ -145,7 +149,8 @@ Scene build_rush(const SceneRequest& request) {
       t += random.uniform(0.1, 0.9);
       points.push_back({{side * 3.2, lane}, t});
     }
-    add_mover(&scene, "person", track_along(points, duration), hash64(request.seed, static_cast<uint64_t>(i)));
+    add_mover(&scene, "person", track_along(points, duration, request.stand_still > 0),
+              hash64(request.seed, static_cast<uint64_t>(i)));
   }
   return scene;
 }
@@ -168,7 +173,7 @@ Scene build_straight(const SceneRequest& request) {
     const double cart = 5.0 * eased(random.uniform(0, end) / duration, 0.06);
     return Vector2d(cart + random.uniform(0.8, 3.6), random.uniform(-1.3, 1.3));
   };
-  add_walkers(&scene, area, people_of(request, 4), end, request.seed);
+  add_walkers(&scene, area, people_of(request, 4), end, request);
   return scene;
 }
 
@@ -179,9 +184,12 @@ Scene build_cover(const SceneRequest& request) {
   if (request.people != 0) {
     // In from the side, in front of the camera, and out again.
     Track track;
-    const double arrive = std::min(2.6, 0.3 * duration), leave = std::max(0.75 * duration, duration - 2.0);
+    const bool stands = request.stand_still > 0;  // before the camera, from the first frame
+    const double arrive = stands ? -1e3 : std::min(2.6, 0.3 * duration),
+                 leave = stands ? request.stand_still : std::max(0.75 * duration, duration - 2.0);
     double phase = 0;
-    const auto where = [&](double t) -> Vector2d {
+    const auto where = [&](double time) -> Vector2d {
+      const double t = stands ? std::max(time, leave) : time;
       const Rigid3 camera = path(t);
       const Vector3d ahead = camera.rotation * Vector3d::UnitZ();
       // Follows the camera half-way, sways on its own.
@@ -210,7 +218,7 @@ Scene build_cover(const SceneRequest& request) {
     WalkArea area;
     area.no_stop.push_back({-1.4, -2.6, 1.4, -0.6});
     area.camera_distance = 1.6;  // behind the one in front
-    add_walkers(&scene, area, request.people - 1, duration, request.seed);
+    add_walkers(&scene, area, request.people - 1, duration, request);
   }
   return scene;
 }
@@ -235,7 +243,7 @@ Scene build_chair(const SceneRequest& request) {
     WalkArea area;
     area.no_stop.push_back({-1.6, -2.6, 1.6, 1.0});
     area.obstacles.push_back({-1.6, -0.9, 1.6, 1.0});  // the chair's ground
-    add_walkers(&scene, area, request.people, duration, request.seed);
+    add_walkers(&scene, area, request.people, duration, request);
   }
   return scene;
 }
@@ -307,7 +315,7 @@ Scene build_loop(const SceneRequest& request) {
     }
     return shaken({p.x(), p.y(), 1.35}, heading - 0.3, -0.14, t, 1, seed);
   };
-  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request.seed);
+  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request);
   return scene;
 }
 
@@ -352,7 +360,7 @@ Scene build_twins(const SceneRequest& request) {
     return shaken({x, 0.06 * std::sin(along), 1.36 + 0.04 * std::sin(2 * along)}, kPi / 2 + 0.14 * std::cos(along),
                   -0.16, t, 1, seed);
   };
-  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request.seed);
+  if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request);
   return scene;
 }
 
@@ -370,8 +378,15 @@ void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed
   scene->movers.push_back(std::move(m));
 }
 
-void add_walkers(Scene* scene, WalkArea area, int count, double duration, uint64_t seed) {
+void add_walkers(Scene* scene, WalkArea area, int count, double duration, const SceneRequest& request) {
   const CameraPath path = scene->path;
+  area.stand_still = request.stand_still;
+  area.first_place = [path](Random& random) -> Vector2d {
+    const Rigid3 pose = path(0);
+    const Vector3d ahead = pose.rotation * Vector3d::UnitZ();
+    const double yaw = std::atan2(ahead.y(), ahead.x()) + random.uniform(-0.42, 0.42);
+    return pose.translation.head<2>() + random.uniform(1.3, 3.4) * Vector2d(std::cos(yaw), std::sin(yaw));
+  };
   area.inside = scene->inside;
   area.obstacles.insert(area.obstacles.end(), scene->furnishing.footprints.begin(), scene->furnishing.footprints.end());
   area.camera = [path](double t) -> Vector2d { return path(t).translation.head<2>(); };
@@ -384,8 +399,8 @@ void add_walkers(Scene* scene, WalkArea area, int count, double duration, uint64
              random.uniform(-1.6, 1.6) * Vector2d(-axis.y(), axis.x());
     };
   uint64_t i = 0;
-  for (Track& track : plan_walks(area, count, duration, seed))
-    add_mover(scene, "person", std::move(track), hash64(seed, 100 + i++));
+  for (Track& track : plan_walks(area, count, duration, request.seed))
+    add_mover(scene, "person", std::move(track), hash64(request.seed, 100 + i++));
 }
 
 Scene build_scene(const SceneRequest& request) {
@@ -398,6 +413,9 @@ Scene build_scene(const SceneRequest& request) {
   if (request.name == "cover") return build_cover(request);
   if (request.name == "chair") return build_chair(request);
   if (request.name == "twins") return build_twins(request);
+  if (request.name == "corridor") return build_corridor(request);
+  if (request.name == "building") return build_building(request);
+  if (request.name == "dim") return build_dim(request);
   throw std::logic_error("no scene of the name " + request.name);
 }
 

@@ -36,19 +36,24 @@ bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int half_wi
 
 }  // namespace
 
-ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, double grey_noise, uint64_t seed) {
+ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, const Exposure& exposure, uint64_t seed) {
   ColourImage out(width, height);
   // Noise common to the channels and of each channel, so that 0.299 r + 0.587 g + 0.114 b has the wanted spread.
-  const auto own = static_cast<float>(0.8 * grey_noise);
-  const auto common = static_cast<float>(
+  const double grey_noise = exposure.grey_noise;
+  const auto all_own = static_cast<float>(0.8 * grey_noise);
+  const auto all_common = static_cast<float>(
       std::sqrt(std::max(0.0, 1 - 0.64 * (0.299 * 0.299 + 0.587 * 0.587 + 0.114 * 0.114))) * grey_noise);
   const float cx = static_cast<float>(width - 1) / 2, cy = static_cast<float>(height - 1) / 2, r2 = cx * cx + cy * cy;
   for (int y = 0; y < height; ++y) {
     const uint64_t* row = sum.data() + static_cast<size_t>(y) * static_cast<size_t>(width);
     Rgb* target = out.row(y);
     const float dy = static_cast<float>(y) - cy;
+    const float light = exposure.row_gain.empty() ? 1.0F : exposure.row_gain[static_cast<size_t>(y)];
+    const float photons = static_cast<float>(exposure.photon_noise) * std::max(1.0F, light);
+    const float own = all_own * std::max(1.0F, light), common = all_common * std::max(1.0F, light);
     for (int x = 0; x < width; ++x) {
-      const float dx = static_cast<float>(x) - cx, gain = (1.0F - 0.16F * (dx * dx + dy * dy) / r2) * (1.0F / 256.0F);
+      const float dx = static_cast<float>(x) - cx;
+      const float gain = (1.0F - 0.16F * (dx * dx + dy * dy) / r2) * (1.0F / 256.0F) * light;
       const uint64_t h = hash64(seed ^ (static_cast<uint64_t>(y) << 32 | static_cast<uint64_t>(x)));
       const uint64_t g = hash64(h);
       const float n = common * normal_from_bits(h);
@@ -59,9 +64,18 @@ ColourImage expose(const std::vector<uint64_t>& sum, int width, int height, doub
                (2.4494897F / 1024.0F);
       };
       const uint64_t c = row[x];
-      target[x].r = byte(static_cast<float>(c & 0xFFFF) * gain + n + pair(0));
-      target[x].b = byte(static_cast<float>((c >> 16) & 0xFFFF) * gain + n + pair(20));
-      target[x].g = byte(static_cast<float>((c >> 32) & 0xFFFF) * gain + n + pair(40));
+      const float red = static_cast<float>(c & 0xFFFF) * gain, blue = static_cast<float>((c >> 16) & 0xFFFF) * gain,
+                  green = static_cast<float>((c >> 32) & 0xFFFF) * gain;
+      target[x].r = byte(red + n + pair(0));
+      target[x].b = byte(blue + n + pair(20));
+      target[x].g = byte(green + n + pair(40));
+      if (photons <= 0) continue;
+      const auto counted = [&](float level, uint64_t channel) {
+        return std::sqrt(photons * level) * normal_from_bits(hash64(g ^ channel));
+      };
+      target[x].r = byte(red + n + pair(0) + counted(red, 1));
+      target[x].b = byte(blue + n + pair(20) + counted(blue, 2));
+      target[x].g = byte(green + n + pair(40) + counted(green, 3));
     }
   }
   return out;
@@ -76,6 +90,15 @@ DepthImage round_depth(const Image<float>& inverse_depth, const CameraModel& cam
         out(x, y) = in_units(z, camera);
     }
   return out;
+}
+
+void look_through(const Image<float>& pane_inverse_depth, const Image<float>& pane_cosine,
+                  const Image<float>& inverse_depth, Image<float>* grey) {
+  for (size_t i = 0; i < grey->size(); ++i) {
+    if (pane_inverse_depth.data()[i] <= inverse_depth.data()[i]) continue;
+    const float c = pane_cosine.data()[i];
+    grey->data()[i] *= c > 0.995F ? 0.0F : 0.6F * std::clamp((c - 0.3F) / 0.4F, 0.0F, 1.0F);
+  }
 }
 
 DepthImage sense_depth(const Image<float>& inverse_depth, const Image<float>& grey, const Image<float>& cosine,

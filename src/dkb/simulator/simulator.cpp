@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/simulator/disturbances.h"
 #include "dkb/simulator/noise.h"
 #include "dkb/simulator/rasteriser.h"
 #include "dkb/simulator/scene.h"
@@ -26,7 +27,9 @@ constexpr std::array<std::array<int, 2>, 8> kRays{
     {{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
 constexpr double kLensBlur = 1.7;       // rays spread over that many pixels
 constexpr int kBandRows = 16;           // rows read at the same time, as far as the rolling shutter goes
-constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth
+constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth, up to 30 Hz
+constexpr double kSceneRate = 30;       // [Hz] in which scenes count their frames
+constexpr double kLongest = 36000;      // [s]
 
 std::string stamp_text(int64_t microseconds) {
   const long long size = std::abs(static_cast<long long>(microseconds));
@@ -48,24 +51,28 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
 }  // namespace
 
 const std::vector<std::string>& simulator_scenes() {
-  static const std::vector<std::string> names{"room",     "crowd", "loop",  "spin", "rush",
-                                              "straight", "cover", "chair", "twins"};
+  static const std::vector<std::string> names{"room",  "crowd", "loop",  "spin",     "rush", "straight",
+                                              "cover", "chair", "twins", "corridor", "dim",  "building"};
   return names;
 }
 
 void SimulatorOptions::check() const {
-  require_option(frames >= 0 && frames <= 1000000, "frames", frames, "0 (as many as the scene needs) ... 1000000");
-  require_option(people >= -1 && people <= 30, "people", people, "0 ... 30");
+  require_option(frames >= 0 && frames <= 1000000, "--frames", frames, "0 (as many as the scene needs) ... 1000000");
+  require_option(people >= -1 && people <= 30, "--people", people, "0 ... 30");
   require_option(width >= 64 && width <= 4096, "width", width, "64 ... 4096 px");
   require_option(height >= 64 && height <= 4096, "height", height, "64 ... 4096 px");
   require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure,
                  "0.001 ... 0.03 s, or 0 for the scene's own");
+  require_option(rate >= 1 && rate <= 60, "--rate", rate, "1 ... 60 Hz");
+  require_option(frames <= kLongest * rate, "--frames", frames, "at most 10 hours at --rate");
+  require_option(dropouts >= 0 && dropouts <= 0.9, "--dropouts", dropouts, "0 ... 0.9");
+  require_option(stand_still >= 0 && stand_still <= 3600, "--stand-still", stand_still, "0 ... 3600 s");
   require_option(readout >= 0 && readout <= 0.033, "readout", readout, "0 ... 0.033 s");
-  require_option(std::isfinite(blackout_start) && blackout_start >= 0, "blackout.start", blackout_start,
+  require_option(std::isfinite(blackout_start) && blackout_start >= 0, "--blackout START", blackout_start,
                  "at least 0 s");
-  require_option(std::isfinite(blackout_seconds) && blackout_seconds >= 0, "blackout.seconds", blackout_seconds,
+  require_option(std::isfinite(blackout_seconds) && blackout_seconds >= 0, "--blackout SECONDS", blackout_seconds,
                  "at least 0 s");
-  if (odometry_drift) require_option(std::abs(*odometry_drift) <= 0.5, "odometry", *odometry_drift, "-0.5 ... 0.5");
+  if (odometry_drift) require_option(std::abs(*odometry_drift) <= 0.5, "--odometry", *odometry_drift, "-0.5 ... 0.5");
   require_option(grey_noise >= 0 && grey_noise <= 20, "grey_noise", grey_noise, "0 ... 20 grey levels");
 }
 
@@ -73,29 +80,36 @@ struct Simulator::Impl {
   SimulatorOptions options;
   CameraModel camera;
   sim::Scene scene;
-  double exposure = 0.014;
+  double exposure = 0.014, readout = 0.018;
+  std::vector<int> shots;  // numbers of the frames that are not missing; a frame's noise is that of its number
+  std::optional<sim::Flicker> flicker;
 
+  uint64_t shot(int i) const { return static_cast<uint64_t>(shots[static_cast<size_t>(i)]); }
   int64_t start_us() const { return std::llround(scene.start_stamp * 1e6); }
-  int64_t colour_us(int i) const { return std::llround(i * 1e6 / camera.fps); }
+  int64_t colour_us(int i) const { return std::llround(shots[static_cast<size_t>(i)] * 1e6 / camera.fps); }
   int64_t depth_us(int i) const {
+    const double spread = camera.fps > 30 ? 0.48 / camera.fps : kStampSpread;
     const double shift =
-        (2.0 * static_cast<double>(sim::unit_float(sim::hash64(options.seed, 0xD5, static_cast<uint64_t>(i)))) - 1.0) *
-        kStampSpread;
+        (2.0 * static_cast<double>(sim::unit_float(sim::hash64(options.seed, 0xD5, shot(i)))) - 1.0) * spread;
     return colour_us(i) + std::llround(shift * 1e6);
   }
 
   // [s] that these rows are read after the middle row.
   double row_delay(const sim::Rasteriser::Rows& rows) const {
-    return options.readout * ((rows.first + rows.end) / (2.0 * camera.height) - 0.5);
+    return readout * ((rows.first + rows.end) / (2.0 * camera.height) - 0.5);
   }
 
   // Surfaces of all movers at a time, with the owner of each primitive.
   struct MoverSurfaces {
     std::vector<sim::Surfaces> parts;
   };
-  MoverSurfaces movers_at(double t) const {
+  // `seen`: which cells are; empty where the scene has none.
+  MoverSurfaces movers_at(double t, const std::vector<bool>& seen) const {
     MoverSurfaces m;
-    for (const sim::Mover& mover : scene.movers) m.parts.push_back(mover.surfaces(t));
+    for (const sim::Mover& mover : scene.movers) {
+      const bool hidden = !seen.empty() && !seen[sim::cell_at(scene.cells, mover.track.at(t).position)];
+      m.parts.push_back(hidden ? sim::Surfaces() : mover.surfaces(t));
+    }
     return m;
   }
   static sim::DrawList with(const sim::DrawList& still, const MoverSurfaces& movers) {
@@ -115,6 +129,18 @@ struct Simulator::Impl {
   }
   void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam,
                       double t, SimulatedFrame* frame) const;
+  // How the sensor sees the light at a time, row by row.
+  sim::Exposure exposure_at(double t) const {
+    sim::Exposure out;
+    out.grey_noise = options.grey_noise;
+    out.photon_noise = scene.photon_noise;
+    if (!flicker && scene.brightness == 1) return out;
+    for (int y = 0; y < camera.height; ++y) {
+      const double lamps = flicker ? flicker->gain(t) * flicker->lamps(t + row_delay({y, y + 1}), exposure) : 1;
+      out.row_gain.push_back(static_cast<float>(scene.brightness * lamps));
+    }
+    return out;
+  }
 };
 
 void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner,
@@ -164,7 +190,7 @@ Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<I
   Impl& m = *impl_;
   m.options = options;
   const double scale = options.width / 640.0;
-  m.camera.fps = 30;
+  m.camera.fps = options.rate;
   m.camera.width = options.width;
   m.camera.height = options.height;
   m.camera.fx = m.camera.fy = 525.0 * scale;
@@ -175,10 +201,13 @@ Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<I
   m.camera.check();
   sim::SceneRequest request;
   request.name = options.scene;
-  request.frames = options.frames;
+  // As many at 30 Hz as last until the last frame.
+  request.frames =
+      options.frames > 0 ? static_cast<int>(std::ceil((options.frames - 1) * kSceneRate / options.rate - 1e-6)) + 1 : 0;
   request.people = options.people;
   request.seed = options.seed;
-  request.fps = m.camera.fps;
+  request.fps = kSceneRate;
+  request.stand_still = options.stand_still;
   const bool file = options.scene.find_first_of("./") != std::string::npos;
   const auto& names = simulator_scenes();
   if (!file && std::find(names.begin(), names.end(), options.scene) == names.end()) {
@@ -198,6 +227,23 @@ Simulator::Simulator(const SimulatorOptions& options) : impl_(std::make_unique<I
     m.scene = sim::build_scene(request);
   }
   m.exposure = options.exposure > 0 ? options.exposure : m.scene.exposure;
+  m.readout = std::min(options.readout, 1 / options.rate);
+  const double duration = (m.scene.frames - 1) / kSceneRate;
+  int count = static_cast<int>(std::floor(duration * options.rate + 1e-6)) + 1;
+  if (options.frames > count)
+    m.scene.notes.push_back("the path lasts " + std::to_string(count) + " frames; " + std::to_string(options.frames) +
+                            " were asked for");
+  if (options.frames > 0) count = std::min(count, options.frames);
+  m.shots = sim::frames_left(count, options.dropouts, sim::hash64(options.seed, 0xD809));
+  if (options.flicker) m.flicker.emplace(duration, sim::hash64(options.seed, 0xF11C));
+  if (options.stand_still <= 0) return;
+  bool anybody = false;
+  for (sim::Mover& mover : m.scene.movers) {
+    if (mover.kind != "person") continue;
+    anybody = true;
+    mover.track.add_sway(sim::hash64(options.seed, 0x5A9, static_cast<uint64_t>(mover.id)));
+  }
+  if (!anybody) m.scene.notes.emplace_back("--stand-still: there is nobody in the scene; --people adds some");
 }
 
 Simulator::~Simulator() = default;
@@ -205,7 +251,7 @@ Simulator::Simulator(Simulator&&) noexcept = default;
 Simulator& Simulator::operator=(Simulator&&) noexcept = default;
 
 int Simulator::frames() const {
-  return impl_->scene.frames;
+  return static_cast<int>(impl_->shots.size());
 }
 const CameraModel& Simulator::camera() const {
   return impl_->camera;
@@ -270,28 +316,32 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
 
   // What may be seen at any moment of the frame.
   double slack = 0;
-  for (const double other :
-       {t - (m.exposure + m.options.readout) / 2, t + (m.exposure + m.options.readout) / 2, depth_t}) {
+  for (const double other : {t - (m.exposure + m.readout) / 2, t + (m.exposure + m.readout) / 2, depth_t}) {
     const Rigid3 motion = m.scene.path(other).inverse() * middle;
     slack = std::max({slack, motion.translation.norm(), vector_from_rotation(motion.rotation).norm()});
   }
   sim::DrawList still;
-  still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), 1.5 * slack + 0.02);
+  slack = 1.5 * slack + 0.02;
+  still.add_visible(m.scene.furnishing.surfaces, m.camera, middle.inverse(), slack);
+  std::vector<bool> seen;
+  if (!m.scene.cells.empty()) seen = sim::visible_cells(m.scene.cells, m.camera, middle, slack);
+  for (size_t i = 0; i < seen.size(); ++i)
+    if (seen[i]) still.add_visible(m.scene.cells[i].furnishing.surfaces, m.camera, middle.inverse(), slack);
 
   std::vector<sim::Rasteriser::Rows> bands;
-  const int band = m.options.readout > 0 ? kBandRows : m.camera.height;
+  const int band = m.readout > 0 ? kBandRows : m.camera.height;
   for (int y = 0; y < m.camera.height; y += band) bands.push_back({y, std::min(y + band, m.camera.height)});
   sim::Rasteriser rasteriser(m.camera);
   sim::GeometryImage geometry;
-  const uint64_t seed = sim::hash64(m.options.seed, 0x5EED, static_cast<uint64_t>(index));
+  const uint64_t seed = sim::hash64(m.options.seed, 0x5EED, m.shot(index));
   {
-    const auto movers = m.movers_at(t);
+    const auto movers = m.movers_at(t, seen);
     const sim::DrawList list = Impl::with(still, movers);
     for (const auto& rows : bands)
       rasteriser.draw(list, m.scene.path(t + m.row_delay(rows)).inverse(), Eigen::Vector2d::Zero(), rows, &geometry);
     m.observe_movers(geometry, Impl::owners(still, movers), middle, t, &frame);
     if (with_true_depth) {
-      if (m.options.readout > 0)  // the depth image has no rolling shutter
+      if (m.readout > 0)  // the depth image has no rolling shutter
         rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
       frame.true_depth = DepthImage(m.camera.width, m.camera.height);
       for (size_t i = 0; i < geometry.inverse_depth.size(); ++i) {
@@ -303,7 +353,7 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   std::vector<uint64_t> sum(static_cast<size_t>(m.camera.width) * static_cast<size_t>(m.camera.height), 0);
   for (size_t k = 0; k < kRays.size(); ++k) {
     const double at = t + m.exposure * ((static_cast<double>(k) + 0.5) / kRays.size() - 0.5);
-    const auto movers = m.movers_at(at);
+    const auto movers = m.movers_at(at, seen);
     const sim::DrawList list = Impl::with(still, movers);
     const Eigen::Vector2d offset = kLensBlur / 16.0 * Eigen::Vector2d(kRays[k][0], kRays[k][1]);
     // The mip level is dithered in an order of its own.
@@ -313,15 +363,24 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
       rasteriser.add_colour(list, m.scene.materials, geometry, level_shift, &sum);
     }
   }
-  frame.image.colour = sim::expose(sum, m.camera.width, m.camera.height, m.options.grey_noise, sim::hash64(seed, 1));
+  frame.image.colour = sim::expose(sum, m.camera.width, m.camera.height, m.exposure_at(t), sim::hash64(seed, 1));
   frame.image.grey = grey_from_colour(frame.image.colour);
   {
-    const auto movers = m.movers_at(depth_t);
+    const auto movers = m.movers_at(depth_t, seen);
     const sim::DrawList list = Impl::with(still, movers);
     rasteriser.draw(list, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);
     if (m.options.depth_noise) {
       Image<float> grey, cosine;
       rasteriser.reflectance(list, m.scene.materials, geometry, &grey, &cosine);
+      sim::DrawList glass;
+      glass.add_visible(m.scene.glass, m.camera, middle.inverse(), slack);
+      if (!glass.patches.empty()) {
+        sim::GeometryImage panes;
+        Image<float> pane_grey, pane_cosine;
+        rasteriser.draw(glass, m.scene.path(depth_t).inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &panes);
+        rasteriser.reflectance(glass, m.scene.materials, panes, &pane_grey, &pane_cosine);
+        sim::look_through(panes.inverse_depth, pane_cosine, geometry.inverse_depth, &grey);
+      }
       frame.image.depth = sim::sense_depth(geometry.inverse_depth, grey, cosine, m.camera, sim::hash64(seed, 2));
     } else {
       frame.image.depth = sim::round_depth(geometry.inverse_depth, m.camera);

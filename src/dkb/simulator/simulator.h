@@ -15,9 +15,13 @@
 namespace dkb {
 
 struct SimulatorOptions {
-  std::string scene = "room";     // a name of simulator_scenes(), or a YAML scene file (anything with a '.' or a '/')
-  std::string path;               // trajectory file in TUM format that the camera follows; empty: the scene's own path
-  int frames = 0;                 // >= 0; 0: as many as the scene needs (300; loop and twins 900), at 30 Hz
+  std::string scene = "room";  // a name of simulator_scenes(), or a YAML scene file (anything with a '.' or a '/')
+  std::string path;            // trajectory file in TUM format that the camera follows; empty: the scene's own path
+  int frames = 0;        // >= 0; 0: as many as the scene needs (300 at 30 Hz; loop, twins, corridor 900; building 6000)
+  double rate = 30;      // [Hz] 1 ... 60; the motion is the same in seconds
+  double dropouts = 0;   // 0 ... 0.9, share of the frames that is missing, singly and in bursts; never the first
+  bool flicker = false;  // exposure jumps, lamps at 100 Hz
+  double stand_still = 0;         // [s] 0 ... 3600; people stand from the start, half of them in view, then walk off
   int people = -1;                // 0 ... 30 walkers; -1: as many as the scene has by itself
   uint64_t seed = 1;              // of everything random: furniture, people, tremor, noise
   int width = 640, height = 480;  // [px] 64 ... 4096; the field of view stays that of a Kinect (fx = 525 at 640)
@@ -36,7 +40,7 @@ struct SimulatorOptions {
   void check() const;  // throws InvalidOption
 };
 
-// room crowd loop spin rush straight cover chair twins
+// room crowd loop spin rush straight cover chair twins corridor dim building
 const std::vector<std::string>& simulator_scenes();
 
 // What moves by itself, as seen in one frame.
@@ -49,7 +53,7 @@ struct SimulatedMover {
 };
 
 struct SimulatedFrame {
-  int index = 0;
+  int index = 0;                   // in the sequence as it is written
   std::string stamp, depth_stamp;  // [s] with 6 decimals
   RgbdImage image;                 // as the sensor gives it; the depth is that of the 16-bit file, exactly
   GreyImage mask;                  // 255 = mover, at the middle of the exposure
