@@ -194,7 +194,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
     if (!scene.mask.at(at.x(), at.y())) continue;
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
-    if (options_.noise.same_surface(depth(x, y), point.depth) &&
+    if (std::abs(depth(x, y) - point.depth) <= options_.noise.point_tolerance(point.depth) &&
         !std::binary_search(matched.begin(), matched.end(), point.id))
       on_mover.push_back(point.id);
   }
