@@ -18,11 +18,10 @@ namespace {
 constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed after so long
 
 Viewer* open_viewer(const ViewerOptions& options) {
+  const auto open =
+      reinterpret_cast<OpenViewer>(viewer_symbol(kOpenViewerSymbol, options.port ? "--viewer" : "--record"));
   std::string reason;
-  const Module module{"libdkb_viewer.so", DKB_MODULE_LIBDIR, {DKB_VIEWER_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
-  void* symbol = module_symbol(module, kOpenViewerSymbol, &reason);
-  if (symbol == nullptr) throw InputError("--viewer: this build has no live page (" + reason + ")");
-  Viewer* viewer = reinterpret_cast<OpenViewer>(symbol)(options, &reason);
+  Viewer* viewer = open(options, &reason);
   if (viewer == nullptr) throw InputError(reason);
   return viewer;
 }
@@ -42,6 +41,15 @@ std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
 }
 
 }  // namespace
+
+void* viewer_symbol(const char* name, const std::string& what) {
+  std::string reason;
+  const Module module{"libdkb_viewer.so", DKB_MODULE_LIBDIR, {DKB_VIEWER_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
+  void* symbol = module_symbol(module, name, &reason);
+  if (symbol == nullptr)
+    throw InputError(what + ": this build has no libdkb_viewer.so (" + reason + "); install it beside the library");
+  return symbol;
+}
 
 std::vector<std::string> with_default_port(int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
@@ -66,10 +74,11 @@ void add_viewer_options(CLI::App& command, ViewerArguments& args) {
 
 RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name,
                      const Options& options, fs::path out)
-    : exit_(args.exit), out_(std::move(out)) {
+    : serves_(args.on), exit_(args.exit), out_(std::move(out)) {
   ViewerOptions o;
   o.host = args.host;
-  o.port = args.port;
+  o.port = args.on ? std::optional(args.port) : std::nullopt;
+  if (args.record) o.record = out_ / "session.dkbs";
   o.description = source.description();
   o.camera = source.camera();
   o.frames = source.size();
@@ -77,6 +86,7 @@ RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const st
   o.realtime = options.realtime;
   o.truth = truth_beside(source_name);
   viewer_.reset(open_viewer(o));
+  if (!serves_) return;
   fmt::print(stderr, "viewer: {}\n", viewer_->url());
   std::fflush(stderr);
 }
@@ -104,8 +114,8 @@ void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, s
 }
 
 void RunViewer::serve_on(const Slam& slam, bool quiet) {
-  viewer_->ended();
-  if (exit_ || Interrupt::happened()) return;
+  viewer_->ended(slam.map());
+  if (!serves_ || exit_ || Interrupt::happened()) return;
   if (!quiet) fmt::print("the page is served until Ctrl-C\n");
   while (!Interrupt::happened()) {
     save_if_asked(slam);

@@ -23,6 +23,8 @@ export class View {
   readonly controls: OrbitControls;
   mode: Mode = "follow";
   onMode: () => void = () => {};
+  onLead: () => void = () => {}; // a visitor turns this one
+  leader: View | null = null; // looks at what that one looks at
   onMeasure: (text: string) => void = () => {};
   private scene = new THREE.Scene();
   private poses = new Poses();
@@ -60,7 +62,10 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.target.set(0, 0, 1);
     this.controls.enableDamping = !this.still.matches;
-    this.controls.addEventListener("start", () => this.setMode("free"));
+    this.controls.addEventListener("start", () => {
+      this.onLead();
+      this.setMode("free");
+    });
     this.controls.addEventListener("change", () => {
       this.movedAt = performance.now();
       this.dirty = true;
@@ -270,6 +275,7 @@ export class View {
   }
   // The camera turned, moved or brought nearer, by keys.
   turn(across: number, down: number): void {
+    this.onLead();
     this.setMode("free");
     const away = this.camera.position.clone().sub(this.controls.target);
     away.applyAxisAngle(this.camera.up, -across);
@@ -281,6 +287,7 @@ export class View {
     this.controls.update();
   }
   nearer(factor: number): void {
+    this.onLead();
     this.setMode("free");
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
     this.controls.update();
@@ -341,6 +348,15 @@ export class View {
     }
     this.staleKeyframes = this.staleEdges = false;
   }
+  private copyLeader(): void {
+    const { camera, controls } = this.leader!;
+    if (this.camera.position.equals(camera.position) && this.controls.target.equals(controls.target)) return;
+    this.camera.position.copy(camera.position);
+    this.camera.quaternion.copy(camera.quaternion);
+    this.controls.target.copy(controls.target);
+    this.movedAt = performance.now();
+    this.dirty = true;
+  }
   private follow(): void {
     if (this.mode !== "follow" || !this.cameraPose) return;
     const at = new THREE.Vector3(0, 0, 1.0).applyMatrix4(this.cameraPose);
@@ -354,8 +370,11 @@ export class View {
   private draw(): void {
     const now = performance.now();
     if (now - this.lastDrawn < 15) return;
-    this.follow();
-    this.controls.update();
+    if (this.leader) this.copyLeader();
+    else {
+      this.follow();
+      this.controls.update();
+    }
     if (this.poses.step()) this.dirty = true;
     const moving = now - this.movedAt < 250;
     if (!this.dirty && (moving || !this.coarse)) return;

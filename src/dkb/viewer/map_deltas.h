@@ -31,6 +31,8 @@ enum class StreamMessage : uint8_t {
   image = 10,        // uint32 frame, uint32 0 colour or 1 depth, JPEG
   truth = 11,        // {float32 time, x, y, z}: the whole of it
   path_reset = 12,   // empty: the path comes anew
+  moment = 13,       // of files: "DKBS"; uint32 flags (session_file.h); float64 seconds since the first frame; int32
+                     // frame; uint32 bytes of the messages that follow and belong to it
 };
 
 // Appends numbers as they lie in memory, which is little-endian on all machines this runs on.
@@ -93,6 +95,7 @@ class MapDeltas {
   bool write(Client& client, StreamWriter& out, size_t budget) const;
 
   double unit() const { return unit_; }  // [m]
+  int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
 
  private:
   struct Keyframe {

@@ -40,13 +40,17 @@ void SessionHistory::add(SessionEvent event) {
   ++events_gone_;
 }
 
+double SessionHistory::seconds_of(int64_t stamp_ns) const {
+  return first_stamp_ ? static_cast<double>(stamp_ns - *first_stamp_) * 1e-9 : 0;
+}
+
 void SessionHistory::clear_path() {
   path_.clear();
   last_on_path_.reset();
   ++path_generation_;
 }
 
-void SessionHistory::write(Client& client, StreamWriter& out) const {
+void SessionHistory::write(Client& client, StreamWriter& out, int keyframes) const {
   out.message(StreamMessage::facts, [&](StreamWriter& m) {
     client.facts = std::max(client.facts, facts_gone_);
     for (; client.facts - facts_gone_ < facts_.size(); ++client.facts) {
@@ -54,7 +58,7 @@ void SessionHistory::write(Client& client, StreamWriter& out) const {
       m.put(static_cast<uint32_t>(f.frame));
       m.put(f.tracking_ms);
       m.put(f.waiting_ms);
-      m.put(static_cast<float>(static_cast<double>(f.stamp_ns - *first_stamp_) * 1e-9));
+      m.put(static_cast<float>(seconds_of(f.stamp_ns)));
       m.put(f.inliers);
       m.put(static_cast<uint8_t>(f.state));
       m.put<uint8_t>(f.made_keyframe ? 1 : 0);
@@ -66,7 +70,7 @@ void SessionHistory::write(Client& client, StreamWriter& out) const {
     client.path = 0;
   }
   out.message(StreamMessage::path, [&](StreamWriter& m) {
-    for (; client.path < path_.size(); ++client.path) {
+    for (; client.path < path_.size() && path_[client.path].host < keyframes; ++client.path) {
       const PathPoint& p = path_[client.path];
       m.put(static_cast<uint32_t>(p.frame));
       m.put<int32_t>(p.host);
@@ -78,7 +82,7 @@ void SessionHistory::write(Client& client, StreamWriter& out) const {
     nlohmann::json list = nlohmann::json::array();
     for (; client.events - events_gone_ < events_.size(); ++client.events) {
       const SessionEvent& e = events_[client.events - events_gone_];
-      list.push_back({{"kind", e.kind}, {"frame", e.frame}, {"text", e.text}});
+      list.push_back({{"kind", e.kind}, {"frame", e.frame}, {"text", e.text}, {"time", seconds_of(e.stamp_ns)}});
     }
     out.message(StreamMessage::events, [&](StreamWriter& m) {
       m.put_bytes(list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -30,6 +30,7 @@ struct FrameFact {
 struct SessionEvent {
   std::string kind, text;
   int frame = 0;
+  int64_t stamp_ns = 0;  // of it
 };
 
 // The session so far as a late client is told it. Bounded however long it lasts: the charts reach back ten minutes, the
@@ -46,9 +47,11 @@ class SessionHistory {
     uint64_t facts = 0, events = 0, path_generation = 0;
     size_t path = 0;
   };
-  // Writes what the client does not know.
-  void write(Client& client, StreamWriter& out) const;
+  // Writes what the client does not know; of the path up to what hangs on the first `keyframes` keyframes, which the
+  // client knows.
+  void write(Client& client, StreamWriter& out, int keyframes) const;
 
+  double seconds_of(int64_t stamp_ns) const;  // since the first frame
   size_t path_size() const { return path_.size(); }
   // The motion from the truth's world to the map's that brings the path and the truth together; nothing before there
   // are enough positions of the same time.

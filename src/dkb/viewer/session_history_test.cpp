@@ -17,14 +17,14 @@ FrameFact fact(int frame, double x) {
 }
 size_t bytes_for(const SessionHistory& history, SessionHistory::Client& client) {
   StreamWriter out;
-  history.write(client, out);
+  history.write(client, out, 1);
   return out.size();
 }
 
 TEST(SessionHistory, TellsEachClientOnce) {
   SessionHistory history;
   for (int i = 0; i < 100; ++i) history.add(fact(i, 0.1 * i));
-  history.add(SessionEvent{"note", "hello", 3});
+  history.add(SessionEvent{"note", "hello", 3, 0});
   SessionHistory::Client client;
   EXPECT_GT(bytes_for(history, client), 100U * (20 + 20));
   EXPECT_EQ(bytes_for(history, client), 0U);
@@ -37,7 +37,7 @@ TEST(SessionHistory, StaysBoundedOverADay) {
   SessionHistory::Client early;
   for (int i = 0; i < 24 * 3600 * 30; ++i) {
     history.add(fact(i, 0.02 * (i % 100000)));
-    if (i % 100 == 0) history.add(SessionEvent{"keyframe", "", i});
+    if (i % 100 == 0) history.add(SessionEvent{"keyframe", "", i, 0});
     if (i == 50) bytes_for(history, early);
   }
   EXPECT_LT(history.path_size(), SessionHistory::kPath);

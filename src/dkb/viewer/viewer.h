@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -18,7 +19,8 @@ namespace dkb {
 
 struct ViewerOptions {
   std::string host = "127.0.0.1";  // to bind; anything but a loopback name asks every visitor for a token
-  int port = 8090;                 // 0 = any free one
+  std::optional<int> port = 8090;  // 0 = any free one; nothing = no page
+  std::filesystem::path record;    // file to write the session to; empty = none
   std::string description;         // of what is shown, one line
   Camera camera;
   std::optional<size_t> frames;    // of the source, where it knows
@@ -31,18 +33,18 @@ struct ViewerOptions {
   std::vector<TruePosition> truth;  // by stamp; may be empty
 };
 
-// A live page in the browser: a web server on a thread of its own that is shown every frame's result. It lives in a
-// module, libdkb_viewer.so, that a run without it never loads. One thread feeds.
+// A live page in the browser, a recording of the session, or both, each on a thread of its own, told every frame's
+// result. It lives in a module, libdkb_viewer.so, that a run without it never loads. One thread feeds.
 class Viewer {
  public:
   virtual ~Viewer() = default;
-  virtual std::string url() const = 0;  // to open; holds the token where one is asked for
+  virtual std::string url() const = 0;  // to open; holds the token where one is asked for; empty without a page
 
   // A frame of the source, and what came of it. Hands over and returns: of frames that come faster than clients take
-  // them, the newest is shown.
+  // them, the newest is shown. Only a recording that is not in real time takes every frame, and may keep this waiting.
   virtual void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events) = 0;
   virtual void say(const std::string& line) = 0;  // one line for the list of events
-  virtual void ended() = 0;                       // there will be no further frame
+  virtual void ended(MapSnapshot map) = 0;        // there will be no further frame; the map as it is at the end
 
   // What visitors ask for. The feeding thread calls wait_turn() before each frame: true when it may go on; false when
   // the session is still paused after `patience`.
