@@ -20,8 +20,8 @@ function wish(w: Wish): void {
 function lead(view: View): void {
   for (const p of panels) p.view.leader = p.view === view ? null : view;
 }
-function addPanel(head: HTMLElement, openEvent: ConstructorParameters<typeof Panel>[3]): Panel {
-  const panel = new Panel(document.querySelector("main")!, head, panels.length, openEvent);
+function addPanel(head: HTMLElement, name: string, openEvent: ConstructorParameters<typeof Panel>[4]): Panel {
+  const panel = new Panel(document.querySelector("main")!, head, panels.length, name, openEvent);
   panels.push(panel);
   panel.onWish = wish;
   panel.view.onLead = () => lead(panel.view);
@@ -97,7 +97,7 @@ document.addEventListener("keydown", (e) => {
 
 // --- a running session
 function showLive(): void {
-  const panel = addPanel(at("title"), null);
+  const panel = addPanel(at("title"), "", null);
   panel.onState = () => {
     const s = panel.state!;
     at("pause").textContent = s.paused ? "Resume" : "Pause";
@@ -142,7 +142,7 @@ async function showReplay(): Promise<void> {
   document.body.classList.toggle("compare", compare);
   if (compare) at("title").textContent = "two runs, the same time and the same view";
   const players = list.map((info, n) => {
-    const panel = addPanel(compare ? document.querySelector("main")! : at("title"), (e) => transport!.seek(e.time));
+    const panel = addPanel(compare ? document.querySelector("main")! : at("title"), info.name, (e) => transport!.seek(e.time));
     return new Player(n, info, panel);
   });
   lead(panels[0].view);

@@ -39,8 +39,8 @@ export class Panel {
   private measuring = false;
   private roots: HTMLElement[];
 
-  // `openEvent`: nothing = an event leads to where the camera was.
-  constructor(main: HTMLElement, head: HTMLElement, private number: number, openEvent: ((e: SessionEvent) => void) | null) {
+  // `name`: of a recorded session, else empty. `openEvent`: nothing = an event leads to where the camera was.
+  constructor(main: HTMLElement, head: HTMLElement, private number: number, name: string, openEvent: ((e: SessionEvent) => void) | null) {
     const copy = (id: string) => (document.getElementById(id + "-template") as HTMLTemplateElement).content.firstElementChild!.cloneNode(true) as HTMLElement;
     const root = copy("panel"), headRoot = copy("head");
     this.roots = [root, headRoot];
@@ -49,6 +49,8 @@ export class Panel {
     // The first panel's parts have names of their own, for links and tests.
     if (number === 0) for (const r of this.roots) for (const e of r.querySelectorAll<HTMLElement>("[class]"))
       if (!document.getElementById(e.classList[0])) e.id = e.classList[0];
+    this.at("name").textContent = name;
+    this.at("name").hidden = name === "";
     this.view = new View(this.at<HTMLCanvasElement>("view"), this.at("labels"));
     this.picture = new Picture(this.at<HTMLCanvasElement>("picture"));
     this.charts = new Charts(this.at("time"), this.at("points"));

@@ -41,10 +41,12 @@ export class Transport {
     this.goal = { time: Math.max(0, Math.min(time, this.duration)), before };
     this.stepping = false;
     for (const p of this.players) p.seek(this.goal.time, before);
+    this.show();
   }
   step(): void {
     this.playing = false;
     this.stepping = true;
+    this.show();
   }
   back(): void {
     this.playing = false;

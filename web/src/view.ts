@@ -398,6 +398,7 @@ export class View {
     data.points = String(this.cloud.points);
     data.cloudCalls = String(this.cloud.drawCalls);
     data.calls = String(this.renderer.info.render.calls);
+    data.look = this.camera.position.toArray().map((x) => x.toFixed(3)).join(" ");
     data.drawn = String(Number(data.drawn ?? 0) + 1);
   }
   private label(): void {
