@@ -8,7 +8,6 @@
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/module.h"
 #include "interrupt.h"
 
 namespace dkb {
@@ -16,15 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed after so long
-
-Viewer* open_viewer(const ViewerOptions& options) {
-  const auto open =
-      reinterpret_cast<OpenViewer>(viewer_symbol(kOpenViewerSymbol, options.port ? "--viewer" : "--record"));
-  std::string reason;
-  Viewer* viewer = open(options, &reason);
-  if (viewer == nullptr) throw InputError(reason);
-  return viewer;
-}
 
 std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
   std::vector<ViewerOptions::TruePosition> truth;
@@ -41,15 +31,6 @@ std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
 }
 
 }  // namespace
-
-void* viewer_symbol(const char* name, const std::string& what) {
-  std::string reason;
-  const Module module{"libdkb_viewer.so", DKB_MODULE_LIBDIR, {DKB_VIEWER_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
-  void* symbol = module_symbol(module, name, &reason);
-  if (symbol == nullptr)
-    throw InputError(what + ": this build has no libdkb_viewer.so (" + reason + "); install it beside the library");
-  return symbol;
-}
 
 std::vector<std::string> with_default_port(int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
@@ -85,7 +66,7 @@ RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const st
   if (o.camera.fps > 0) o.budget_ms = 1000 / o.camera.fps;
   o.realtime = options.realtime;
   o.truth = truth_beside(source_name);
-  viewer_.reset(open_viewer(o));
+  viewer_ = open_viewer(o);
   if (!serves_) return;
   fmt::print(stderr, "viewer: {}\n", viewer_->url());
   std::fflush(stderr);
@@ -111,6 +92,7 @@ void RunViewer::wait_turn(const Slam& slam, const std::function<void(bool)>& hol
 
 void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events) {
   viewer_->show(std::move(result), frame, slam.map(), std::move(events));
+  if (slam.options().dense_map && viewer_->wants_dense_map()) viewer_->show_dense_map(slam.dense_map_task());
 }
 
 void RunViewer::serve_on(const Slam& slam, bool quiet) {

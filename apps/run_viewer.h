@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "dkb/viewer/viewer.h"
 #include "dkb_slam/source.h"
+#include "dkb_slam/viewer.h"
 
 namespace dkb {
 
@@ -22,9 +22,6 @@ struct ViewerArguments {
 void add_viewer_options(CLI::App& command, ViewerArguments& args);
 // The words of a command line, the port put in where `--viewer` stands without one.
 std::vector<std::string> with_default_port(int argc, char** argv);
-
-// A symbol of the page's module. Throws InputError, which begins with `what` needs it.
-void* viewer_symbol(const char* name, const std::string& what);
 
 // The live page of one run, the recording of its session in `out`, or both.
 class RunViewer {

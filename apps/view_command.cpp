@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "dkb/slam/viewer_module.h"
 #include "dkb/util/errors.h"
 #include "dkb/viewer/replay.h"
 #include "interrupt.h"
-#include "run_viewer.h"
 
 namespace dkb {
 namespace {

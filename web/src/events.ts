@@ -2,11 +2,11 @@
 // The list of events, the newest first. A click leads to the event.
 export type SessionEvent = { kind: string; frame: number; text: string; time: number };
 
-const most = 300;
+const most = 300, mostKept = 2000; // rows
 
 export class EventList {
   private known = new Map<string, { event: SessionEvent; row: HTMLElement }>();
-  private now = Infinity;
+  private now = 0;
 
   // `keep`: of a recording, what is known of its future stays in the list.
   constructor(private list: HTMLElement, private keep: boolean, private hint: string, private open: (e: SessionEvent) => void) {}
@@ -21,16 +21,19 @@ export class EventList {
       const key = `${e.frame} ${e.kind} ${e.text}`;
       if (this.known.has(key)) continue;
       const row = this.row(e);
+      row.dataset.key = key;
       // Mostly it is the newest.
       let before = this.list.firstElementChild as HTMLElement | null;
       while (before && Number(before.dataset.frame) > e.frame) before = before.nextElementSibling as HTMLElement | null;
       this.list.insertBefore(row, before);
       this.known.set(key, { event: e, row });
     }
-    while (!this.keep && this.known.size > most) {
-      const [oldest, { row }] = this.known.entries().next().value!;
-      row.remove();
-      this.known.delete(oldest);
+    // The oldest goes; of a recording what is furthest from the time that is shown.
+    while (this.known.size > (this.keep ? mostKept : most)) {
+      const newest = this.list.firstElementChild as HTMLElement, oldest = this.list.lastElementChild as HTMLElement;
+      const gone = this.keep && Number(newest.dataset.time) - this.now > this.now - Number(oldest.dataset.time) ? newest : oldest;
+      gone.remove();
+      this.known.delete(gone.dataset.key!);
     }
   }
   // Of a recording: what is not yet is shown so.
@@ -49,6 +52,7 @@ export class EventList {
     button.title = `${words}\n(${this.hint})`;
     button.onclick = () => this.open(e);
     row.dataset.frame = String(e.frame);
+    row.dataset.time = String(e.time);
     row.append(button);
     return row;
   }

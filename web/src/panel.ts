@@ -13,7 +13,7 @@ export type State = {
 
 const layerColours: Record<Layer, string> = {
   points: "var(--text)", keyframes: "var(--keyframe)", covisibility: "var(--covisibility)", path: "var(--path)",
-  movers: "var(--mover)", truth: "var(--truth)", loops: "var(--loop)",
+  movers: "var(--mover)", truth: "var(--truth)", loops: "var(--loop)", surface: "var(--text)", grid: "var(--flow)",
 };
 const marks: Record<string, string> = { used: "○", outlier: "×", dynamic: "□", unused: "·" };
 const modes: Mode[] = ["follow", "free", "top"];
@@ -53,10 +53,11 @@ export class Panel {
     this.at("name").hidden = name === "";
     this.view = new View(this.at<HTMLCanvasElement>("view"), this.at("labels"));
     this.picture = new Picture(this.at<HTMLCanvasElement>("picture"));
-    this.charts = new Charts(this.at("time"), this.at("points"));
+    this.charts = new Charts(this.at("time"), this.at("points"), this.at("stages"), this.at("rules"));
     this.events = new EventList(this.at("events"), openEvent !== null, openEvent ? "goes to its time" : "shows where the camera was",
       openEvent ?? ((e) => this.view.jumpTo(e.frame)));
     layers.forEach((layer, i) => this.checkbox("layers", "layer", layer, `${i + 1} ${layer}`, layerColours[layer], true));
+    this.showLayers(["surface", "grid"], false);
     for (const kind of [...features, "mask", "boxes"])
       this.checkbox("overlays", "overlay", kind, kind, `var(--${kind === "mask" || kind === "boxes" ? "mover" : kind})`, this.picture.shown.has(kind));
     this.checkbox("overlays", "overlay", "depth", "depth", "var(--text)", false);
@@ -93,6 +94,10 @@ export class Panel {
     label.append(box, shown);
     this.at(parent).append(label);
     this.boxes.set(`${what}-${name}`, box);
+  }
+  // Layers of which there is nothing are not offered.
+  private showLayers(names: Layer[], on: boolean): void {
+    for (const name of names) this.boxes.get("layer-" + name)!.parentElement!.hidden = !on;
   }
   click(box: string): void {
     this.boxes.get(box)!.click();
@@ -151,7 +156,7 @@ export class Panel {
         this.picture.begin(hello.camera.width, hello.camera.height);
         this.charts.begin(hello.budget_ms);
         this.at("source").textContent = hello.source;
-        this.at("budget").textContent = `dashed: ${hello.budget_ms.toFixed(0)} ms, the frame's budget`;
+        this.showLayers(["surface", "grid"], false);
         this.events.begin();
         break;
       }
@@ -162,7 +167,22 @@ export class Panel {
       case Kind.path: this.view.takePath(data); break;
       case Kind.pathReset: this.view.clearPath(); break;
       case Kind.facts: this.charts.take(data); break;
-      case Kind.events: this.events.take(json(data)); break;
+      case Kind.stageNames: this.charts.takeStageNames(json(data)); break;
+      case Kind.stages: this.charts.takeStages(data); break;
+      case Kind.surface:
+        this.view.takeSurface(data);
+        this.showLayers(["surface"], true);
+        break;
+      case Kind.grid:
+        this.view.takeGrid(data);
+        this.showLayers(["grid"], true);
+        break;
+      case Kind.events: {
+        const events = json(data) as SessionEvent[];
+        this.events.take(events);
+        this.charts.takeEvents(events);
+        break;
+      }
       case Kind.truth: this.view.takeTruth(data); break;
       case Kind.image: void this.picture.takeImage(data); break;
       case Kind.frame: {
@@ -173,6 +193,8 @@ export class Panel {
         this.picture.take(new DataView(data.buffer, data.byteOffset + 4 + length, data.byteLength - 4 - length), frame.movers, frame.boxes);
         for (const kind of features)
           this.boxes.get("overlay-" + kind)!.nextElementSibling!.textContent = `${marks[kind]} ${kind} ${this.picture.counts[kind] ?? 0}`;
+        this.boxes.get("overlay-dynamic")!.parentElement!.title = this.boxes.get("overlay-outlier")!.parentElement!.title =
+          ["on a mover", "moved", "disagrees"].map((r) => `${r} ${this.picture.counts[r] ?? 0}`).join(", ");
         this.at("decision").textContent = frame.explanation;
         break;
       }

@@ -10,7 +10,7 @@ export type Hello = {
   camera: { width: number; height: number; fx: number; fy: number; cx: number; cy: number };
 };
 export type Mode = "follow" | "free" | "top";
-export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops"] as const;
+export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops", "surface", "grid"] as const;
 export type Layer = (typeof layers)[number];
 
 const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
@@ -36,6 +36,8 @@ export class View {
   private truth = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private frustum = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private movers = new THREE.Group();
+  private surface = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }));
+  private grid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true, side: THREE.DoubleSide, depthWrite: false }));
   private marker = new THREE.Group();
   private labels: HTMLDivElement[] = [];
   private known = new Map<number, { frame: number; culled: boolean }>();
@@ -79,7 +81,8 @@ export class View {
     this.truth.matrixAutoUpdate = this.frustum.matrixAutoUpdate = false;
     this.truth.visible = false;
     this.scene.add(this.cloud.group, this.keyframes.object, this.covisibility.object, this.path.object,
-      this.loops.object, this.truth, this.frustum, this.movers, this.marker);
+      this.loops.object, this.truth, this.frustum, this.movers, this.marker, this.surface, this.grid);
+    this.surface.visible = this.grid.visible = this.grid.matrixAutoUpdate = false;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     const loop = () => {
       requestAnimationFrame(loop);
@@ -102,7 +105,7 @@ export class View {
     this.known.clear();
     this.edges.clear();
     this.clearPath();
-    this.truth.visible = false;
+    this.truth.visible = this.surface.visible = this.grid.visible = false;
     const c = hello.camera, z = 0.16;
     const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
     const corners = [corner(0, 0), corner(c.width, 0), corner(c.width, c.height), corner(0, c.height)];
@@ -176,6 +179,46 @@ export class View {
       for (let k = 1; k < 4; k++) points.push(data.getFloat32(at + 4 * k, true));
     this.truth.geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
   }
+  // The dense map's surface, in the world.
+  takeSurface(data: DataView): void {
+    const middle = [0, 4, 8].map((at) => data.getFloat32(at, true)), unit = data.getFloat32(12, true);
+    const n = data.getUint32(16, true), triangles = data.getUint32(20, true);
+    const position = new Float32Array(3 * n), colour = new Uint8Array(4 * n), index = new Uint16Array(3 * triangles);
+    for (let i = 0; i < 3 * n; i++) position[i] = middle[i % 3] + unit * data.getInt16(24 + 2 * i, true);
+    let at = 24 + 4 * Math.ceil((6 * n) / 4);
+    colour.set(new Uint8Array(data.buffer, data.byteOffset + at, 4 * n));
+    at += 4 * n;
+    for (let i = 0; i < 3 * triangles; i++) index[i] = data.getUint16(at + 2 * i, true);
+    this.surface.geometry.dispose();
+    const geometry = (this.surface.geometry = new THREE.BufferGeometry());
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colour, 4, true));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    this.surface.visible = !this.hidden.has("surface");
+    this.dirty = true;
+  }
+  // Where a robot can drive, on the floor: free is green, occupied orange, unknown nothing.
+  takeGrid(data: DataView): void {
+    const f = (i: number) => data.getFloat32(4 * i, true);
+    const [cell, x, y] = [f(0), f(1), f(2)], w = data.getUint32(40, true), h = data.getUint32(44, true);
+    const pixels = new Uint8Array(4 * w * h);
+    for (let at = 48, i = 0; at + 4 <= data.byteLength; at += 4) {
+      const end = Math.min(w * h, i + data.getUint16(at, true)), value = data.getUint16(at + 2, true);
+      for (; i < end; i++) pixels.set(value === 0 ? [230, 110, 0, 230] : value === 254 ? [0, 158, 115, 90] : [0, 0, 0, 0], 4 * i);
+    }
+    this.grid.material.map?.dispose();
+    const texture = (this.grid.material.map = new THREE.DataTexture(pixels, w, h));
+    texture.needsUpdate = this.grid.material.needsUpdate = true;
+    this.grid.geometry.dispose();
+    const geometry = (this.grid.geometry = new THREE.BufferGeometry());
+    const [right, top] = [x + w * cell, y + h * cell];
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute([x, y, 0, right, y, 0, right, top, 0, x, top, 0], 3));
+    geometry.setAttribute("uv", new THREE.Float32BufferAttribute([0, 1, 1, 1, 1, 0, 0, 0], 2)); // the first row is the top
+    geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    this.grid.matrix.copy(this.matrix([f(3), f(4), f(5), f(6), f(7), f(8), f(9)]).invert());
+    this.grid.visible = !this.hidden.has("grid");
+    this.dirty = true;
+  }
   private matrix(pose: number[]): THREE.Matrix4 {
     return new THREE.Matrix4().compose(new THREE.Vector3(pose[4], pose[5], pose[6]),
       new THREE.Quaternion(pose[0], pose[1], pose[2], pose[3]), new THREE.Vector3(1, 1, 1));
@@ -213,9 +256,10 @@ export class View {
     else this.hidden.add(layer);
     const objects: Record<Layer, THREE.Object3D> = {
       points: this.cloud.group, keyframes: this.keyframes.object, covisibility: this.covisibility.object,
-      path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object,
+      path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object, surface: this.surface, grid: this.grid,
     };
-    objects[layer].visible = on;
+    const empty = (layer === "surface" || layer === "grid") && !(objects[layer] as THREE.Mesh).geometry.index;
+    objects[layer].visible = on && !empty;
     this.dirty = true;
   }
   setMode(mode: Mode): void {
@@ -384,8 +428,8 @@ export class View {
     this.coarse = moving && this.cloud.points > this.budget;
     this.render(moving ? this.budget : Infinity);
     // A coarser map where the machine does not keep up, a finer one where it does.
-    if (moving && interval > 40 && interval < 500) this.budget = Math.max(10000, this.budget * 0.9);
-    if (moving && interval < 25) this.budget = Math.min(4e6, this.budget * 1.03);
+    if (moving && interval > 31 && interval < 500) this.budget = Math.max(10000, this.budget * 0.9);
+    if (moving && interval < 22) this.budget = Math.min(4e6, this.budget * 1.03);
   }
   private render(points: number): void {
     this.rebuild();

@@ -4,12 +4,15 @@
 
 Writes OUT_FOLDER/odom.txt, the odometry in TUM format, and OUT_FOLDER/figures.txt, the last diagnostics.
 """
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -51,6 +54,14 @@ def wait_for(condition, seconds=60):
                 return True
         time.sleep(0.05)
     return False
+
+
+def page_answers(folder):
+    """Whether the page whose address the node or the nodelets' manager has logged tells of frames."""
+    logs = [os.path.join(folder, name) for name in ("manager.log", "node.log")]
+    with open(max(filter(os.path.exists, logs), key=os.path.getmtime)) as log:
+        address = re.findall(r"viewer: (http://\S+/)", log.read())
+    return bool(address) and json.load(urllib.request.urlopen(address[-1] + "api/state", timeout=10))["frame"] >= 0
 
 
 def call(name, kind, *arguments):
@@ -111,6 +122,8 @@ def main():
     with open(out + "/figures.txt", "w") as file:
         for status in busy:
             file.write("; ".join(f"{v.key} {v.value}" for v in status.values) + "\n")
+
+    expect(page_answers(out), "the live page answers")
 
     map_file = os.path.abspath(out + "/map.dkb")
     expect(call("save_map", MapFile, map_file) and os.path.getsize(map_file) > 1000, "save_map")

@@ -53,7 +53,7 @@ python3 - "$depth_factor" <<'PARAMETERS'
 import sys
 import rospy
 rospy.set_param("/dkb_slam", {"base_from_cam": [0, 0, 0, -0.5, 0.5, -0.5, 0.5], "depth_factor": float(sys.argv[1]),
-                              "features": {"count": 900}, "grid_period": 2.0,
+                              "features": {"count": 900}, "grid_period": 2.0, "viewer_port": 0,
                               "queue_size": 200})  # no machine is too slow for the test
 PARAMETERS
 "$work/build/devel/lib/dkb_slam_ros/dkb_slam_node" "${remaps[@]}" >"$work/node.log" 2>&1 &

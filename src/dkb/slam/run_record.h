@@ -26,6 +26,9 @@ class RunRecord {
   // What the stages beside tracking have counted by now, and the durations since they were asked last.
   void add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times);
 
+  // The durations that came since they were asked for last, by stage.
+  std::vector<StageTime> take_news();
+
   MapSnapshot map() const;
   // A frame hangs on a keyframe, since the world may still move; or as it was published.
   std::vector<TrajectoryFrame> trajectory(bool online) const;
@@ -45,7 +48,7 @@ class RunRecord {
   TrackingMap map_;
   Statistics counts_;
   KeyframeTestCounts tests_;
-  StageTimes times_;
+  StageTimes times_, news_;
 };
 
 }  // namespace dkb

@@ -5,6 +5,8 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "dkb/util/thread_priority.h"
+#include "dkb/viewer/dense_messages.h"
 #include "dkb/viewer/page_files.h"
 
 namespace dkb {
@@ -47,6 +49,10 @@ Session::Session(const ViewerOptions& options) : realtime_(options.realtime), mo
   if (options.port) page_.emplace(options.host, *options.port, service);
 }
 
+Session::~Session() {
+  if (dense_.joinable()) dense_.join();
+}
+
 std::string Session::url() const {
   return page_ ? page_->url() : std::string();
 }
@@ -78,6 +84,38 @@ void Session::ended(MapSnapshot map) {
   model_.set_paused(false);
   model_.end(std::move(map));
   wake();
+}
+
+bool Session::wants_dense_map() const {
+  const std::lock_guard lock(dense_mutex_);
+  return !making_dense_ && std::chrono::steady_clock::now() >= next_dense_;
+}
+
+void Session::show_dense_map(std::function<DenseMap()> task) {
+  {
+    const std::lock_guard lock(dense_mutex_);
+    if (making_dense_) return;
+    making_dense_ = true;
+  }
+  if (dense_.joinable()) dense_.join();
+  dense_ = std::thread([this, task = std::move(task)] {
+    set_thread_priority(ThreadPriority::background);
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      std::string messages = dense_messages(task());
+      const auto lock = model_.hold();
+      model_.take_dense(std::move(messages));
+    } catch (const std::exception& e) {
+      model_.say(std::string("no dense map: ") + e.what());
+    }
+    const auto end = std::chrono::steady_clock::now();
+    {
+      const std::lock_guard lock(dense_mutex_);
+      making_dense_ = false;
+      next_dense_ = end + std::max<std::chrono::steady_clock::duration>(10 * (end - start), std::chrono::seconds(1));
+    }
+    wake();
+  });
 }
 
 bool Session::wait_turn(std::chrono::milliseconds patience) {
@@ -160,7 +198,7 @@ void Session::tick(size_t streams) {
 
 }  // namespace dkb
 
-extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_1(const dkb::ViewerOptions& options,
+extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_2(const dkb::ViewerOptions& options,
                                                                                  std::string* error) {
   try {
     return new dkb::Session(options);

@@ -7,8 +7,10 @@
 
 namespace dkb {
 
-void SessionHistory::add(const FrameFact& fact) {
+void SessionHistory::add(FrameFact fact) {
   if (!first_stamp_) first_stamp_ = fact.stamp_ns;
+  add_stages(fact);
+  fact.stages.clear();
   facts_.push_back(fact);
   if (facts_.size() > kFacts) {
     facts_.pop_front();
@@ -31,6 +33,41 @@ void SessionHistory::add(const FrameFact& fact) {
   path_.resize(std::min(kept, kPath / 2));
   spacing_ *= 2;
   ++path_generation_;
+}
+
+void SessionHistory::add_stages(const FrameFact& fact) {
+  StagesOfFrame of{fact.frame, static_cast<float>(seconds_of(fact.stamp_ns)), {}};
+  for (const StageTime& s : fact.stages) {
+    auto name = std::find(stage_names_.begin(), stage_names_.end(), s.stage);
+    if (name == stage_names_.end()) name = stage_names_.insert(name, s.stage);
+    of.times.emplace_back(static_cast<uint16_t>(name - stage_names_.begin()),
+                          static_cast<uint16_t>(std::clamp(50 * s.ms, 0.0F, 65535.0F)));
+  }
+  if (of.times.empty()) return;
+  stages_.push_back(std::move(of));
+  if (stages_.size() <= kStages) return;
+  stages_.pop_front();
+  ++stages_gone_;
+}
+
+void SessionHistory::write_stages(Client& client, StreamWriter& out) const {
+  if (client.stage_names < stage_names_.size()) {
+    client.stage_names = stage_names_.size();
+    out.message(StreamMessage::stage_names, [&](StreamWriter& m) { m.put_bytes(nlohmann::json(stage_names_).dump()); });
+  }
+  client.stages = std::max(client.stages, stages_gone_);
+  out.message(StreamMessage::stages, [&](StreamWriter& m) {
+    for (; client.stages - stages_gone_ < stages_.size(); ++client.stages) {
+      const StagesOfFrame& of = stages_[client.stages - stages_gone_];
+      m.put(static_cast<uint32_t>(of.frame));
+      m.put(of.seconds);
+      m.put(static_cast<uint32_t>(of.times.size()));
+      for (const auto& [stage, time] : of.times) {
+        m.put(stage);
+        m.put(time);
+      }
+    }
+  });
 }
 
 void SessionHistory::add(SessionEvent event) {
@@ -64,6 +101,7 @@ void SessionHistory::write(Client& client, StreamWriter& out, int keyframes) con
       m.put<uint8_t>(f.made_keyframe ? 1 : 0);
     }
   });
+  write_stages(client, out);
   if (client.path_generation != path_generation_) {
     if (client.path_generation != 0) out.empty_message(StreamMessage::path_reset);
     client.path_generation = path_generation_;

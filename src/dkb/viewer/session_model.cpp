@@ -48,6 +48,7 @@ FrameFact fact_of(const FrameResult& result, const MapSnapshot& map) {
   fact.inliers = static_cast<uint16_t>(std::clamp(result.inliers, 0, 65535));
   fact.state = result.state;
   fact.made_keyframe = result.keyframe;
+  fact.stages = result.stages;
   if (!result.world_from_cam || map.map() == nullptr || map.map()->keyframe_count() == 0) return fact;
   // The newest keyframes are not in the snapshot yet.
   fact.host = std::clamp(result.reference_keyframe, 0, map.map()->keyframe_count() - 1);
@@ -132,7 +133,7 @@ void SessionModel::take_in() {
     handover_.facts.clear();
     handover_.events.clear();
   }
-  for (const FrameFact& fact : taken.facts) history_.add(fact);
+  for (FrameFact& fact : taken.facts) history_.add(std::move(fact));
   for (SessionEvent& event : taken.events) history_.add(std::move(event));
   if (taken.latest != shown_ || taken.ended != ended_ || taken.paused != paused_) {
     // The pictures are still those of a frame that was only told to be paused.
@@ -152,7 +153,9 @@ void SessionModel::take_in() {
 void SessionModel::take_in_map(int rest) {
   const auto now = std::chrono::steady_clock::now();
   if (shown_ == nullptr || (!ended_ && now < map_taken_ + rest * map_cost_)) return;
+  const uint64_t world = map_.world();
   map_.update(shown_->map);
+  if (map_.world() != world) history_.clear_path();  // it hung on the keyframes of the world before
   map_taken_ = std::chrono::steady_clock::now();
   map_cost_ = map_taken_ - now;
 }
@@ -164,17 +167,24 @@ double SessionModel::seconds() const {
 void SessionModel::write(Client& client, StreamWriter& out, size_t budget) {
   if (map_.begun_anew(client.map)) {
     client.history = {};
-    client.frame = 0;
+    client.frame = client.dense = 0;
     out.message(StreamMessage::hello, [&](StreamWriter& m) { m.put_bytes(hello()); });
     write_truth(out);
   }
   map_.write(client.map, out, budget);
   history_.write(client.history, out, map_.keyframe_count());
+  if (client.dense != dense_number_) out.put_bytes(dense_);
+  client.dense = dense_number_;
   if (client.frame == shown_number_) return;
   client.frame = shown_number_;
   out.put_bytes(frame_message());
   if (client.images) out.put_bytes(image_message(false));
   if (client.depth) out.put_bytes(image_message(true));
+}
+
+void SessionModel::take_dense(std::string messages) {
+  dense_ = std::move(messages);
+  ++dense_number_;
 }
 
 void SessionModel::write_truth(StreamWriter& out) const {

@@ -11,7 +11,7 @@
 
 #include "dkb/viewer/map_deltas.h"
 #include "dkb/viewer/session_history.h"
-#include "dkb/viewer/viewer.h"
+#include "dkb_slam/viewer.h"
 
 namespace dkb {
 
@@ -37,9 +37,11 @@ class SessionModel {
   // a while to compare.
   void take_in_map(int rest);
 
+  void take_dense(std::string messages);  // dense_messages.h
+
   struct Client {
     bool images = false, depth = false;  // wanted
-    uint64_t frame = 0;
+    uint64_t frame = 0, dense = 0;
     MapDeltas::Client map = {};
     SessionHistory::Client history = {};
   };
@@ -87,6 +89,8 @@ class SessionModel {
   SessionHistory history_;
   std::optional<Rigid3> world_from_truth_;
   size_t aligned_at_ = 0;  // points of the path when it was computed
+  std::string dense_;
+  uint64_t dense_number_ = 0;
   std::string frame_message_, image_messages_[2];
 };
 

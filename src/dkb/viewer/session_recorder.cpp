@@ -85,7 +85,7 @@ bool SessionRecorder::write_news(bool last) {
     model_.take_in();
     model_.take_in_map(realtime_ ? 10 : 1);
     model_.write(client_, news, std::numeric_limits<size_t>::max());
-    seconds = model_.seconds();
+    seconds = seconds_ = std::max(seconds_, model_.seconds());  // a new world may begin with earlier stamps
     frame = model_.frame();
     ended = model_.ended();
     since_checkpoint_ += news.size();

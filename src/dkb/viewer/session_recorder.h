@@ -34,6 +34,7 @@ class SessionRecorder {
   const bool realtime_;
   File file_;
   SessionModel::Client client_;
+  double seconds_ = 0;
   size_t since_checkpoint_ = 0, checkpoint_size_ = 0;
 
   std::mutex mutex_;  // guards what follows
