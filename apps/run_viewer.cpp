@@ -96,6 +96,7 @@ void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, s
 }
 
 void RunViewer::serve_on(const Slam& slam, bool quiet) {
+  if (slam.options().dense_map && !Interrupt::happened()) viewer_->show_dense_map(slam.dense_map_task());
   viewer_->ended(slam.map());
   if (!serves_ || exit_ || Interrupt::happened()) return;
   if (!quiet) fmt::print("the page is served until Ctrl-C\n");

@@ -5,15 +5,16 @@ import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdtempSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
-import { delimiter, join } from "node:path";
+import { basename, delimiter, dirname, join, resolve } from "node:path";
 
 const [program, modules, sequence, out] = process.argv.slice(2);
 const { chromium: launcher } = createRequire(join(modules, "x.js"))("playwright-core");
 const executablePath = ["chromium-headless-shell", "chromium"]
   .flatMap((name) => (process.env.PATH ?? "").split(delimiter).map((folder) => join(folder, name))).find(existsSync);
 const work = mkdtempSync(join(tmpdir(), "dkb-pictures-"));
-for (const [name, more] of [["default", ["--dense", "--detector", "motion"]], ["orb", ["--preset", "orb"]]])
-  execFileSync(program, ["run", sequence, "--record", "--quiet", ...more, "--out", join(work, name)]);
+// The pictures tell the sequence's name and not where it lies.
+for (const [name, more] of [["default", ["--detector", "motion"]], ["orb", ["--preset", "orb"]]])
+  execFileSync(resolve(program), ["run", basename(sequence), "--record", "--quiet", ...more, "--out", join(work, name)], { cwd: dirname(resolve(sequence)) });
 
 const browser = await launcher.launch({ executablePath, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
 const servers = [];

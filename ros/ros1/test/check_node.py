@@ -6,7 +6,6 @@ Writes OUT_FOLDER/odom.txt, the odometry in TUM format, and OUT_FOLDER/figures.t
 """
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -56,12 +55,10 @@ def wait_for(condition, seconds=60):
     return False
 
 
-def page_answers(folder):
-    """Whether the page whose address the node or the nodelets' manager has logged tells of frames."""
-    logs = [os.path.join(folder, name) for name in ("manager.log", "node.log")]
-    with open(max(filter(os.path.exists, logs), key=os.path.getmtime)) as log:
-        address = re.findall(r"viewer: (http://\S+/)", log.read())
-    return bool(address) and json.load(urllib.request.urlopen(address[-1] + "api/state", timeout=10))["frame"] >= 0
+def page_answers():
+    address = f"http://127.0.0.1:{rospy.get_param('/dkb_slam/viewer_port')}/api/state"
+    with urllib.request.urlopen(address, timeout=10) as answer:
+        return json.load(answer)["frame"] >= 0
 
 
 def call(name, kind, *arguments):
@@ -123,7 +120,7 @@ def main():
         for status in busy:
             file.write("; ".join(f"{v.key} {v.value}" for v in status.values) + "\n")
 
-    expect(page_answers(out), "the live page answers")
+    expect(page_answers(), "the live page answers")
 
     map_file = os.path.abspath(out + "/map.dkb")
     expect(call("save_map", MapFile, map_file) and os.path.getsize(map_file) > 1000, "save_map")

@@ -75,6 +75,7 @@ void Session::say(const std::string& line) {
 }
 
 void Session::ended(MapSnapshot map) {
+  if (dense_.joinable()) dense_.join();  // so that a recording holds it
   {
     const std::lock_guard lock(mutex_);
     paused_ = false;
