@@ -24,7 +24,7 @@ const json = (data: DataView, from = 0, length = data.byteLength - from) => JSON
 // What a visitor asks of one panel holds for all of them.
 export type Wish =
   | { what: "layer"; name: Layer; on: boolean } | { what: "overlay"; name: string; on: boolean }
-  | { what: "mode"; mode: Mode } | { what: "measure"; on: boolean } | { what: "shoot" };
+  | { what: "offer"; layer: Layer } | { what: "mode"; mode: Mode } | { what: "measure"; on: boolean } | { what: "shoot" };
 
 export class Panel {
   readonly view: View;
@@ -57,7 +57,7 @@ export class Panel {
     this.events = new EventList(this.at("events"), openEvent !== null, openEvent ? "goes to its time" : "shows where the camera was",
       openEvent ?? ((e) => this.view.jumpTo(e.frame)));
     layers.forEach((layer, i) => this.checkbox("layers", "layer", layer, `${i + 1} ${layer}`, layerColours[layer], true));
-    this.showLayers(["surface", "grid"], false);
+    for (const layer of ["surface", "grid"] as Layer[]) this.offer(layer, false);
     for (const kind of [...features, "mask", "boxes"])
       this.checkbox("overlays", "overlay", kind, kind, `var(--${kind === "mask" || kind === "boxes" ? "mover" : kind})`, this.picture.shown.has(kind));
     this.checkbox("overlays", "overlay", "depth", "depth", "var(--text)", false);
@@ -96,8 +96,8 @@ export class Panel {
     this.boxes.set(`${what}-${name}`, box);
   }
   // Layers of which there is nothing are not offered.
-  private showLayers(names: Layer[], on: boolean): void {
-    for (const name of names) this.boxes.get("layer-" + name)!.parentElement!.hidden = !on;
+  private offer(layer: Layer, on: boolean): void {
+    this.boxes.get("layer-" + layer)!.parentElement!.hidden = !on;
   }
   click(box: string): void {
     this.boxes.get(box)!.click();
@@ -117,6 +117,9 @@ export class Panel {
         else if (wish.on) this.picture.shown.add(wish.name);
         else this.picture.shown.delete(wish.name);
         this.picture.refresh();
+        break;
+      case "offer":
+        this.offer(wish.layer, true);
         break;
       case "mode":
         this.view.setMode(wish.mode);
@@ -156,7 +159,6 @@ export class Panel {
         this.picture.begin(hello.camera.width, hello.camera.height);
         this.charts.begin(hello.budget_ms);
         this.at("source").textContent = hello.source;
-        this.showLayers(["surface", "grid"], false);
         this.events.begin();
         break;
       }
@@ -171,11 +173,11 @@ export class Panel {
       case Kind.stages: this.charts.takeStages(data); break;
       case Kind.surface:
         this.view.takeSurface(data);
-        this.showLayers(["surface"], true);
+        this.onWish({ what: "offer", layer: "surface" });
         break;
       case Kind.grid:
         this.view.takeGrid(data);
-        this.showLayers(["grid"], true);
+        this.onWish({ what: "offer", layer: "grid" });
         break;
       case Kind.events: {
         const events = json(data) as SessionEvent[];

@@ -170,8 +170,8 @@ await late.page.close();
 errors.length = 0; // the pages have lost their server
 
 // Replay.
-for (const preset of ["default", "orb"])
-  execFileSync(program, ["run", sequence, "--record", "--detector", "none", "--preset", preset, "--quiet", "--out", join(work, preset)]);
+for (const [preset, more] of [["default", ["--dense"]], ["orb", []]])
+  execFileSync(program, ["run", sequence, "--record", "--detector", "none", "--preset", preset, ...more, "--quiet", "--out", join(work, preset)]);
 const replay = await serve("view", join(work, "orb"), "--port", "0", "--quiet");
 const { page: film } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" }, replay.url);
 const settled = (p) => until(p, () => document.body.dataset.settled === "true");
@@ -226,6 +226,11 @@ await pair.mouse.move(right.x + 200, right.y + 150);
 await pair.mouse.down();
 await pair.mouse.move(right.x + 300, right.y + 100, { steps: 4 });
 await pair.mouse.up();
+await slide(pair, 1);
+assert.equal(await pair.isVisible("#layer-surface"), true, "the second run has a dense map");
+assert.equal(await film.isVisible("#layer-surface"), false, "that one has none");
+assert.ok((await film.locator("#stages button").count()) >= 4, "stages are told apart");
+assert.match(await film.textContent("#rules"), /first.*baseline/);
 await until(pair, () => new Set([...document.querySelectorAll(".view")].map((view) => view.dataset.look)).size === 1);
 assert.equal(await pair.getAttribute("#free", "aria-pressed"), "true");
 await shoot(pair, "compare");
