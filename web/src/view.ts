@@ -17,6 +17,15 @@ const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
 
 type Palette = { keyframe: string; covisibility: string; path: string; loop: string; truth: string; camera: string; mover: string };
 
+// Without a GPU every sample of a pixel costs as much as a pixel.
+function drawnByProcessor(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
 export class View {
   readonly renderer: THREE.WebGLRenderer;
   readonly camera = new THREE.PerspectiveCamera(60, 1, 0.02, 500);
@@ -58,7 +67,7 @@ export class View {
   private hello: Hello | null = null;
 
   constructor(private canvas: HTMLCanvasElement, private overlay: HTMLElement) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnByProcessor() });
     this.camera.up.set(0, -1, 0); // the world's y is down
     this.camera.position.set(1.2, -2, -3);
     this.controls = new OrbitControls(this.camera, canvas);
