@@ -48,7 +48,7 @@ test-asan: deps
 	cmake --preset asan
 	cmake --build build-asan --target unit_tests -j $(JOBS)
 	ASAN_OPTIONS=strict_string_checks=1:detect_stack_use_after_return=1 \
-	UBSAN_OPTIONS=print_stacktrace=1 \
+	UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS=suppressions=$(CURDIR)/cmake/leaks.supp:print_suppressions=0 \
 	ctest --test-dir build-asan -L unit --output-on-failure --no-tests=error -j $(JOBS)
 
 test-tsan: deps

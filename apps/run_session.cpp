@@ -31,43 +31,6 @@ namespace dkb {
 namespace fs = std::filesystem;
 namespace {
 
-// One line that renews itself on a terminal; plain lines now and then elsewhere.
-class Progress {
- public:
-  // `total`: about how many frames there are.
-  Progress(std::optional<size_t> total, bool quiet)
-      : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
-  void frame(size_t done, const FrameResult* result) {
-    if (quiet_) return;
-    const double ms = watch_.ms();
-    if (done != total_ && ms - last_ms_ < (terminal_ ? 100 : 5000)) return;
-    last_ms_ = ms;
-    const double rate = ms > 0 ? 1000.0 * static_cast<double>(done) / ms : 0;
-    std::string line = fmt::format("frame {}", done);
-    if (total_) line += fmt::format("/{}", std::max(*total_, done));
-    line += fmt::format("  {:.0f} frames/s", rate);
-    if (total_ && rate > 0)
-      line += fmt::format("  ETA {:.0f} s", static_cast<double>(*total_ - std::min(*total_, done)) / rate);
-    if (result != nullptr) line += fmt::format("  {} {} inliers", name_of(result->state), result->inliers);
-    if (terminal_)
-      fmt::print(stderr, "\r\033[K{}", line);
-    else
-      fmt::print(stderr, "{}\n", line);
-    std::fflush(stderr);
-    open_line_ = terminal_;
-  }
-  void finish() {
-    if (open_line_) fmt::print(stderr, "\n");
-    open_line_ = false;
-  }
-
- private:
-  std::optional<size_t> total_;
-  bool quiet_, terminal_, open_line_ = false;
-  double last_ms_ = -1e9;
-  Stopwatch watch_;
-};
-
 std::string source_name(const fs::path& source) {
   if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
   const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
@@ -214,8 +177,7 @@ RunSession::RunSession(const RunArguments& args)
 
 int RunSession::run() {
   const Interrupt interrupt([&] { source_->stop(); });
-  Progress progress(recording_->size(), args_.quiet);
-  progress_ = [&](size_t done, const FrameResult* result) { progress.frame(done, result); };
+  progress_.emplace(recording_->size(), args_.quiet);
   warn_of_source();
   const Stopwatch wall;
   try {
@@ -229,7 +191,7 @@ int RunSession::run() {
     if (!failure_) failure_ = std::current_exception();
   }
   if (failure_ && slam_->statistics().tracked == 0) std::rethrow_exception(failure_);
-  progress.finish();
+  progress_->finish();
   source_->stop();
   write(wall.ms() / 1000);
   warnings_.finish();
@@ -255,7 +217,7 @@ void RunSession::track() {
       ++facts_.skipped;
       warnings_.warn("frame skipped, an image cannot be read",
                      "frame " + std::to_string(next.index) + ": " + next.note + "; frame skipped");
-      progress_(next.index + 1, nullptr);
+      progress_->frame(next.index + 1, nullptr);
     } else {
       facts_.stamps.push_back(next.stamp);
       show(next, slam_->process(next.frame));
@@ -276,7 +238,7 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   }
   if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
   if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
-  progress_(next.index + 1, &result);
+  progress_->frame(next.index + 1, &result);
   if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
 }
 

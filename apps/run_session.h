@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +15,7 @@
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
 #include "live_report.h"
+#include "progress.h"
 #include "report/run_report.h"
 #include "run_outputs.h"
 #include "run_viewer.h"
@@ -78,7 +78,7 @@ class RunSession {
   RunFacts facts_;
   std::optional<report::RunLog> log_;
   LiveReport camera_;
-  std::function<void(size_t done, const FrameResult* result)> progress_;
+  std::optional<Progress> progress_;
   std::exception_ptr failure_;
   std::string interrupted_;  // after how many frames; empty when it was not
 };

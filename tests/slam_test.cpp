@@ -181,6 +181,31 @@ TEST_F(SlamTest, OdometryTakesNoJumpsAndTheWorldTakesThemAll) {
   }
 }
 
+TEST_F(SlamTest, TheFinalPosesSmoothEachOther) {
+  const Trajectory truth = read_trajectory(sequence() / "groundtruth.txt");
+  Options raw;
+  raw.set("experiment.smooth_trajectory", "false");
+  Slam slam(camera), without(camera, raw);
+  for (Slam* s : {&slam, &without}) {
+    feed(*s, 0, frames.size());
+    s->finish();
+  }
+  expect_same(slam.keyframes(), without.keyframes());
+  expect_same(slam.online_trajectory(), without.online_trajectory());
+  const auto step_errors = [&](const Slam& s) {
+    const auto poses = s.trajectory();
+    double sum = 0;
+    for (size_t i = 1; i < poses.size(); ++i) {
+      const Rigid3 step = poses[i - 1].world_from_cam.inverse() * poses[i].world_from_cam;
+      const Rigid3 true_step = truth[i - 1].world_from_cam.inverse() * truth[i].world_from_cam;
+      sum += (step.translation - true_step.translation).squaredNorm();
+    }
+    return std::sqrt(sum / static_cast<double>(poses.size() - 1));
+  };
+  ASSERT_EQ(slam.trajectory().size(), truth.size());
+  EXPECT_LT(step_errors(slam), 0.9 * step_errors(without)) << step_errors(without);
+}
+
 TEST_F(SlamTest, TheCovarianceIsOneAndSpeaksOfMillimetres) {
   Slam slam(camera);
   for (const FrameResult& r : feed(slam, 0, 20)) {

@@ -12,13 +12,6 @@
 namespace dkb {
 namespace {
 
-constexpr double kUsualDrift = 0.01;  // of wheels on a floor
-constexpr double kMaxGap = 0.5;       // [s] between poses that motion is interpolated over
-// Drift is systematic: over a way of this length the standard deviation is that of the drift, over a shorter one more.
-// A sum of independent steps can only grow with the root of the way.
-constexpr double kDriftLength = 10;                         // [m]
-constexpr double kMinPositionSd = 1e-3, kMinTurnSd = 1e-3;  // [m, rad] of a step: wheels slip and shake
-
 class PriorSource final : public Source {
  public:
   PriorSource(std::unique_ptr<Source> source, OdometryTrack track)
@@ -56,11 +49,9 @@ std::optional<Rigid3> OdometryTrack::at(double time) const {
   if (next == poses_.begin()) return std::nullopt;
   const StampedPose& a = *std::prev(next);
   if (a.timestamp == time) return a.world_from_cam;
-  if (next == poses_.end() || next->timestamp - a.timestamp > kMaxGap) return std::nullopt;
+  if (next == poses_.end() || next->timestamp - a.timestamp > kMaxOdometryGap) return std::nullopt;
   const double share = (time - a.timestamp) / (next->timestamp - a.timestamp);
-  return Rigid3(
-      a.world_from_cam.rotation.slerp(share, next->world_from_cam.rotation),
-      a.world_from_cam.translation + share * (next->world_from_cam.translation - a.world_from_cam.translation));
+  return interpolated(a.world_from_cam, next->world_from_cam, share);
 }
 
 std::optional<MotionPrior> OdometryTrack::between(double before, double now) const {
@@ -68,11 +59,8 @@ std::optional<MotionPrior> OdometryTrack::between(double before, double now) con
   if (!from || !to) return std::nullopt;
   MotionPrior prior;
   prior.previous_from_current = from->inverse() * *to;
-  const double length = prior.previous_from_current.translation.norm();
-  const double grown = drift_ * drift_ * length * kDriftLength;
-  prior.covariance.setZero();
-  prior.covariance.diagonal().head<3>().setConstant(kMinPositionSd * kMinPositionSd + grown);
-  prior.covariance.diagonal().tail<3>().setConstant(kMinTurnSd * kMinTurnSd + grown);
+  const double variance = drift_variance(drift_, prior.previous_from_current.translation.norm());
+  prior.covariance = Matrix6d::Identity() * (kMinOdometrySd * kMinOdometrySd + variance);
   return prior;
 }
 

@@ -10,6 +10,24 @@
 
 namespace dkb {
 
+inline constexpr double kUsualDrift = 0.01;     // share of a way, of wheels on a floor
+inline constexpr double kMaxOdometryGap = 0.5;  // [s] between poses that motion is interpolated over
+inline constexpr double kMinOdometrySd = 1e-3;  // [m, rad] of any motion: wheels slip and shake
+
+// The variance [m^2, rad^2] of a motion over `way` [m, rad] by a sensor that is off by the share `drift` of it. Drift
+// is systematic: over 10 m the standard deviation is that of the drift, over a shorter way more, since a sum of
+// independent steps can only grow with the root of the way.
+inline double drift_variance(double drift, double way) {
+  constexpr double kLength = 10;  // [m, rad]
+  return drift * drift * way * kLength;
+}
+
+// The pose at `share` (0 ... 1) of the way from one to another.
+inline Rigid3 interpolated(const Rigid3& from, const Rigid3& to, double share) {
+  return {from.rotation.slerp(share, to.rotation).normalized(),
+          from.translation + share * (to.translation - from.translation)};
+}
+
 // Poses of a robot by its wheels, as motion priors between any two times.
 class OdometryTrack {
  public:

@@ -1,34 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/detection/onnx_module.h"
 
-#include <cstdio>
-#include <exception>
 #include <memory>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
 #include <string>
 #include <vector>
 
+#include "dkb/util/module_guard.h"
+
 namespace {
+
+using dkb::guarded;
 
 struct Network {
   cv::dnn::Net net;
   std::vector<std::string> output_names;
   std::vector<cv::Mat> outputs;
 };
-
-// Runs `work`; an exception becomes `failure` and a text.
-template <class Result, class Work>
-Result guarded(Result failure, char* error, size_t error_size, const Work& work) {
-  try {
-    return work();
-  } catch (const std::exception& e) {
-    std::snprintf(error, error_size, "%s", e.what());
-  } catch (...) {
-    std::snprintf(error, error_size, "unknown failure");
-  }
-  return failure;
-}
 
 void* open_network(const char* bytes, size_t size, char* error, size_t error_size) {
   return guarded<void*>(nullptr, error, error_size, [&]() -> void* {

@@ -3,6 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "dkb/util/module_guard.h"
 
 // The C interface between the library and the modules that hold the makers' libraries for their cameras: one module a
 // maker, loaded when a camera of theirs is asked for. No exception crosses it: failures are texts written to `error`,
@@ -46,22 +51,50 @@ __attribute__((visibility("default"))) const struct DkbDeviceApi* dkb_device_api
 
 }  // extern "C"
 
-// For the modules: runs `work`; an exception becomes `failure` and a text.
-#include <cstdio>
-#include <exception>
+namespace dkb {
 
-namespace dkb::module {
-
-template <class Result, class Work>
-Result guarded(Result failure, char* error, size_t error_size, const Work& work) {
-  try {
+// Runs the calls of a maker's library as they are.
+struct AsItIs {
+  template <class Work>
+  static auto run(const Work& work) {
     return work();
-  } catch (const std::exception& e) {
-    std::snprintf(error, error_size, "%s", e.what());
-  } catch (...) {
-    std::snprintf(error, error_size, "unknown failure");
   }
-  return failure;
+};
+
+// For the modules: the interface around a class that has places() (static: of the devices that are plugged in),
+// Device(place), describe(camera) and next(timeout_ms, colour, depth). `Calls` runs what may throw; it turns what is no
+// std::exception into one.
+template <class Device, class Calls = AsItIs>
+const DkbDeviceApi* device_api() {
+  static const DkbDeviceApi api{
+      [](char* lines, size_t lines_size, char* error, size_t error_size) {
+        return guarded(-1, error, error_size, [&] {
+          return Calls::run([&] {
+            std::string text;
+            const std::vector<std::string> places = Device::places();
+            for (const std::string& place : places) text += place + "\n";
+            std::snprintf(lines, lines_size, "%s", text.c_str());
+            return static_cast<int>(places.size());
+          });
+        });
+      },
+      [](const char* place, char* error, size_t error_size) {
+        return guarded<void*>(nullptr, error, error_size,
+                              [&] { return Calls::run([&]() -> void* { return new Device(place); }); });
+      },
+      [](void* device, DkbDeviceCamera* camera) {  // a device that fails here tells nothing
+        DkbDeviceCamera told{};
+        char error[1];
+        const auto describe = [&] { return static_cast<Device*>(device)->describe(&told), true; };
+        if (guarded(false, error, sizeof error, [&] { return Calls::run(describe); })) *camera = told;
+      },
+      [](void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error, size_t error_size) {
+        return guarded<int>(dkb_failed, error, error_size, [&] {
+          return Calls::run([&]() -> int { return static_cast<Device*>(device)->next(timeout_ms, colour, depth); });
+        });
+      },
+      [](void* device) { delete static_cast<Device*>(device); }};
+  return &api;
 }
 
-}  // namespace dkb::module
+}  // namespace dkb

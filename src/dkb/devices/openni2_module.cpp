@@ -32,6 +32,14 @@ void start_library() {
 
 class Device final : public OpenNI::DeviceDisconnectedListener {
  public:
+  static std::vector<std::string> places() {
+    start_library();
+    openni::Array<openni::DeviceInfo> devices;
+    OpenNI::enumerateDevices(&devices);
+    std::vector<std::string> uris;
+    for (int i = 0; i < devices.getSize(); ++i) uris.emplace_back(devices[i].getUri());
+    return uris;
+  }
   explicit Device(const char* place) {
     start_library();
     const char* uri = *place == '\0' ? openni::ANY_DEVICE : place;
@@ -163,39 +171,8 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
   bool started_ = false;
 };
 
-int list_devices(char* lines, size_t lines_size, char* error, size_t error_size) {
-  return dkb::module::guarded(-1, error, error_size, [&] {
-    start_library();
-    openni::Array<openni::DeviceInfo> devices;
-    OpenNI::enumerateDevices(&devices);
-    std::string text;
-    for (int i = 0; i < devices.getSize(); ++i) text += std::string(devices[i].getUri()) + "\n";
-    std::snprintf(lines, lines_size, "%s", text.c_str());
-    return devices.getSize();
-  });
-}
-
-void* open_device(const char* place, char* error, size_t error_size) {
-  return dkb::module::guarded<void*>(nullptr, error, error_size, [&] { return new Device(place); });
-}
-
-void describe_device(void* device, DkbDeviceCamera* camera) {
-  static_cast<Device*>(device)->describe(camera);
-}
-
-int next_images(void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error,
-                size_t error_size) {
-  return dkb::module::guarded<int>(dkb_failed, error, error_size,
-                                   [&] { return static_cast<Device*>(device)->next(timeout_ms, colour, depth); });
-}
-
-void close_device(void* device) {
-  delete static_cast<Device*>(device);
-}
-
 }  // namespace
 
 extern "C" const DkbDeviceApi* dkb_device_api_1() {
-  static const DkbDeviceApi api{list_devices, open_device, describe_device, next_images, close_device};
-  return &api;
+  return dkb::device_api<Device>();
 }

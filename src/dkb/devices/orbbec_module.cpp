@@ -21,6 +21,13 @@ std::shared_ptr<ob::Device> find_device(ob::Context& context, const std::string&
 
 class Device {
  public:
+  static std::vector<std::string> places() {
+    const ob::Context context;
+    const std::shared_ptr<ob::DeviceList> devices = context.queryDeviceList();
+    std::vector<std::string> serials;
+    for (uint32_t i = 0; i < devices->getCount(); ++i) serials.emplace_back(devices->getSerialNumber(i));
+    return serials;
+  }
   explicit Device(const std::string& serial) {
     const std::shared_ptr<ob::Device> device = find_device(context_, serial);
     if (device == nullptr)
@@ -96,52 +103,19 @@ class Device {
 };
 
 // Its errors are no std::exception.
-template <class Result, class Work>
-Result guarded(Result failure, char* error, size_t error_size, const Work& work) {
-  return dkb::module::guarded(failure, error, error_size, [&] {
+struct Calls {
+  template <class Work>
+  static auto run(const Work& work) {
     try {
       return work();
     } catch (const ob::Error& e) {
       throw std::runtime_error(e.getMessage());
     }
-  });
-}
-
-int list_devices(char* lines, size_t lines_size, char* error, size_t error_size) {
-  return guarded(-1, error, error_size, [&] {
-    const ob::Context context;
-    const std::shared_ptr<ob::DeviceList> devices = context.queryDeviceList();
-    std::string text;
-    for (uint32_t i = 0; i < devices->getCount(); ++i) text += std::string(devices->getSerialNumber(i)) + "\n";
-    std::snprintf(lines, lines_size, "%s", text.c_str());
-    return static_cast<int>(devices->getCount());
-  });
-}
-
-void* open_device(const char* place, char* error, size_t error_size) {
-  return guarded<void*>(nullptr, error, error_size, [&]() -> void* { return new Device(place); });
-}
-
-void describe_device(void* device, DkbDeviceCamera* camera) {
-  try {
-    static_cast<Device*>(device)->describe(camera);
-  } catch (const ob::Error&) {  // then it tells nothing
   }
-}
-
-int next_images(void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error,
-                size_t error_size) {
-  return guarded<int>(dkb_failed, error, error_size,
-                      [&]() -> int { return static_cast<Device*>(device)->next(timeout_ms, colour, depth); });
-}
-
-void close_device(void* device) {
-  delete static_cast<Device*>(device);
-}
+};
 
 }  // namespace
 
 extern "C" const DkbDeviceApi* dkb_device_api_1() {
-  static const DkbDeviceApi api{list_devices, open_device, describe_device, next_images, close_device};
-  return &api;
+  return dkb::device_api<Device, Calls>();
 }

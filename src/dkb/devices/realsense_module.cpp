@@ -14,6 +14,13 @@ constexpr int kWidth = 640, kHeight = 480, kFps = 30;
 
 class Device {
  public:
+  static std::vector<std::string> places() {
+    const rs2::context context;
+    std::vector<std::string> serials;
+    for (const rs2::device& device : context.query_devices())
+      serials.emplace_back(device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER));
+    return serials;
+  }
   explicit Device(const std::string& serial) {
     rs2::config config;
     if (!serial.empty()) config.enable_device(serial);
@@ -91,45 +98,8 @@ class Device {
   float metres_per_unit_ = 0.001F;
 };
 
-int list_devices(char* lines, size_t lines_size, char* error, size_t error_size) {
-  return dkb::module::guarded(-1, error, error_size, [&] {
-    const rs2::context context;
-    std::string text;
-    int count = 0;
-    for (const rs2::device& device : context.query_devices()) {
-      text += std::string(device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER)) + "\n";
-      ++count;
-    }
-    std::snprintf(lines, lines_size, "%s", text.c_str());
-    return count;
-  });
-}
-
-void* open_device(const char* place, char* error, size_t error_size) {
-  return dkb::module::guarded<void*>(nullptr, error, error_size, [&] { return new Device(place); });
-}
-
-void describe_device(void* device, DkbDeviceCamera* camera) {
-  DkbDeviceCamera told{};
-  char error[1];
-  if (dkb::module::guarded(false, error, sizeof error,
-                           [&] { return static_cast<Device*>(device)->describe(&told), true; }))
-    *camera = told;
-}
-
-int next_images(void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error,
-                size_t error_size) {
-  return dkb::module::guarded<int>(dkb_failed, error, error_size,
-                                   [&] { return static_cast<Device*>(device)->next(timeout_ms, colour, depth); });
-}
-
-void close_device(void* device) {
-  delete static_cast<Device*>(device);
-}
-
 }  // namespace
 
 extern "C" const DkbDeviceApi* dkb_device_api_1() {
-  static const DkbDeviceApi api{list_devices, open_device, describe_device, next_images, close_device};
-  return &api;
+  return dkb::device_api<Device>();
 }

@@ -88,9 +88,7 @@ Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
   const double interval = image_time_ - last_->time, offset = current_->time - image_time_;
   if (!(interval > 0) || interval > kMaxGap || std::abs(offset) > interval) return {};
   const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
-  Vector6d part;
-  part << step.translation, vector_from_rotation(step.rotation);
-  return rigid3_from_tangent(offset / interval * part);
+  return rigid3_from_tangent(offset / interval * tangent_from_rigid3(step));
 }
 
 void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected) {

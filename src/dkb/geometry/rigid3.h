@@ -36,6 +36,22 @@ inline Rigid3 rigid3_from_tangent(const Vector6d& d) {
   return {rotation_from_vector(d.tail<3>()), d.head<3>()};
 }
 
+// Inverse of rigid3_from_tangent.
+inline Vector6d tangent_from_rigid3(const Rigid3& motion) {
+  Vector6d d;
+  d << motion.translation, vector_from_rotation(motion.rotation);
+  return d;
+}
+
+// Right perturbations [translation, rotation] in frame b as such in frame a: the adjoint of a_from_b.
+inline Matrix6d adjoint(const Rigid3& a_from_b) {
+  const Eigen::Matrix3d r = a_from_b.matrix3();
+  Matrix6d m = Matrix6d::Zero();
+  m.topLeftCorner<3, 3>() = m.bottomRightCorner<3, 3>() = r;
+  m.topRightCorner<3, 3>() = skew(a_from_b.translation) * r;
+  return m;
+}
+
 // Camera centre in the world of a `cam_from_world`.
 inline Eigen::Vector3d centre_in_world(const Rigid3& cam_from_world) {
   return -(cam_from_world.rotation.conjugate() * cam_from_world.translation);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
 #include "dkb/image/pixel_views.h"
 #include "dkb/image/rgbd_image.h"
@@ -65,15 +66,8 @@ MotionPrior joined(const MotionPrior& first, const MotionPrior& second) {
   sum.previous_from_current = first.previous_from_current * second.previous_from_current;
   sum.rotation_only = first.rotation_only || second.rotation_only;
   // A exp(a) B exp(b) = A B exp(Ad a) exp(b) with the adjoint of B's inverse.
-  const Rigid3 inverse = second.previous_from_current.inverse();
-  const Eigen::Matrix3d r = inverse.matrix3();
-  const Eigen::Vector3d& t = inverse.translation;
-  Eigen::Matrix3d cross;
-  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
-  Matrix6d adjoint = Matrix6d::Zero();
-  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = r;
-  adjoint.topRightCorner<3, 3>() = cross * r;
-  sum.covariance = adjoint * first.covariance * adjoint.transpose() + second.covariance;
+  const Matrix6d carry = adjoint(second.previous_from_current.inverse());
+  sum.covariance = carry * first.covariance * carry.transpose() + second.covariance;
   return sum;
 }
 

@@ -4,16 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/util/stamps.h"
+#include "dkb/dataset/odometry_track.h"
+#include "dkb/geometry/rigid3.h"
 
 namespace dkb {
 namespace {
 
 constexpr size_t kMaxSamples = 20'000;
-constexpr double kFloor = 1e-3;  // [m, rad] standard deviation of any motion
-// Drift is systematic: over a way of this length its standard deviation is `kDrift` of the way, and over a shorter one
-// more. A sum of independent steps can only grow with the root of the way.
-constexpr double kDrift = 0.01, kDriftLength = 10;  // [m/m, rad/m and rad/rad], [m, rad]
 
 double square(double x) {
   return x * x;
@@ -31,16 +28,6 @@ Vector6d diagonal_of(const std::array<double, 36>& covariance) {
 
 bool tells(double variance) {
   return std::isfinite(variance) && variance > 0;
-}
-
-Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (angle == 0) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
-}
-
-double angle_of(const Eigen::Quaterniond& rotation) {
-  return 2 * std::atan2(rotation.vec().norm(), std::abs(rotation.w()));
 }
 
 // Variances along the axes of a frame, along those of another; what they do not tell stays untold.
@@ -103,7 +90,6 @@ std::optional<MotionPrior> RecordedMotion::between(int64_t from_ns, int64_t to_n
 }
 
 std::optional<RecordedMotion::Moment> RecordedMotion::at(int64_t stamp_ns) const {
-  constexpr double kMaxGap = 0.5;  // [s]
   const auto after = std::lower_bound(samples_.begin(), samples_.end(), stamp_ns,
                                       [](const Sample& s, int64_t t) { return s.stamp_ns < t; });
   if (after == samples_.end()) return std::nullopt;
@@ -111,12 +97,10 @@ std::optional<RecordedMotion::Moment> RecordedMotion::at(int64_t stamp_ns) const
   if (after == samples_.begin()) return std::nullopt;
   const Sample& before = *(after - 1);
   const double gap = seconds(before.stamp_ns, after->stamp_ns);
-  if (gap > kMaxGap) return std::nullopt;
+  if (gap > kMaxOdometryGap) return std::nullopt;
   const double share = seconds(before.stamp_ns, stamp_ns) / gap;
-  return Moment{{before.pose.rotation.slerp(share, after->pose.rotation).normalized(),
-                 before.pose.translation + share * (after->pose.translation - before.pose.translation)},
-                before.pose_variance + share * (after->pose_variance - before.pose_variance),
-                after->twist_variance};
+  return Moment{interpolated(before.pose, after->pose, share),
+                before.pose_variance + share * (after->pose_variance - before.pose_variance), after->twist_variance};
 }
 
 std::optional<MotionPrior> RecordedMotion::by_poses(int64_t from_ns, int64_t to_ns) const {
@@ -124,7 +108,7 @@ std::optional<MotionPrior> RecordedMotion::by_poses(int64_t from_ns, int64_t to_
   if (!from || !to) return std::nullopt;
   const Rigid3 motion = from->pose.inverse() * to->pose;
   const double duration = seconds(from_ns, to_ns);
-  const double distance = motion.translation.norm(), angle = angle_of(motion.rotation);
+  const double distance = motion.translation.norm(), angle = vector_from_rotation(motion.rotation).norm();
   // The pose's covariance stands in the axes of its world.
   const Eigen::Matrix3d body_from_world = to->pose.matrix3().transpose();
   Vector6d growth = to->pose_variance - from->pose_variance;
@@ -132,13 +116,13 @@ std::optional<MotionPrior> RecordedMotion::by_poses(int64_t from_ns, int64_t to_
   Matrix6d covariance = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i) {
     const bool rotation = i >= 3;
-    double variance = square(kDrift) * kDriftLength * (rotation ? distance + angle : distance);
+    double variance = drift_variance(kUsualDrift, rotation ? distance + angle : distance);
     if (tells(growth[i]))
       variance = growth[i];
     else if (tells(to->twist_variance[i]))
       variance = to->twist_variance[i] * square(duration);
     // Directions that a driver does not know carry huge numbers; a metre and a radian a frame are as good as unknown.
-    covariance(i, i) = std::min(variance, 1.0) + square(kFloor);
+    covariance(i, i) = std::min(variance, 1.0) + square(kMinOdometrySd);
   }
   return in_camera_axes(motion, covariance);
 }
@@ -157,13 +141,14 @@ std::optional<MotionPrior> RecordedMotion::by_rates(int64_t from_ns, int64_t to_
     // The rate changes evenly from one message to the next: its mean over the part within the interval.
     const int64_t first = std::max(a.stamp_ns, from_ns), last = std::min(b.stamp_ns, to_ns);
     const double middle = 0.5 * (seconds(a.stamp_ns, first) + seconds(a.stamp_ns, last)) / gap;
-    rotation = rotation * rotation_by((a.rate + middle * (b.rate - a.rate)) * seconds(first, last));
+    rotation = rotation * rotation_from_vector((a.rate + middle * (b.rate - a.rate)) * seconds(first, last));
     for (int axis = 0; axis < 3; ++axis)
       if (tells(b.rate_variance[axis])) variance[axis] = b.rate_variance[axis];
   }
   Matrix6d covariance = Matrix6d::Identity();
   for (int axis = 0; axis < 3; ++axis)
-    covariance(3 + axis, 3 + axis) = std::min(variance[axis] * square(seconds(from_ns, to_ns)), 1.0) + square(kFloor);
+    covariance(3 + axis, 3 + axis) =
+        std::min(variance[axis] * square(seconds(from_ns, to_ns)), 1.0) + square(kMinOdometrySd);
   MotionPrior prior = in_camera_axes({rotation.normalized(), Eigen::Vector3d::Zero()}, covariance);
   prior.rotation_only = true;
   prior.previous_from_current.translation.setZero();
@@ -172,18 +157,11 @@ std::optional<MotionPrior> RecordedMotion::by_rates(int64_t from_ns, int64_t to_
 
 MotionPrior RecordedMotion::in_camera_axes(const Rigid3& motion, const Matrix6d& covariance) const {
   const Rigid3 cam_from_body = body_from_cam_.inverse();
-  const Eigen::Matrix3d r = cam_from_body.matrix3();
-  const Eigen::Vector3d& t = cam_from_body.translation;
-  Eigen::Matrix3d cross;
-  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
   // A small motion on the right of the body's, as one on the right of the camera's.
-  Matrix6d adjoint = Matrix6d::Zero();
-  adjoint.topLeftCorner<3, 3>() = r;
-  adjoint.topRightCorner<3, 3>() = cross * r;
-  adjoint.bottomRightCorner<3, 3>() = r;
+  const Matrix6d carry = adjoint(cam_from_body);
   MotionPrior prior;
   prior.previous_from_current = cam_from_body * motion * body_from_cam_;
-  prior.covariance = adjoint * covariance * adjoint.transpose();
+  prior.covariance = carry * covariance * carry.transpose();
   return prior;
 }
 

@@ -68,7 +68,8 @@ TEST(SqliteMessages, TopicsThatCannotBeConvertedAreTold) {
   EXPECT_EQ(warnings, std::vector<std::string>{(scratch / "a.db3").string() +
                                                ": topic /path of type nav_msgs/Path is left out; its type is not "
                                                "converted from ROS 2"});
-  for (const RecordedTopic& topic : open_messages(scratch / "a.mcap")->topics()) EXPECT_NE(topic.name, "/path");
+  const auto stream = open_messages(scratch / "a.mcap");
+  for (const RecordedTopic& topic : stream->topics()) EXPECT_NE(topic.name, "/path");
 }
 
 TEST(SqliteMessages, NothingIsWrittenBesideTheFile) {

@@ -141,10 +141,9 @@ void bind_experiments(Settings& s, SlamOptions& o) {
          {{"oriented", NormalSum::oriented}, {"plain", NormalSum::plain}});
   s.bind("experiment.keyframes.visibility_levels", &a.visibility_levels, "of 10 degrees each (DKB eq. 32)",
          Range{2, 18});
-  s.bind("experiment.keyframes.floor_reference_ratio", &a.floor_reference_ratio,
-         "share of the reference's points below which a keyframe is made", Range{0, 1});
-  s.bind("experiment.keyframes.floor_kept_ratio", &a.floor_kept_ratio,
-         "the same of the points tracked right after the last keyframe", Range{0, 1});
+
+  s.bind("experiment.smooth_trajectory", &o.smooth_trajectory,
+         "let the poses of the final trajectory smooth each other");
 
   GeometricWeightOptions& w = o.mapping.ba.weights;
   s.bind("experiment.mapping.ba.edge_weight", &w.edge_weight, "of edge points without adaptive_weight (DKB Table 1)",
@@ -221,7 +220,8 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   if (name != "paper" && name != "orb")
     throw InputError(where + ": there is no preset \"" + name + "\"" + did_you_mean(name, names) +
                      "; presets: default, paper, orb");
-  // What the paper does not have: the camera's own motion within an image and between images.
+  // What the paper does not have: the camera's own motion within an image, between images and over many.
+  o.smooth_trajectory = false;
   o.depth.model_rolling_shutter = false;
   o.depth.model_time_offset = false;
   o.dynamics.filter = FilterKind::paper;

@@ -40,7 +40,8 @@ struct SlamOptions {
   MappingOptions mapping;
   LoopStageOptions loop_closing;
   ReadoutOptions readout;
-  bool final_ba = false;  // adjust the whole map once more at the end
+  bool final_ba = false;          // adjust the whole map once more at the end
+  bool smooth_trajectory = true;  // let the poses of the final trajectory smooth each other
   DynamicsOptions dynamics;
   DenseOptions dense;
   bool dense_map = false;  // keep what the dense map is made of

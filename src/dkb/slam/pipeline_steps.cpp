@@ -361,7 +361,7 @@ std::vector<Event> Pipeline::take_events() {
 std::function<DenseMap()> Pipeline::dense_map_task() const {
   if (!dense_) throw InputError("dense map: it was not asked for; set Options::dense_map");
   std::vector<TimedPose> poses;
-  for (const TrajectoryFrame& f : record_.trajectory(false))
+  for (const TrajectoryFrame& f : record_.trajectory(TrajectoryKind::by_map))
     if (f.map == 0) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
   return [dense = *dense_, poses = std::move(poses), seed = options_.seed] { return dense.build(poses, seed); };
 }

@@ -38,9 +38,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
         -camera_.fy * p.y() / (p.z() * p.z());
     Eigen::Matrix<double, 2, 6> jacobian;
     jacobian.leftCols<3>() = projection;
-    Eigen::Matrix3d cross;
-    cross << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
-    jacobian.rightCols<3>() = -projection * cross;
+    jacobian.rightCols<3>() = -projection * skew(p);
     const Eigen::Vector2d flow = jacobian * velocity;
     const Eigen::Vector2d late = flow * (k.image_pixel.y() / camera_.height - 0.5);
     const Eigen::Vector2d error = k.pixel.cast<double>() - camera_.project(p);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "dkb/solver/pose_smoother.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
@@ -25,7 +26,8 @@ void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const 
   ++counts_.tracked;
   counts_.predicted += result.state == TrackingState::predicted;
   counts_.relocalisations += result.state == TrackingState::relocalised;
-  records_.push_back({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam});
+  records_.push_back({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam,
+                      frame.covariance.cast<float>()});
 }
 
 void RunRecord::add(const KeyframeTests& tests) {
@@ -73,16 +75,28 @@ MapSnapshot RunRecord::map() const {
   return {map_.shared_view(), loops_};
 }
 
-std::vector<TrajectoryFrame> RunRecord::trajectory(bool online) const {
-  const std::lock_guard lock(mutex_);
-  const std::vector<KeyframeId> roots = map_.view().roots();
+std::vector<TrajectoryFrame> RunRecord::trajectory(TrajectoryKind kind) const {
   std::vector<TrajectoryFrame> frames;
-  frames.reserve(records_.size());
-  for (const Record& r : records_)
-    frames.push_back(
-        {r.frame, r.stamp_ns,
-         online ? r.world_from_cam_online : (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse(),
-         rank_of(roots, map_.root(r.reference))});
+  std::map<int, std::vector<MeasuredPose>> by_map;
+  {
+    const std::lock_guard lock(mutex_);
+    const std::vector<KeyframeId> roots = map_.view().roots();
+    frames.reserve(records_.size());
+    for (const Record& r : records_) {
+      const Rigid3 by_keyframe = (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse();
+      frames.push_back({r.frame, r.stamp_ns, kind == TrajectoryKind::online ? r.world_from_cam_online : by_keyframe,
+                        rank_of(roots, map_.root(r.reference))});
+      if (kind == TrajectoryKind::smoothed)
+        by_map[frames.back().map].push_back(
+            {seconds_from_ns(r.stamp_ns - records_[0].stamp_ns), by_keyframe, r.covariance.cast<double>()});
+    }
+  }
+  for (const auto& [map, measured] : by_map) {
+    const std::vector<Rigid3> poses = smoothed_poses(measured);
+    auto pose = poses.begin();
+    for (TrajectoryFrame& f : frames)
+      if (f.map == map) f.world_from_cam = *pose++;
+  }
   return frames;
 }
 

@@ -13,6 +13,10 @@
 
 namespace dkb {
 
+// Which poses of the frames: as they were published; hanging on the keyframes, since the world may still move; or those,
+// smoothed by each other.
+enum class TrajectoryKind { online, by_map, smoothed };
+
 // What a run has brought so far. The pipeline writes on its thread; any thread reads.
 class RunRecord {
  public:
@@ -30,8 +34,7 @@ class RunRecord {
   std::vector<StageTime> take_news();
 
   MapSnapshot map() const;
-  // A frame hangs on a keyframe, since the world may still move; or as it was published.
-  std::vector<TrajectoryFrame> trajectory(bool online) const;
+  std::vector<TrajectoryFrame> trajectory(TrajectoryKind kind) const;
   std::vector<TrajectoryFrame> keyframes() const;
   Statistics statistics() const;
 
@@ -41,6 +44,7 @@ class RunRecord {
     int64_t stamp_ns = 0;
     KeyframeId reference = kNoKeyframe;
     Rigid3 cam_from_reference, world_from_cam_online;
+    Eigen::Matrix<float, 6, 6> covariance;  // as in TrackedFrame
   };
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Record> records_;

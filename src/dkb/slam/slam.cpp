@@ -211,10 +211,11 @@ MapSnapshot Slam::map() const {
   return impl_->shared_record()->map();
 }
 std::vector<TrajectoryFrame> Slam::trajectory() const {
-  return impl_->shared_record()->trajectory(false);
+  return impl_->shared_record()->trajectory(impl_->context.options.smooth_trajectory ? TrajectoryKind::smoothed
+                                                                                     : TrajectoryKind::by_map);
 }
 std::vector<TrajectoryFrame> Slam::online_trajectory() const {
-  return impl_->shared_record()->trajectory(true);
+  return impl_->shared_record()->trajectory(TrajectoryKind::online);
 }
 std::vector<TrajectoryFrame> Slam::keyframes() const {
   return impl_->shared_record()->keyframes();

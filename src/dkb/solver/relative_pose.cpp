@@ -4,12 +4,6 @@
 namespace dkb::solver {
 namespace {
 
-Vector6d tangent(const Rigid3& motion) {
-  Vector6d d;
-  d << motion.translation, vector_from_rotation(motion.rotation);
-  return d;
-}
-
 // Derivative of log(exp(w) exp(x)) by x at 0: the inverse right Jacobian of SO(3),
 // I + skew(w)/2 + (1/t^2 - (1 + cos t)/(2 t sin t)) skew(w)^2 with t = |w| (Forster et al., T-RO 2017, eq. 8).
 Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& w) {
@@ -24,7 +18,7 @@ Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& w) {
 
 Vector6d relative_pose_error(const Rigid3& cam_a_from_world, const Rigid3& cam_b_from_world,
                              const Rigid3& measured_b_from_a) {
-  return tangent(measured_b_from_a.inverse() * (cam_b_from_world * cam_a_from_world.inverse()));
+  return tangent_from_rigid3(measured_b_from_a.inverse() * (cam_b_from_world * cam_a_from_world.inverse()));
 }
 
 RelativePoseResidual relative_pose_residual(const Rigid3& cam_a_from_world, const Rigid3& cam_b_from_world,
@@ -32,7 +26,7 @@ RelativePoseResidual relative_pose_residual(const Rigid3& cam_a_from_world, cons
   const Rigid3 predicted = cam_b_from_world * cam_a_from_world.inverse();
   const Rigid3 difference = measured_b_from_a.inverse() * predicted;
   RelativePoseResidual r;
-  r.error = tangent(difference);
+  r.error = tangent_from_rigid3(difference);
   const Eigen::Matrix3d log_derivative = inverse_right_jacobian(r.error.tail<3>());
   // a: difference * T(d_a).
   r.jacobian_a.setZero();

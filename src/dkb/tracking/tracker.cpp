@@ -269,9 +269,7 @@ void Tracker::finish(TrackedFrame& frame) {
 
 Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
-  Vector6d tangent;
-  tangent << step.translation, vector_from_rotation(step.rotation);
-  return tangent / (frame.timestamp - last_->timestamp);
+  return tangent_from_rigid3(step) / (frame.timestamp - last_->timestamp);
 }
 
 // Features and pose as they are when the camera's motion within the image is known. The frame keeps what it has when

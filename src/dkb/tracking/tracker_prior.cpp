@@ -50,9 +50,8 @@ std::optional<PosePrediction> Tracker::predict(FrameIndex index, double timestam
 }
 
 bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
-  const Rigid3 off = cam_from_world * found_cam_from_world.inverse();  // right perturbation of world_from_cam
-  Vector6d delta;
-  delta << off.translation, vector_from_rotation(off.rotation);
+  // As a right perturbation of world_from_cam.
+  const Vector6d delta = tangent_from_rigid3(cam_from_world * found_cam_from_world.inverse());
   Matrix6d sum = covariance;
   sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
   sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
@@ -67,9 +66,7 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   frame.reference = last_->reference;
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
-  Vector6d tangent;
-  tangent << step.translation, vector_from_rotation(step.rotation);
-  velocity_ = tangent / (frame.timestamp - last_->timestamp);
+  velocity_ = velocity_to(frame);
   // What was seen last is still what the camera may see next.
   last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;
