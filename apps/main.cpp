@@ -18,6 +18,7 @@
 #include "run_command.h"
 #include "run_viewer.h"
 #include "simulate_command.h"
+#include "view_command.h"
 
 namespace {
 
@@ -76,6 +77,7 @@ int main(int argc, char** argv) {
   try {
     dkb::register_run(app, exit_code);
     dkb::register_live(app, exit_code);
+    dkb::register_view(app, exit_code);
     dkb::register_record(app, exit_code);
     dkb::register_sources(app, exit_code);
     dkb::register_eval(app, exit_code);

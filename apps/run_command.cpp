@@ -68,6 +68,7 @@ void register_run(CLI::App& app, int& exit_code) {
   command->add_flag("--realtime", args->realtime, "Frames at the pace of their stamps; never wait for mapping");
   command->add_flag("--cv-orb", args->cv_orb,
                     "Time OpenCV's ORB on the same images after the run, as a unit of times: cv_orb.json");
+  command->add_flag("--record", args->viewer.record, "Write session.dkbs too, which `dkb-slam view` replays");
   command->callback([args, &exit_code] { exit_code = RunSession(*args).run(); });
 }
 
@@ -80,6 +81,8 @@ void register_live(CLI::App& app, int& exit_code) {
                    "`dkb-slam sources` lists them. A recording is played in real time")
       ->required();
   add_options(command, args);
+  args->viewer.record = true;
+  command->add_flag("!--no-record", args->viewer.record, "Do not write session.dkbs, which `dkb-slam view` replays");
   command->callback([args, &exit_code] {
     args->live = args->realtime = true;
     exit_code = RunSession(*args).run();

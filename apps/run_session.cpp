@@ -156,7 +156,7 @@ RunSession::RunSession(const RunArguments& args)
   slam_.emplace(recording_->camera(), options_, std::move(detectors));
   if (!args.load_map.empty()) slam_->load_map(args.load_map);
   slam_->localize_only(args.localize);
-  slam_->explain_keyframes(args.debug_log || args.viewer.on);
+  slam_->explain_keyframes(args.debug_log || args.viewer.on || args.viewer.record);
   out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
   make_output_folder(out_);
   if (!args.quiet) fmt::print("{}, results in {}\n", recording_->description(), out_.string());
@@ -166,7 +166,13 @@ RunSession::RunSession(const RunArguments& args)
   log_.emplace(recording_->size());
   if (args.realtime && !live_) paced_.emplace(*recording_);
   source_ = paced_ ? static_cast<Source*>(&*paced_) : recording_.get();
-  if (args.viewer.on) viewer_ = std::make_unique<RunViewer>(args.viewer, *recording_, args.source, options_, out_);
+  if (!args.viewer.on && !args.viewer.record) return;
+  try {
+    viewer_ = std::make_unique<RunViewer>(args.viewer, *recording_, args.source, options_, out_);
+  } catch (const InputError& e) {
+    if (args.viewer.on || !args.live) throw;
+    warnings_.warn("session", std::string("the session is not recorded: ") + e.what());
+  }
 }
 
 int RunSession::run() {

@@ -8,7 +8,6 @@
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/module.h"
 #include "interrupt.h"
 
 namespace dkb {
@@ -16,16 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed after so long
-
-Viewer* open_viewer(const ViewerOptions& options) {
-  std::string reason;
-  const Module module{"libdkb_viewer.so", DKB_MODULE_LIBDIR, {DKB_VIEWER_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
-  void* symbol = module_symbol(module, kOpenViewerSymbol, &reason);
-  if (symbol == nullptr) throw InputError("--viewer: this build has no live page (" + reason + ")");
-  Viewer* viewer = reinterpret_cast<OpenViewer>(symbol)(options, &reason);
-  if (viewer == nullptr) throw InputError(reason);
-  return viewer;
-}
 
 std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
   std::vector<ViewerOptions::TruePosition> truth;
@@ -66,17 +55,19 @@ void add_viewer_options(CLI::App& command, ViewerArguments& args) {
 
 RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name,
                      const Options& options, fs::path out)
-    : exit_(args.exit), out_(std::move(out)) {
+    : serves_(args.on), exit_(args.exit), out_(std::move(out)) {
   ViewerOptions o;
   o.host = args.host;
-  o.port = args.port;
+  o.port = args.on ? std::optional(args.port) : std::nullopt;
+  if (args.record) o.record = out_ / "session.dkbs";
   o.description = source.description();
   o.camera = source.camera();
   o.frames = source.size();
   if (o.camera.fps > 0) o.budget_ms = 1000 / o.camera.fps;
   o.realtime = options.realtime;
   o.truth = truth_beside(source_name);
-  viewer_.reset(open_viewer(o));
+  viewer_ = open_viewer(o);
+  if (!serves_) return;
   fmt::print(stderr, "viewer: {}\n", viewer_->url());
   std::fflush(stderr);
 }
@@ -101,11 +92,13 @@ void RunViewer::wait_turn(const Slam& slam, const std::function<void(bool)>& hol
 
 void RunViewer::show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events) {
   viewer_->show(std::move(result), frame, slam.map(), std::move(events));
+  if (slam.options().dense_map && viewer_->wants_dense_map()) viewer_->show_dense_map(slam.dense_map_task());
 }
 
 void RunViewer::serve_on(const Slam& slam, bool quiet) {
-  viewer_->ended();
-  if (exit_ || Interrupt::happened()) return;
+  if (slam.options().dense_map && !Interrupt::happened()) viewer_->show_dense_map(slam.dense_map_task());
+  viewer_->ended(slam.map());
+  if (!serves_ || exit_ || Interrupt::happened()) return;
   if (!quiet) fmt::print("the page is served until Ctrl-C\n");
   while (!Interrupt::happened()) {
     save_if_asked(slam);

@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "dkb/viewer/viewer.h"
 #include "dkb_slam/source.h"
+#include "dkb_slam/viewer.h"
 
 namespace dkb {
 
-// The options of the live page, on any command that tracks.
+// The options of the live page and of recording the session, on any command that tracks.
 struct ViewerArguments {
-  bool on = false, exit = false;
+  bool on = false, exit = false, record = false;
   int port = 8090;
   std::string host = "127.0.0.1";
 };
@@ -23,11 +23,11 @@ void add_viewer_options(CLI::App& command, ViewerArguments& args);
 // The words of a command line, the port put in where `--viewer` stands without one.
 std::vector<std::string> with_default_port(int argc, char** argv);
 
-// The live page of one run.
+// The live page of one run, the recording of its session in `out`, or both.
 class RunViewer {
  public:
-  // Opens the page and prints its address on stderr. Throws InputError when this build has none, or the port is taken.
-  // Ground truth beside `source` in TUM layout is shown too.
+  // Opens what is asked for and prints the page's address on stderr. Throws InputError when this build has no page, or
+  // the port is taken. Ground truth beside `source` in TUM layout is shown too.
   RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name, const Options& options,
             std::filesystem::path out);
 
@@ -41,7 +41,7 @@ class RunViewer {
  private:
   void save_if_asked(const Slam& slam);
 
-  const bool exit_;
+  const bool serves_, exit_;
   const std::filesystem::path out_;
   std::unique_ptr<Viewer> viewer_;
 };

@@ -42,6 +42,21 @@ TEST_F(Library, FollowsACameraExactly) {
   }
 }
 
+TEST_F(Library, EveryFrameSaysWhatItsTimeWentInto) {
+  Slam slam = slam_with();
+  for (const Frame& frame : world.walk(0, 5)) {
+    const FrameResult r = slam.process(frame);
+    double tracking = 0, features = 0;
+    for (const StageTime& s : r.stages) {
+      if (s.stage == "tracking") tracking = s.ms;
+      if (s.stage == "features") features = s.ms;
+    }
+    EXPECT_NEAR(tracking, r.tracking_ms, 1e-3 * r.tracking_ms);
+    EXPECT_GT(features, 0);
+    EXPECT_LT(features, tracking);
+  }
+}
+
 // Motion priors.
 
 TEST_F(Library, APriorGuidesAJumpThatTheMotionModelMisses) {

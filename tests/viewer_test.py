@@ -20,12 +20,9 @@ PROGRAM, SEQUENCE = sys.argv[1:3]
 FRAMES = 40
 
 
-class Run:
-    def __init__(self, out, *more, viewer=True):
-        self.out = Path(out)
-        page = ["--viewer", "0"] if viewer else []
-        self.process = subprocess.Popen([PROGRAM, "run", SEQUENCE, "--quiet", "--detector", "none", "--out", str(out), *page, *more],
-                                        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+class Served:
+    def __init__(self, *words, viewer=True):
+        self.process = subprocess.Popen([PROGRAM, *words], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         if viewer:
             line = self.process.stderr.readline()
             match = re.fullmatch(r"viewer: http://([^/:]+|\[[^]]*\]):(\d+)/(?:#token=([0-9a-f]{32}))?\n", line)
@@ -58,23 +55,32 @@ class Run:
             time.sleep(0.02)
         raise AssertionError(f"never came: {state}")
 
-    def stream(self, query=""):
-        connection = socket.create_connection(("127.0.0.1", self.port), timeout=20)
-        connection.sendall(f"GET /api/stream{query} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-        return Stream(connection)
-
     def end(self):
         self.process.send_signal(signal.SIGINT)
         code = self.process.wait(30)
         return code, self.process.stderr.read()
 
 
+class Run(Served):
+    def __init__(self, out, *more, viewer=True):
+        self.out = Path(out)
+        super().__init__("run", SEQUENCE, "--quiet", "--detector", "none", "--out", str(out), *(["--viewer", "0"] if viewer else []), *more,
+                         viewer=viewer)
+
+    def stream(self, query=""):
+        connection = socket.create_connection(("127.0.0.1", self.port), timeout=20)
+        connection.sendall(f"GET /api/stream{query} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        return Stream(connection)
+
+
 class Stream:
     """Keeps what it is told, as the page does."""
 
-    def __init__(self, connection):
+    def __init__(self, connection=None):
         self.connection, self.buffer = connection, b""
         self.kinds, self.points, self.keyframes, self.frames, self.images, self.facts = {}, {}, {}, [], [], 0
+        if connection is None:
+            return
         while b"\r\n\r\n" not in self.buffer:
             self.buffer += connection.recv(65536)
         head, self.buffer = self.buffer.split(b"\r\n\r\n", 1)
@@ -84,17 +90,20 @@ class Stream:
         end = time.time() + seconds
         while not until(self):
             assert time.time() < end, f"never came; {self.kinds}"
-            while len(self.buffer) >= 8:
-                size, kind = struct.unpack_from("<II", self.buffer)
-                if len(self.buffer) < 8 + size:
-                    break
-                self.message(kind, self.buffer[8:8 + size])
-                self.buffer = self.buffer[8 + size:]
+            self.split()
             if until(self):
                 return
             data = self.connection.recv(1 << 20)
             assert data, "the stream ended"
             self.buffer += data
+
+    def split(self):
+        while len(self.buffer) >= 8:
+            size, kind = struct.unpack_from("<II", self.buffer)
+            if len(self.buffer) < 8 + size:
+                break
+            self.message(kind, self.buffer[8:8 + size])
+            self.buffer = self.buffer[8 + size:]
 
     def message(self, kind, data):
         self.kinds[kind] = self.kinds.get(kind, 0) + 1
@@ -251,4 +260,5 @@ def main():
     print("the page is served as it should be")
 
 
-main()
+if __name__ == "__main__":
+    main()

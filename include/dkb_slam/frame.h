@@ -123,6 +123,12 @@ struct StageSummary {
   size_t count = 0;                                           ///< how often it ran
 };
 
+/// How long a stage took.
+struct StageTime {
+  std::string stage;  ///< as in Statistics::stages
+  float ms = 0;       ///< [ms] by the steady clock
+};
+
 /// Everything of one frame.
 struct FrameResult {
   int frame = 0;                                      ///< counts the frames that were accepted, from 0
@@ -144,6 +150,7 @@ struct FrameResult {
   std::string keyframe_explanation;     ///< why, or why not; empty unless Slam::explain_keyframes(true)
   double tracking_ms = 0;               ///< steady clock: own work on this frame
   double waiting_ms = 0;                ///< for mapping and the detector; 0 in a real-time run, but for the first frame
+  std::vector<StageTime> stages;        ///< this frame's, and what other threads have finished since the last
 
   /// There is a pose.
   bool tracked() const {

@@ -14,7 +14,6 @@
 #include "dkb_slam/detector.h"
 #include "dkb_slam/errors.h"
 #include "dkb_slam/frame.h"
-#include "dkb_slam/keyframe_policy.h"
 #include "dkb_slam/map.h"
 #include "dkb_slam/options.h"
 

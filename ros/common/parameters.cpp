@@ -36,6 +36,8 @@ std::vector<ParameterDescription> own_parameters() {
       {"map_period", 1.0, "[s] between map_points and path; 0 = never", 0, 3600},
       {"grid_period", 0.0, "[s] between grids, which cost memory and time; 0 = never", 0, 3600},
       {"path_step", 0.05, "[m] between poses of the path", 0, 100},
+      {"viewer_port", int64_t{-1}, "port of the live page in the browser; 0 = any, -1 = no page", -1, 65535},
+      {"viewer_host", "127.0.0.1", "address to serve the page at; another lets others in, by the token that is logged"},
       {"preset", "default", "what the settings start from", -kInf, kInf, {"default", "paper", "orb"}},
   };
 }
@@ -239,6 +241,8 @@ Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& 
   p.map_period = values.get<double>("map_period");
   p.grid_period = values.get<double>("grid_period");
   p.path_step = values.get<double>("path_step");
+  p.viewer_port = values.number("viewer_port");
+  p.viewer_host = values.text("viewer_host");
 
   p.options = dkb::Options(values.text("preset"));
   for (const auto& [name, value] : given) {

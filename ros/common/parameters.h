@@ -33,6 +33,8 @@ struct Parameters {
   bool localize_only = false;
   double map_period = 1, grid_period = 0;  // [s] 0 = never
   double path_step = 0.05;                 // [m]
+  int viewer_port = -1;                    // of the live page; 0 = any, -1 = none
+  std::string viewer_host = "127.0.0.1";
 
   dkb::Options options;  // the settings
 

@@ -217,10 +217,35 @@ void SlamCore::process(const ImagePair& pair) {
     forget_motion();
   }
   if (!slam_ && !start(pair)) return;
+  // What comes while a visitor of the page has paused is dropped.
+  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) return;
   const dkb::FrameInput input = input_of(pair);
-  const dkb::FrameResult result = slam_->process(input);
+  const dkb::Frame frame(slam_->camera(), input);
+  dkb::FrameResult result = slam_->process(frame);
   if (result.state != dkb::TrackingState::paused) last_stamp_ns_ = pair.colour.stamp_ns;
   publish(pair, input, result);
+  std::vector<dkb::Event> events = tell_events();
+  if (!viewer_) return;
+  viewer_->show(std::move(result), frame, slam_->map(), std::move(events));
+  if (slam_->options().dense_map && viewer_->wants_dense_map()) viewer_->show_dense_map(slam_->dense_map_task());
+  if (viewer_->take_save_order()) viewer_->say("here the service save_map saves the map");
+}
+
+void SlamCore::open_page() {
+  dkb::ViewerOptions options;
+  options.host = parameters_.viewer_host;
+  options.port = parameters_.viewer_port;
+  options.description = "ROS node, images in " + camera_frame_;
+  options.camera = slam_->camera();
+  options.realtime = true;
+  if (options.camera.fps > 0) options.budget_ms = 1000 / options.camera.fps;
+  try {
+    viewer_ = dkb::open_viewer(options);
+    slam_->explain_keyframes(true);
+    middleware_.log(LogLevel::info, "viewer: " + viewer_->url());
+  } catch (const dkb::InputError& error) {
+    middleware_.log(LogLevel::error, std::string("viewer_port: ") + error.what());
+  }
 }
 
 const std::string& SlamCore::camera_frame(const ImagePair& pair) const {
@@ -256,8 +281,11 @@ bool SlamCore::start(const ImagePair& pair) {
   if (pair.depth.frame_id != pair.colour.frame_id)
     middleware_.log(LogLevel::warning, "depth/image is in frame " + pair.depth.frame_id + ", rgb/image in " +
                                            pair.colour.frame_id + ": taken for registered to the colour image");
-  const std::lock_guard lock(report_mutex_);
-  slam_ = std::move(slam);
+  {
+    const std::lock_guard lock(report_mutex_);
+    slam_ = std::move(slam);
+  }
+  if (parameters_.viewer_port >= 0) open_page();
   return true;
 }
 
@@ -356,7 +384,6 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     image.frame_id = camera_frame_;
     middleware_.publish(image);
   }
-  tell_events();
 }
 
 void SlamCore::publish_odometry(const dkb::FrameResult& result) {
@@ -439,14 +466,16 @@ void SlamCore::forget_motion() {
   unplaced_.clear();
 }
 
-void SlamCore::tell_events() {
-  for (const dkb::Event& e : slam_->take_events()) {
+std::vector<dkb::Event> SlamCore::tell_events() {
+  std::vector<dkb::Event> events = slam_->take_events();
+  for (const dkb::Event& e : events) {
     using Kind = dkb::Event::Kind;
     if (e.kind == Kind::keyframe) continue;
     const bool bad = e.kind == Kind::warning || e.kind == Kind::lost;
     middleware_.log(bad ? LogLevel::warning : LogLevel::info,
                     std::string(dkb::name_of(e.kind)) + (e.text.empty() ? "" : ": " + e.text));
   }
+  return events;
 }
 
 // The same complaint is made again only after a while.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <dkb_slam/viewer.h>
+
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -85,7 +87,8 @@ class SlamCore final : public RosCore {
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_anew();
   void forget_motion();
-  void tell_events();
+  std::vector<dkb::Event> tell_events();
+  void open_page();
   void complain(LogLevel level, const std::string& text);
 
   // On the thread of reports.
@@ -115,6 +118,7 @@ class SlamCore final : public RosCore {
   std::optional<Rigid3> map_from_odom_;              // as sent last
   std::deque<std::pair<int64_t, Rigid3>> unplaced_;  // map_from_base at times that the robot's odometry has not reached
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
+  std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;
 

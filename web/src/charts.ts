@@ -1,23 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracking time against the frame's budget, and tracked points, over the last minute.
+// What a frame's time went into, against its budget, and tracked points with the rules that made keyframes, over the
+// last minute.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import type { SessionEvent } from "./events";
 
 const kept = 18000; // frames, as the server keeps
+const shown = 60; // [s]
+// Stages that tracking itself consists of, bottom to top; what is left of it is the rest. Others have threads of their own.
+const parts = ["features", "motion", "flow", "filter", "keyframe_decision", "rest"];
+const beside = ["mapping", "loop", "global_ba", "detection", "wait_mapper", "wait_detector"];
+const shapes = ["●", "■", "▲", "◆"];
+
+type StageFact = { frame: number; times: Map<number, number> };
 
 export class Charts {
   private time: number[] = [];
+  private frames: number[] = [];
   private ms: number[] = [];
   private points: number[] = [];
-  private keyframe: (number | null)[] = [];
+  private keyframe: boolean[] = [];
   private lost: (number | null)[] = [];
+  private names: string[] = [];
+  private stages: StageFact[] = [];
+  private rules: string[] = []; // that made keyframes, in the order in which they came
+  private ruleOf = new Map<number, string>(); // by frame
   private plots: uPlot[] = [];
-  private drawn = 0;
+  private off = new Set<string>(beside.slice(1));
+  private legend = new Map<string, HTMLButtonElement>();
   private stale = false;
   budget = 33.3;
-  whole = false;
 
-  constructor(private timeBox: HTMLElement, private pointsBox: HTMLElement) {
+  constructor(private timeBox: HTMLElement, private pointsBox: HTMLElement, private stageBox: HTMLElement, private ruleBox: HTMLElement) {
     setInterval(() => this.draw(), 200);
     const observer = new ResizeObserver(() => {
       for (const [i, box] of [timeBox, pointsBox].entries())
@@ -28,25 +42,65 @@ export class Charts {
   }
   begin(budget: number): void {
     this.budget = budget;
-    this.time = [];
-    this.ms = [];
-    this.points = [];
-    this.keyframe = [];
-    this.lost = [];
+    for (const list of [this.time, this.frames, this.ms, this.points, this.keyframe, this.lost, this.stages] as unknown[][]) list.length = 0;
     this.stale = true;
   }
   take(data: DataView): void {
     for (let at = 0; at < data.byteLength; at += 20) {
       const inliers = data.getUint16(at + 16, true), state = data.getUint8(at + 18);
+      this.frames.push(data.getUint32(at, true));
       this.time.push(data.getFloat32(at + 12, true));
       this.ms.push(data.getFloat32(at + 4, true));
       this.points.push(inliers);
-      this.keyframe.push(data.getUint8(at + 19) ? inliers : null);
+      this.keyframe.push(data.getUint8(at + 19) === 1);
       this.lost.push(state === 2 ? 0 : null);
     }
     if (this.time.length > 2 * kept)
-      for (const list of [this.time, this.ms, this.points, this.keyframe, this.lost] as unknown[][]) list.splice(0, list.length - kept);
+      for (const list of [this.time, this.frames, this.ms, this.points, this.keyframe, this.lost] as unknown[][]) list.splice(0, list.length - kept);
     this.stale = true;
+  }
+  takeStageNames(names: string[]): void {
+    this.names = names;
+    for (const stage of [...parts, ...beside]) if (!this.legend.has(stage) && (names.includes(stage) || stage === "rest")) this.offer(stage);
+  }
+  takeStages(data: DataView): void {
+    for (let at = 0; at < data.byteLength; ) {
+      const n = data.getUint32(at + 8, true), times = new Map<number, number>();
+      for (let i = 0; i < n; i++) times.set(data.getUint16(at + 12 + 4 * i, true), data.getUint16(at + 14 + 4 * i, true) / 50);
+      this.stages.push({ frame: data.getUint32(at, true), times });
+      at += 12 + 4 * n;
+    }
+    if (this.stages.length > 4000) this.stages.splice(0, this.stages.length - 2000);
+    this.stale = true;
+  }
+  takeEvents(events: SessionEvent[]): void {
+    for (const e of events) {
+      if (e.kind !== "keyframe") continue;
+      const rule = e.text || "keyframe";
+      this.ruleOf.set(e.frame, rule);
+      if (this.rules.includes(rule)) continue;
+      this.rules.push(rule);
+      this.paint();
+    }
+    // The oldest are further back than the chart.
+    for (const frame of this.ruleOf.keys()) {
+      if (this.ruleOf.size < 4 * kept) break;
+      this.ruleOf.delete(frame);
+    }
+  }
+  private offer(stage: string): void {
+    const button = document.createElement("button");
+    button.textContent = `${parts.includes(stage) ? "■" : "●"} ${stage.replace("keyframe_", "").replace("_", " ")}`;
+    button.style.color = parts.includes(stage) ? `var(--${stage})` : "var(--text)";
+    button.title = parts.includes(stage) ? "part of tracking; click to hide or show" : "beside tracking, on another thread; click to hide or show";
+    button.setAttribute("aria-pressed", String(!this.off.has(stage)));
+    button.onclick = () => {
+      if (!this.off.delete(stage)) this.off.add(stage);
+      button.setAttribute("aria-pressed", String(!this.off.has(stage)));
+      this.stale = true;
+    };
+    this.legend.set(stage, button);
+    this.stageBox.replaceChildren(...[...parts, ...beside].flatMap((s) => this.legend.get(s) ?? []));
   }
   // Also after a change of colours.
   paint(): void {
@@ -63,29 +117,74 @@ export class Charts {
         scales: { x: { time: false }, y: { range: (_u, min, max) => range(min ?? 0, max ?? 1) } }, axes: axes(unit),
         series: [{}, ...series], padding: [6, 6, 0, 0],
       }, [[]], box);
+    const dots = (c: string, shape: string, size = 6): uPlot.Series => ({
+      stroke: c, width: 0, paths: () => null, points: { show: true, size, fill: c, ...markPaths(shape, size) },
+    });
+    const ruleColours = [colour("--keyframe"), colour("--loop"), colour("--motion"), colour("--flow")];
     this.plots = [
       make(this.timeBox, " ms", [
-        { stroke: colour("--used"), width: 1, points: { show: false } },
+        // The sums, the largest first: what is drawn later covers what lies below.
+        ...[...parts].reverse().map((s): uPlot.Series => ({ stroke: colour("--" + s), fill: colour("--" + s), width: 0, points: { show: false } })),
         { stroke: colour("--dynamic"), width: 1.5, dash: [6, 4], points: { show: false } },
+        ...beside.map(() => dots(colour("--text"), "●", 3)),
       ], (_min, max) => [0, Math.max(1.2 * this.budget, Math.min(max * 1.1, 6 * this.budget))]),
       make(this.pointsBox, "", [
         { stroke: colour("--used"), width: 1, points: { show: false } },
-        { stroke: colour("--keyframe"), width: 0, paths: () => null, points: { show: true, size: 6, fill: colour("--keyframe") } },
-        { stroke: colour("--dynamic"), width: 0, paths: () => null, points: { show: true, size: 5, fill: colour("--dynamic") } },
+        ...this.rules.map((_rule, i) => dots(ruleColours[i % 4], shapes[i % 4])),
+        dots(colour("--dynamic"), "×"),
       ], (_min, max) => [0, Math.max(10, max * 1.15)]),
     ];
+    this.ruleBox.replaceChildren(...this.rules.map((rule, i) => {
+      const item = document.createElement("span");
+      item.textContent = `${shapes[i % 4]} ${rule}`;
+      item.style.color = ruleColours[i % 4];
+      return item;
+    }));
+    this.ruleBox.title = "keyframes, by the rule that made them";
+    this.stageBox.title = `dashed: ${this.budget.toFixed(0)} ms, the frame's budget`;
     this.stale = true;
     this.draw();
   }
   private draw(): void {
     if (!this.stale || this.plots.length === 0 || document.hidden) return;
     this.stale = false;
-    this.drawn++;
     const last = this.time[this.time.length - 1] ?? 0;
-    let from = 0;
-    if (!this.whole) while (from < this.time.length && this.time[from] < last - 60) from++;
-    const t = this.time.slice(from);
-    this.plots[0].setData([t, this.ms.slice(from), t.map(() => this.budget)]);
-    this.plots[1].setData([t, this.points.slice(from), this.keyframe.slice(from), this.lost.slice(from)]);
+    let from = this.time.length;
+    while (from > 0 && this.time[from - 1] >= last - shown) from--;
+    const t = this.time.slice(from), frames = this.frames.slice(from), ms = this.ms.slice(from), points = this.points.slice(from);
+    const byFrame = new Map(this.stages.map((s) => [s.frame, s.times]));
+    const timeOf = (frame: number, stage: string) => byFrame.get(frame)?.get(this.names.indexOf(stage));
+    // Sums from below; a part that is hidden is left out.
+    const sums = t.map(() => 0), stack: number[][] = [];
+    for (const part of parts) {
+      for (let i = 0; i < t.length; i++) {
+        const known = parts.slice(0, -1).reduce((sum, p) => sum + (timeOf(frames[i], p) ?? 0), 0);
+        if (!this.off.has(part)) sums[i] += part === "rest" ? Math.max(0, ms[i] - known) : timeOf(frames[i], part) ?? 0;
+      }
+      stack.unshift([...sums]);
+    }
+    const others = beside.map((s) => (this.off.has(s) ? t.map(() => null) : frames.map((f) => timeOf(f, s) ?? null)));
+    this.plots[0].setData([t, ...stack, t.map(() => this.budget), ...others]);
+    const marks = this.rules.map((rule) => points.map((p, i) => (this.keyframe[from + i] && (this.ruleOf.get(frames[i]) ?? this.rules[0]) === rule ? p : null)));
+    this.plots[1].setData([t, points, ...marks, this.lost.slice(from)]);
   }
+}
+
+// Marks that differ in shape, not only in colour.
+function markPaths(shape: string, size: number): { paths?: uPlot.Series.Points.PathBuilder } {
+  if (shape === "●") return {};
+  const paths: uPlot.Series.Points.PathBuilder = (u, series, first, last) => {
+    const path = new Path2D(), r = (size / 2) * devicePixelRatio * 1.1;
+    for (let i = first; i <= last; i++) {
+      const value = u.data[series][i];
+      if (value == null) continue;
+      const x = u.valToPos(u.data[0][i], "x", true), y = u.valToPos(value, "y", true);
+      const corners: [number, number][] = shape === "■" ? [[-r, -r], [r, -r], [r, r], [-r, r]] : shape === "▲" ? [[-r, r], [0, -r], [r, r]] : shape === "◆" ? [[0, -r], [r, 0], [0, r], [-r, 0]]
+        : [[-r, -r], [0, -r / 2], [r, -r], [r / 2, 0], [r, r], [0, r / 2], [-r, r], [-r / 2, 0]];
+      corners.forEach(([dx, dy], k) => (k === 0 ? path.moveTo(x + dx, y + dy) : path.lineTo(x + dx, y + dy)));
+      path.closePath();
+    }
+    return { stroke: new Path2D(), fill: path };
+  };
+  return { paths };
 }

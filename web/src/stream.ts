@@ -3,6 +3,7 @@
 
 export const enum Kind {
   heartbeat, hello, keyframes, points, covisibility, loops, path, facts, events, frame, image, truth, pathReset,
+  moment, stageNames, stages, surface, grid,
 }
 export type Message = { kind: Kind; data: DataView };
 

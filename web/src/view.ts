@@ -10,12 +10,21 @@ export type Hello = {
   camera: { width: number; height: number; fx: number; fy: number; cx: number; cy: number };
 };
 export type Mode = "follow" | "free" | "top";
-export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops"] as const;
+export const layers = ["points", "keyframes", "covisibility", "path", "movers", "truth", "loops", "surface", "grid"] as const;
 export type Layer = (typeof layers)[number];
 
 const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
 
 type Palette = { keyframe: string; covisibility: string; path: string; loop: string; truth: string; camera: string; mover: string };
+
+// Without a GPU every sample of a pixel costs as much as a pixel.
+function drawnByProcessor(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
 
 export class View {
   readonly renderer: THREE.WebGLRenderer;
@@ -23,6 +32,8 @@ export class View {
   readonly controls: OrbitControls;
   mode: Mode = "follow";
   onMode: () => void = () => {};
+  onLead: () => void = () => {}; // a visitor turns this one
+  leader: View | null = null; // looks at what that one looks at
   onMeasure: (text: string) => void = () => {};
   private scene = new THREE.Scene();
   private poses = new Poses();
@@ -34,6 +45,8 @@ export class View {
   private truth = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private frustum = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private movers = new THREE.Group();
+  private surface = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }));
+  private grid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true, side: THREE.DoubleSide, depthWrite: false }));
   private marker = new THREE.Group();
   private labels: HTMLDivElement[] = [];
   private known = new Map<number, { frame: number; culled: boolean }>();
@@ -54,13 +67,16 @@ export class View {
   private hello: Hello | null = null;
 
   constructor(private canvas: HTMLCanvasElement, private overlay: HTMLElement) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnByProcessor() });
     this.camera.up.set(0, -1, 0); // the world's y is down
     this.camera.position.set(1.2, -2, -3);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.target.set(0, 0, 1);
     this.controls.enableDamping = !this.still.matches;
-    this.controls.addEventListener("start", () => this.setMode("free"));
+    this.controls.addEventListener("start", () => {
+      this.onLead();
+      this.setMode("free");
+    });
     this.controls.addEventListener("change", () => {
       this.movedAt = performance.now();
       this.dirty = true;
@@ -74,7 +90,8 @@ export class View {
     this.truth.matrixAutoUpdate = this.frustum.matrixAutoUpdate = false;
     this.truth.visible = false;
     this.scene.add(this.cloud.group, this.keyframes.object, this.covisibility.object, this.path.object,
-      this.loops.object, this.truth, this.frustum, this.movers, this.marker);
+      this.loops.object, this.truth, this.frustum, this.movers, this.marker, this.surface, this.grid);
+    this.surface.visible = this.grid.visible = this.grid.matrixAutoUpdate = false;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     const loop = () => {
       requestAnimationFrame(loop);
@@ -97,7 +114,7 @@ export class View {
     this.known.clear();
     this.edges.clear();
     this.clearPath();
-    this.truth.visible = false;
+    this.truth.visible = this.surface.visible = this.grid.visible = false;
     const c = hello.camera, z = 0.16;
     const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
     const corners = [corner(0, 0), corner(c.width, 0), corner(c.width, c.height), corner(0, c.height)];
@@ -171,6 +188,46 @@ export class View {
       for (let k = 1; k < 4; k++) points.push(data.getFloat32(at + 4 * k, true));
     this.truth.geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
   }
+  // The dense map's surface, in the world.
+  takeSurface(data: DataView): void {
+    const middle = [0, 4, 8].map((at) => data.getFloat32(at, true)), unit = data.getFloat32(12, true);
+    const n = data.getUint32(16, true), triangles = data.getUint32(20, true);
+    const position = new Float32Array(3 * n), colour = new Uint8Array(4 * n), index = new Uint16Array(3 * triangles);
+    for (let i = 0; i < 3 * n; i++) position[i] = middle[i % 3] + unit * data.getInt16(24 + 2 * i, true);
+    let at = 24 + 4 * Math.ceil((6 * n) / 4);
+    colour.set(new Uint8Array(data.buffer, data.byteOffset + at, 4 * n));
+    at += 4 * n;
+    for (let i = 0; i < 3 * triangles; i++) index[i] = data.getUint16(at + 2 * i, true);
+    this.surface.geometry.dispose();
+    const geometry = (this.surface.geometry = new THREE.BufferGeometry());
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colour, 4, true));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    this.surface.visible = !this.hidden.has("surface");
+    this.dirty = true;
+  }
+  // Where a robot can drive, on the floor: free is green, occupied orange, unknown nothing.
+  takeGrid(data: DataView): void {
+    const f = (i: number) => data.getFloat32(4 * i, true);
+    const [cell, x, y] = [f(0), f(1), f(2)], w = data.getUint32(40, true), h = data.getUint32(44, true);
+    const pixels = new Uint8Array(4 * w * h);
+    for (let at = 48, i = 0; at + 4 <= data.byteLength; at += 4) {
+      const end = Math.min(w * h, i + data.getUint16(at, true)), value = data.getUint16(at + 2, true);
+      for (; i < end; i++) pixels.set(value === 0 ? [230, 110, 0, 230] : value === 254 ? [0, 158, 115, 90] : [0, 0, 0, 0], 4 * i);
+    }
+    this.grid.material.map?.dispose();
+    const texture = (this.grid.material.map = new THREE.DataTexture(pixels, w, h));
+    texture.needsUpdate = this.grid.material.needsUpdate = true;
+    this.grid.geometry.dispose();
+    const geometry = (this.grid.geometry = new THREE.BufferGeometry());
+    const [right, top] = [x + w * cell, y + h * cell];
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute([x, y, 0, right, y, 0, right, top, 0, x, top, 0], 3));
+    geometry.setAttribute("uv", new THREE.Float32BufferAttribute([0, 1, 1, 1, 1, 0, 0, 0], 2)); // the first row is the top
+    geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    this.grid.matrix.copy(this.matrix([f(3), f(4), f(5), f(6), f(7), f(8), f(9)]).invert());
+    this.grid.visible = !this.hidden.has("grid");
+    this.dirty = true;
+  }
   private matrix(pose: number[]): THREE.Matrix4 {
     return new THREE.Matrix4().compose(new THREE.Vector3(pose[4], pose[5], pose[6]),
       new THREE.Quaternion(pose[0], pose[1], pose[2], pose[3]), new THREE.Vector3(1, 1, 1));
@@ -208,9 +265,10 @@ export class View {
     else this.hidden.add(layer);
     const objects: Record<Layer, THREE.Object3D> = {
       points: this.cloud.group, keyframes: this.keyframes.object, covisibility: this.covisibility.object,
-      path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object,
+      path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object, surface: this.surface, grid: this.grid,
     };
-    objects[layer].visible = on;
+    const empty = (layer === "surface" || layer === "grid") && !(objects[layer] as THREE.Mesh).geometry.index;
+    objects[layer].visible = on && !empty;
     this.dirty = true;
   }
   setMode(mode: Mode): void {
@@ -270,6 +328,7 @@ export class View {
   }
   // The camera turned, moved or brought nearer, by keys.
   turn(across: number, down: number): void {
+    this.onLead();
     this.setMode("free");
     const away = this.camera.position.clone().sub(this.controls.target);
     away.applyAxisAngle(this.camera.up, -across);
@@ -281,6 +340,7 @@ export class View {
     this.controls.update();
   }
   nearer(factor: number): void {
+    this.onLead();
     this.setMode("free");
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
     this.controls.update();
@@ -341,6 +401,15 @@ export class View {
     }
     this.staleKeyframes = this.staleEdges = false;
   }
+  private copyLeader(): void {
+    const { camera, controls } = this.leader!;
+    if (this.camera.position.equals(camera.position) && this.controls.target.equals(controls.target)) return;
+    this.camera.position.copy(camera.position);
+    this.camera.quaternion.copy(camera.quaternion);
+    this.controls.target.copy(controls.target);
+    this.movedAt = performance.now();
+    this.dirty = true;
+  }
   private follow(): void {
     if (this.mode !== "follow" || !this.cameraPose) return;
     const at = new THREE.Vector3(0, 0, 1.0).applyMatrix4(this.cameraPose);
@@ -354,8 +423,11 @@ export class View {
   private draw(): void {
     const now = performance.now();
     if (now - this.lastDrawn < 15) return;
-    this.follow();
-    this.controls.update();
+    if (this.leader) this.copyLeader();
+    else {
+      this.follow();
+      this.controls.update();
+    }
     if (this.poses.step()) this.dirty = true;
     const moving = now - this.movedAt < 250;
     if (!this.dirty && (moving || !this.coarse)) return;
@@ -365,8 +437,8 @@ export class View {
     this.coarse = moving && this.cloud.points > this.budget;
     this.render(moving ? this.budget : Infinity);
     // A coarser map where the machine does not keep up, a finer one where it does.
-    if (moving && interval > 40 && interval < 500) this.budget = Math.max(10000, this.budget * 0.9);
-    if (moving && interval < 25) this.budget = Math.min(4e6, this.budget * 1.03);
+    if (moving && interval > 31 && interval < 500) this.budget = Math.max(10000, this.budget * 0.9);
+    if (moving && interval < 22) this.budget = Math.min(4e6, this.budget * 1.03);
   }
   private render(points: number): void {
     this.rebuild();
@@ -379,6 +451,7 @@ export class View {
     data.points = String(this.cloud.points);
     data.cloudCalls = String(this.cloud.drawCalls);
     data.calls = String(this.renderer.info.render.calls);
+    data.look = this.camera.position.toArray().map((x) => x.toFixed(3)).join(" ");
     data.drawn = String(Number(data.drawn ?? 0) + 1);
   }
   private label(): void {

@@ -32,17 +32,31 @@ if (!existsSync(fetched) || readFileSync(fetched, "utf8") !== lock) {
 }
 const { chromium: launcher } = createRequire(join(work, "x.js"))("playwright-core");
 
-const run = spawn(program, ["run", sequence, "--viewer", "0", "--realtime", "--detector", "motion", "--quiet", "--out", join(work, "run")], { stdio: ["ignore", "inherit", "pipe"] });
-process.on("exit", () => run.kill("SIGKILL"));
-const url = await new Promise((found, failed) => {
-  let text = "";
-  run.stderr.on("data", (data) => {
-    text += data;
-    const match = /viewer: (\S+)\n/.exec(text);
-    if (match) found(match[1]);
+// Starts the program and gives the address of its page.
+const started = [];
+process.on("exit", () => started.forEach((p) => p.kill("SIGKILL")));
+async function serve(...words) {
+  const process = spawn(program, words, { stdio: ["ignore", "inherit", "pipe"] });
+  started.push(process);
+  const url = await new Promise((found, failed) => {
+    let text = "";
+    process.stderr.on("data", (data) => {
+      text += data;
+      const match = /viewer: (\S+)\n/.exec(text);
+      if (match) found(match[1]);
+    });
+    process.on("exit", () => failed(new Error(words[0] + " ended: " + text)));
   });
-  run.on("exit", () => failed(new Error("the run ended: " + text)));
-});
+  return { process, url };
+}
+async function interrupted({ process }) {
+  return new Promise((ended) => {
+    process.on("exit", ended);
+    process.kill("SIGINT");
+  });
+}
+const run = await serve("run", sequence, "--viewer", "0", "--realtime", "--detector", "motion", "--quiet", "--out", join(work, "run"));
+const { url } = run;
 
 // Playwright's own waitForFunction evaluates strings, which the page's policy forbids.
 async function until(page, holds, argument = null, seconds = 30) {
@@ -51,15 +65,15 @@ async function until(page, holds, argument = null, seconds = 30) {
 }
 const errors = [], outside = [];
 const browser = await launcher.launch({ executablePath: chromium, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
-async function open(options) {
+async function open(options, address = url) {
   const page = await browser.newPage(options);
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
-  page.on("request", (r) => new URL(r.url()).origin !== new URL(url).origin && !/^(blob|data):/.test(r.url()) && outside.push(r.url()));
-  const started = Date.now();
-  await page.goto(url);
+  page.on("request", (r) => new URL(r.url()).origin !== new URL(address).origin && !/^(blob|data):/.test(r.url()) && outside.push(r.url()));
+  const begun = Date.now();
+  await page.goto(address);
   await until(page, () => Number(document.getElementById("view")?.dataset.points ?? 0) > 100 || document.body.textContent.includes("no 3-D page"));
-  return { page, seconds: (Date.now() - started) / 1000 };
+  return { page, seconds: (Date.now() - begun) / 1000 };
 }
 const shoot = (page, name) => page.screenshot({ path: join(work, name + ".png") });
 const points = (page) => page.evaluate(() => Number(document.getElementById("view").dataset.points));
@@ -150,13 +164,84 @@ await late.page.screenshot({ path: join(work, "phone.png"), fullPage: true });
 await shoot(page, "event");
 
 assert.deepEqual(errors, []);
+assert.equal(await interrupted(run), 0);
+await page.close();
+await late.page.close();
+errors.length = 0; // the pages have lost their server
+
+// Replay.
+for (const [preset, more] of [["default", ["--dense"]], ["orb", []]])
+  execFileSync(program, ["run", sequence, "--record", "--detector", "none", "--preset", preset, ...more, "--quiet", "--out", join(work, preset)]);
+const replay = await serve("view", join(work, "orb"), "--port", "0", "--quiet");
+const { page: film } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" }, replay.url);
+const settled = (p) => until(p, () => document.body.dataset.settled === "true");
+const slide = async (p, share) => {
+  await p.evaluate((s) => {
+    const slider = document.getElementById("slider");
+    slider.value = String(s * Number(slider.max));
+    slider.dispatchEvent(new Event("input"));
+  }, share);
+  await settled(p);
+  await p.waitForTimeout(500);
+};
+await film.selectOption("#speed", "Infinity");
+await until(film, () => document.getElementById("play").textContent === "Play");
+await film.waitForTimeout(500);
+const all = await points(film);
+assert.equal(await frame(film), 40);
+assert.equal(await film.textContent("#badge"), "ended");
+await slide(film, 0.5);
+const middle = await frame(film);
+assert.ok(middle > 15 && middle < 25, "the middle: " + middle);
+assert.ok((await points(film)) < all, "fewer points in the middle");
+assert.ok((await film.locator("#events .future").count()) > 0, "what is to come is listed");
+for (const [key, wanted] of [["n", middle + 1], ["n", middle + 2], ["b", middle + 1], ["b", middle]]) {
+  await film.keyboard.press(key);
+  await until(film, (f) => document.getElementById("count").textContent.startsWith(`frame ${f} `), wanted);
+  await settled(film);
+}
+await shoot(film, "replay");
+await film.keyboard.press("Home");
+await settled(film);
+assert.ok((await frame(film)) <= 1);
+await film.locator("#events button").nth(1).click();
+await settled(film);
+assert.ok((await frame(film)) > 1, "an event leads to its time");
+await film.keyboard.press("End");
+await settled(film);
+await film.waitForTimeout(500);
+assert.equal(await points(film), all, "as many points as before at the end");
+
+// Two side by side, at the same time and with the same view.
+const two = await serve("view", join(work, "orb"), join(work, "default"), "--port", "0", "--quiet");
+const { page: pair } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" }, two.url);
+await pair.keyboard.press("Space");
+await slide(pair, 0.7);
+const counts = await pair.locator(".count").allTextContents();
+assert.equal(counts.length, 2);
+assert.ok(Math.abs(parseInt(counts[0].slice(6)) - parseInt(counts[1].slice(6))) <= 1, "the same time: " + counts);
+assert.deepEqual(await pair.locator(".name").allTextContents(), ["orb", "default"]);
+const right = await pair.locator(".view").nth(1).boundingBox();
+await pair.mouse.move(right.x + 200, right.y + 150);
+await pair.mouse.down();
+await pair.mouse.move(right.x + 300, right.y + 100, { steps: 4 });
+await pair.mouse.up();
+await slide(pair, 1);
+assert.equal(await pair.isVisible("#layer-surface"), true, "the second run has a dense map");
+assert.equal(await film.isVisible("#layer-surface"), false, "that one has none");
+assert.ok((await film.locator("#stages button").count()) >= 4, "stages are told apart");
+assert.match(await film.textContent("#rules"), /first.*baseline/);
+await until(pair, () => new Set([...document.querySelectorAll(".view")].map((view) => view.dataset.look)).size === 1);
+assert.equal(await pair.getAttribute("#free", "aria-pressed"), "true");
+await shoot(pair, "compare");
+const small = await open({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true }, two.url);
+assert.equal(await small.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, "no scrolling sideways");
+await small.page.waitForTimeout(1000);
+await small.page.screenshot({ path: join(work, "compare_phone.png"), fullPage: true });
+
+assert.deepEqual(errors, []);
 assert.deepEqual(outside, []);
 await browser.close();
-run.removeAllListeners("exit");
-const code = await new Promise((ended) => {
-  run.on("exit", ended);
-  run.kill("SIGINT");
-});
-assert.equal(code, 0);
+for (const server of [replay, two]) assert.equal(await interrupted(server), 0);
 console.log(`the page is as it should be; a late visitor saw the map after ${late.seconds.toFixed(1)} s`);
 process.exit(0);

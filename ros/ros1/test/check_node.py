@@ -4,12 +4,14 @@
 
 Writes OUT_FOLDER/odom.txt, the odometry in TUM format, and OUT_FOLDER/figures.txt, the last diagnostics.
 """
+import json
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -51,6 +53,12 @@ def wait_for(condition, seconds=60):
                 return True
         time.sleep(0.05)
     return False
+
+
+def page_answers():
+    address = f"http://127.0.0.1:{rospy.get_param('/dkb_slam/viewer_port')}/api/state"
+    with urllib.request.urlopen(address, timeout=10) as answer:
+        return json.load(answer)["frame"] >= 0
 
 
 def call(name, kind, *arguments):
@@ -111,6 +119,8 @@ def main():
     with open(out + "/figures.txt", "w") as file:
         for status in busy:
             file.write("; ".join(f"{v.key} {v.value}" for v in status.values) + "\n")
+
+    expect(page_answers(), "the live page answers")
 
     map_file = os.path.abspath(out + "/map.dkb")
     expect(call("save_map", MapFile, map_file) and os.path.getsize(map_file) > 1000, "save_map")

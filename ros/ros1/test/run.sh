@@ -30,7 +30,8 @@ cmake -S "$here/../dkb_slam_ros" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="
 cmake --build "$work/build" -j "$(nproc)" >"$work/build.log" 2>&1 || { tail -40 "$work/build.log"; exit 1; }
 
 # shellcheck disable=SC2016
-port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
+port=$(free_port)
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1 ROS_HOME=$work/ros ROS_LOG_DIR=$work/log
 export ROS_PACKAGE_PATH=$here/../dkb_slam_ros:/usr/share PYTHONPATH=$work/build/devel/lib/python3/dist-packages
 export CMAKE_PREFIX_PATH=$work/build/devel LD_LIBRARY_PATH=$work/build/devel/lib:$work/prefix/lib
@@ -49,11 +50,11 @@ until [[ $(python3 -c 'import rosgraph; print(rosgraph.is_master_online())') == 
 
 remaps=(rgb/image:=/camera/color/image_raw rgb/camera_info:=/camera/color/camera_info
   depth/image:=/camera/aligned_depth_to_color/image_raw)
-python3 - "$depth_factor" <<'PARAMETERS'
+python3 - "$depth_factor" "$(free_port)" <<'PARAMETERS'
 import sys
 import rospy
 rospy.set_param("/dkb_slam", {"base_from_cam": [0, 0, 0, -0.5, 0.5, -0.5, 0.5], "depth_factor": float(sys.argv[1]),
-                              "features": {"count": 900}, "grid_period": 2.0,
+                              "features": {"count": 900}, "grid_period": 2.0, "viewer_port": int(sys.argv[2]),
                               "queue_size": 200})  # no machine is too slow for the test
 PARAMETERS
 "$work/build/devel/lib/dkb_slam_ros/dkb_slam_node" "${remaps[@]}" >"$work/node.log" 2>&1 &

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "dkb/keyframes/keyframe_policy.h"
-#include "dkb_slam/keyframe_policy.h"
+#include "dkb_slam/options.h"
 
 namespace dkb {
 

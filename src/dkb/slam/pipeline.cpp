@@ -29,6 +29,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   publish(scene, tracked, decision, result);
   result.tracking_ms = working.ms();
   record_.add_time("tracking", result.tracking_ms);
+  result.stages = record_.take_news();
   return result;
 }
 

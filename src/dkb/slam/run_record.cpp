@@ -55,12 +55,19 @@ void RunRecord::set_map(const TrackingMap& map) {
 void RunRecord::add_time(const std::string& stage, double ms) {
   const std::lock_guard lock(mutex_);
   times_.add(stage, ms);
+  news_.add(stage, ms);
 }
 
 void RunRecord::add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times) {
   const std::lock_guard lock(mutex_);
   fill(counts_);
   times_.merge(times);
+  news_.merge(times);
+}
+
+std::vector<StageTime> RunRecord::take_news() {
+  const std::lock_guard lock(mutex_);
+  return news_.take().sums();
 }
 
 MapSnapshot RunRecord::map() const {

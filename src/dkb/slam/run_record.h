@@ -30,6 +30,9 @@ class RunRecord {
   // What the stages beside tracking have counted by now, and the durations since they were asked last.
   void add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times);
 
+  // The durations that came since they were asked for last, by stage.
+  std::vector<StageTime> take_news();
+
   MapSnapshot map() const;
   std::vector<TrajectoryFrame> trajectory(TrajectoryKind kind) const;
   std::vector<TrajectoryFrame> keyframes() const;
@@ -49,7 +52,7 @@ class RunRecord {
   TrackingMap map_;
   Statistics counts_;
   KeyframeTestCounts tests_;
-  StageTimes times_;
+  StageTimes times_, news_;
 };
 
 }  // namespace dkb

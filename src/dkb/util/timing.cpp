@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace dkb {
 
@@ -25,6 +26,13 @@ std::map<std::string, StageSummary> StageTimes::summaries() const {
     result[stage] = {sum / static_cast<double>(n), sorted[n / 2], sorted[std::min(n - 1, n * 95 / 100)], sorted.back(),
                      n};
   }
+  return result;
+}
+
+std::vector<StageTime> StageTimes::sums() const {
+  std::vector<StageTime> result;
+  for (const auto& [stage, samples] : samples_)
+    result.push_back({stage, std::accumulate(samples.begin(), samples.end(), 0.0F)});
   return result;
 }
 

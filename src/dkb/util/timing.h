@@ -31,6 +31,7 @@ class StageTimes {
   // Hands over what it holds.
   StageTimes take() { return std::exchange(*this, {}); }
   std::map<std::string, StageSummary> summaries() const;
+  std::vector<StageTime> sums() const;
   // As Statistics::stage_histograms.
   std::map<std::string, std::vector<int>> histograms() const;
 

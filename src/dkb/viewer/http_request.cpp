@@ -2,6 +2,7 @@
 #include "dkb/viewer/http_request.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 
 namespace dkb {
@@ -31,6 +32,18 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+// What follows the `=` after `name`, or nothing at all when it is not there.
+std::optional<std::string_view> value_in(std::string_view query, std::string_view name) {
+  while (!query.empty()) {
+    const size_t end = std::min(query.find('&'), query.size());
+    const std::string_view item = query.substr(0, end);
+    if (item == name) return std::string_view();
+    if (item.starts_with(name) && item.substr(name.size()).starts_with('=')) return item.substr(name.size() + 1);
+    query.remove_prefix(std::min(end + 1, query.size()));
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::string_view HttpRequest::header(std::string_view lower_case_name) const {
@@ -40,14 +53,15 @@ std::string_view HttpRequest::header(std::string_view lower_case_name) const {
 }
 
 bool HttpRequest::asks_for(std::string_view name) const {
-  std::string_view rest = query;
-  while (!rest.empty()) {
-    const size_t end = std::min(rest.find('&'), rest.size());
-    const std::string_view item = rest.substr(0, end);
-    if (item == name || (item.starts_with(name) && item.substr(name.size()) == "=1")) return true;
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  return false;
+  const std::optional<std::string_view> value = value_in(query, name);
+  return value && (value->empty() || *value == "1");
+}
+
+std::optional<uint64_t> HttpRequest::number(std::string_view name) const {
+  const std::string_view value = value_in(query, name).value_or("");
+  uint64_t number = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+  return error == std::errc() && end == value.data() + value.size() ? std::optional(number) : std::nullopt;
 }
 
 HttpRequestParser::State HttpRequestParser::refuse(int status) {

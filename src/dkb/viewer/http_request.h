@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,6 +24,8 @@ struct HttpRequest {
   std::string_view header(std::string_view lower_case_name) const;
   // Whether the query holds `name`, alone or as `name=1`.
   bool asks_for(std::string_view name) const;
+  // The whole number N of `name=N` in the query; nothing when it is missing or something else.
+  std::optional<uint64_t> number(std::string_view name) const;
 };
 
 // Takes a request's bytes as they come, in any pieces. Bounded: it keeps at most kMaxHead + kMaxBody bytes.

@@ -110,5 +110,15 @@ TEST(HttpRequestParser, SurvivesMutations) {
   EXPECT_GT(complete, 500);
 }
 
+TEST(HttpRequest, ReadsWholeNumbersOfTheQuery) {
+  HttpRequest request;
+  request.query = "n=1&from=0&to=18446744073709551615&far=18446744073709551616&minus=-1&half=1.5&empty=&bare";
+  EXPECT_EQ(request.number("n"), 1U);
+  EXPECT_EQ(request.number("from"), 0U);
+  EXPECT_EQ(request.number("to"), ~uint64_t{0});
+  for (const char* name : {"far", "minus", "half", "empty", "bare", "fro", "missing"})
+    EXPECT_FALSE(request.number(name)) << name;
+}
+
 }  // namespace
 }  // namespace dkb

@@ -93,7 +93,7 @@ int listen_on(const std::string& host, int port) {
     reason = errno;
     close(fd);
   }
-  throw InputError(fmt::format("--viewer: cannot serve at {}, port {} ({}); give another port, or 0 for any free one",
+  throw InputError(fmt::format("cannot serve the page at {}, port {} ({}); give another port, or 0 for any free one",
                                host, port, std::strerror(reason)));
 }
 
@@ -105,7 +105,7 @@ HttpServer::HttpServer(const std::string& host, int port, AccessRules rules, Htt
   wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_fd_ < 0) {
     close(listener_);
-    throw InputError("--viewer: too many open files");
+    throw InputError("cannot serve the page: too many open files");
   }
 }
 

@@ -31,6 +31,14 @@ enum class StreamMessage : uint8_t {
   image = 10,        // uint32 frame, uint32 0 colour or 1 depth, JPEG
   truth = 11,        // {float32 time, x, y, z}: the whole of it
   path_reset = 12,   // empty: the path comes anew
+  moment = 13,       // of files: "DKBS"; uint32 flags (session_file.h); float64 seconds since the first frame; int32
+                     // frame; uint32 bytes of the messages that follow and belong to it
+  stage_names = 14,  // JSON array: the whole list
+  stages = 15,       // {uint32 frame; float32 time; uint32 n; n x {uint16 stage, time in 1/50 ms}}
+  surface = 16,      // float32 x y z, unit; uint32 vertices v, triangles t; v x int16 x y z in units from x y z, padded
+                     // to 4; v x uint8 r g b 0; t x uint16 a b c: of the dense map, the whole of it
+  grid = 17,         // float32 cell, x, y; float32 q[x y z w], t[3] floor_from_world; uint32 width, height; {uint16 n,
+                     // value}: n cells of that value, by rows from the top
 };
 
 // Appends numbers as they lie in memory, which is little-endian on all machines this runs on.
@@ -93,6 +101,8 @@ class MapDeltas {
   bool write(Client& client, StreamWriter& out, size_t budget) const;
 
   double unit() const { return unit_; }  // [m]
+  int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
+  uint64_t world() const { return world_; }  // its number: another one after clear()
 
  private:
   struct Keyframe {

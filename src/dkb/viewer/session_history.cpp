@@ -7,8 +7,10 @@
 
 namespace dkb {
 
-void SessionHistory::add(const FrameFact& fact) {
+void SessionHistory::add(FrameFact fact) {
   if (!first_stamp_) first_stamp_ = fact.stamp_ns;
+  add_stages(fact);
+  fact.stages.clear();
   facts_.push_back(fact);
   if (facts_.size() > kFacts) {
     facts_.pop_front();
@@ -33,11 +35,50 @@ void SessionHistory::add(const FrameFact& fact) {
   ++path_generation_;
 }
 
+void SessionHistory::add_stages(const FrameFact& fact) {
+  StagesOfFrame of{fact.frame, static_cast<float>(seconds_of(fact.stamp_ns)), {}};
+  for (const StageTime& s : fact.stages) {
+    auto name = std::find(stage_names_.begin(), stage_names_.end(), s.stage);
+    if (name == stage_names_.end()) name = stage_names_.insert(name, s.stage);
+    of.times.emplace_back(static_cast<uint16_t>(name - stage_names_.begin()),
+                          static_cast<uint16_t>(std::clamp(50 * s.ms, 0.0F, 65535.0F)));
+  }
+  if (of.times.empty()) return;
+  stages_.push_back(std::move(of));
+  if (stages_.size() <= kStages) return;
+  stages_.pop_front();
+  ++stages_gone_;
+}
+
+void SessionHistory::write_stages(Client& client, StreamWriter& out) const {
+  if (client.stage_names < stage_names_.size()) {
+    client.stage_names = stage_names_.size();
+    out.message(StreamMessage::stage_names, [&](StreamWriter& m) { m.put_bytes(nlohmann::json(stage_names_).dump()); });
+  }
+  client.stages = std::max(client.stages, stages_gone_);
+  out.message(StreamMessage::stages, [&](StreamWriter& m) {
+    for (; client.stages - stages_gone_ < stages_.size(); ++client.stages) {
+      const StagesOfFrame& of = stages_[client.stages - stages_gone_];
+      m.put(static_cast<uint32_t>(of.frame));
+      m.put(of.seconds);
+      m.put(static_cast<uint32_t>(of.times.size()));
+      for (const auto& [stage, time] : of.times) {
+        m.put(stage);
+        m.put(time);
+      }
+    }
+  });
+}
+
 void SessionHistory::add(SessionEvent event) {
   events_.push_back(std::move(event));
   if (events_.size() <= kEvents) return;
   events_.pop_front();
   ++events_gone_;
+}
+
+double SessionHistory::seconds_of(int64_t stamp_ns) const {
+  return first_stamp_ ? static_cast<double>(stamp_ns - *first_stamp_) * 1e-9 : 0;
 }
 
 void SessionHistory::clear_path() {
@@ -46,7 +87,7 @@ void SessionHistory::clear_path() {
   ++path_generation_;
 }
 
-void SessionHistory::write(Client& client, StreamWriter& out) const {
+void SessionHistory::write(Client& client, StreamWriter& out, int keyframes) const {
   out.message(StreamMessage::facts, [&](StreamWriter& m) {
     client.facts = std::max(client.facts, facts_gone_);
     for (; client.facts - facts_gone_ < facts_.size(); ++client.facts) {
@@ -54,19 +95,20 @@ void SessionHistory::write(Client& client, StreamWriter& out) const {
       m.put(static_cast<uint32_t>(f.frame));
       m.put(f.tracking_ms);
       m.put(f.waiting_ms);
-      m.put(static_cast<float>(static_cast<double>(f.stamp_ns - *first_stamp_) * 1e-9));
+      m.put(static_cast<float>(seconds_of(f.stamp_ns)));
       m.put(f.inliers);
       m.put(static_cast<uint8_t>(f.state));
       m.put<uint8_t>(f.made_keyframe ? 1 : 0);
     }
   });
+  write_stages(client, out);
   if (client.path_generation != path_generation_) {
     if (client.path_generation != 0) out.empty_message(StreamMessage::path_reset);
     client.path_generation = path_generation_;
     client.path = 0;
   }
   out.message(StreamMessage::path, [&](StreamWriter& m) {
-    for (; client.path < path_.size(); ++client.path) {
+    for (; client.path < path_.size() && path_[client.path].host < keyframes; ++client.path) {
       const PathPoint& p = path_[client.path];
       m.put(static_cast<uint32_t>(p.frame));
       m.put<int32_t>(p.host);
@@ -78,7 +120,7 @@ void SessionHistory::write(Client& client, StreamWriter& out) const {
     nlohmann::json list = nlohmann::json::array();
     for (; client.events - events_gone_ < events_.size(); ++client.events) {
       const SessionEvent& e = events_[client.events - events_gone_];
-      list.push_back({{"kind", e.kind}, {"frame", e.frame}, {"text", e.text}});
+      list.push_back({{"kind", e.kind}, {"frame", e.frame}, {"text", e.text}, {"time", seconds_of(e.stamp_ns)}});
     }
     out.message(StreamMessage::events, [&](StreamWriter& m) {
       m.put_bytes(list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -17,14 +17,14 @@ FrameFact fact(int frame, double x) {
 }
 size_t bytes_for(const SessionHistory& history, SessionHistory::Client& client) {
   StreamWriter out;
-  history.write(client, out);
+  history.write(client, out, 1);
   return out.size();
 }
 
 TEST(SessionHistory, TellsEachClientOnce) {
   SessionHistory history;
   for (int i = 0; i < 100; ++i) history.add(fact(i, 0.1 * i));
-  history.add(SessionEvent{"note", "hello", 3});
+  history.add(SessionEvent{"note", "hello", 3, 0});
   SessionHistory::Client client;
   EXPECT_GT(bytes_for(history, client), 100U * (20 + 20));
   EXPECT_EQ(bytes_for(history, client), 0U);
@@ -32,12 +32,30 @@ TEST(SessionHistory, TellsEachClientOnce) {
   EXPECT_EQ(bytes_for(history, client), 8U + 20 + 8 + 20);
 }
 
+TEST(SessionHistory, TellsStagesByNumberAndTheirNamesOnce) {
+  SessionHistory history;
+  FrameFact f = fact(0, 0);
+  f.stages = {{"features", 2.5F}, {"flow", 1.0F}};
+  history.add(f);
+  SessionHistory::Client client;
+  const size_t first = bytes_for(history, client);
+  f.frame = 1;
+  f.stages = {{"flow", 3000.0F}};
+  history.add(f);
+  // A fact; one stage; no further point of the path.
+  EXPECT_EQ(bytes_for(history, client), 8U + 20 + 8 + 12 + 4);
+  SessionHistory::Client late;
+  EXPECT_EQ(bytes_for(history, late), first + 20 + 12 + 4);
+}
+
 TEST(SessionHistory, StaysBoundedOverADay) {
   SessionHistory history;
   SessionHistory::Client early;
   for (int i = 0; i < 24 * 3600 * 30; ++i) {
-    history.add(fact(i, 0.02 * (i % 100000)));
-    if (i % 100 == 0) history.add(SessionEvent{"keyframe", "", i});
+    FrameFact f = fact(i, 0.02 * (i % 100000));
+    f.stages = {{"features", 2.5F}, {"flow", 1.0F}};
+    history.add(f);
+    if (i % 100 == 0) history.add(SessionEvent{"keyframe", "", i, 0});
     if (i == 50) bytes_for(history, early);
   }
   EXPECT_LT(history.path_size(), SessionHistory::kPath);

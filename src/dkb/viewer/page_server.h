@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <thread>
+
+#include "dkb/viewer/http_server.h"
+
+namespace dkb {
+
+// An HttpServer on a thread of its own, of low priority, with the rules that follow from where it is bound to.
+class PageServer {
+ public:
+  // `host`: anything but a loopback name asks every visitor for a token. Throws InputError.
+  PageServer(const std::string& host, int port, HttpService& service);
+  ~PageServer();
+
+  std::string url() const;  // to open; holds the token where one is asked for
+  void wake() { server_.wake(); }
+
+ private:
+  const std::string host_;
+  const AccessRules rules_;
+  HttpServer server_;
+  std::thread thread_;
+};
+
+// What a service answers, most of the time.
+HttpAnswer json_answer(int status, std::string json);
+HttpAnswer refusal_answer(int status, const std::string& why);
+
+}  // namespace dkb
