@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/folder_source.h"
@@ -144,13 +145,12 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
     }
   };
   if (!camera.empty()) writer->add_text(kCameraText, camera);
-  std::optional<size_t> camera_topic;
-  if (!camera.empty()) camera_topic = writer->add_topic(kCameraTopic, "std_msgs/String", true);
+  bool camera_due = !camera.empty();  // at the time of the first message
+  const size_t camera_topic = camera_due ? writer->add_topic(kCameraTopic, "std_msgs/String", true) : 0;
 
   Converted converted{0, "messages"};
   while (const auto message = stream.next()) {
-    if (camera_topic) writer->write(*camera_topic, message->recorded_ns, encode_string(camera));
-    camera_topic.reset();
+    if (std::exchange(camera_due, false)) writer->write(camera_topic, message->recorded_ns, encode_string(camera));
     add_topics();
     const Written& written = topics[message->topic];
     if (written.to_ros1 == nullptr) continue;
