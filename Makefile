@@ -42,7 +42,7 @@ test: deps  ## Release build of everything, then all tests
 	cmake --build build -j $(JOBS)
 	ctest --test-dir build --output-on-failure -j $(JOBS)
 
-test-san: test-asan test-tsan  ## Unit tests under AddressSanitizer + UBSan, then ThreadSanitizer
+test-san: test-asan test-tsan  ## Unit tests under AddressSanitizer + UBSan, those with threads under ThreadSanitizer
 
 test-asan: deps
 	cmake --preset asan
@@ -53,9 +53,9 @@ test-asan: deps
 
 test-tsan: deps
 	cmake --preset tsan
-	$(NO_ASLR) cmake --build build-tsan --target unit_tests -j $(JOBS)
+	$(NO_ASLR) cmake --build build-tsan --target thread_tests -j $(JOBS)
 	TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1 \
-	$(NO_ASLR) ctest --test-dir build-tsan -L unit --output-on-failure --no-tests=error -j $(JOBS)
+	$(NO_ASLR) ctest --test-dir build-tsan -L threads --output-on-failure --no-tests=error -j $(JOBS)
 
 # These want sequences made for them: docs/benchmarks.md.
 NEED_SEQUENCES = $(addprefix bench/,correction_bench.cpp dense_bench.cpp movers_bench.cpp relocalise_bench.cpp soak_bench.cpp)

@@ -19,6 +19,30 @@ if(DKB_WERROR)
   target_compile_options(dkb_warnings INTERFACE -Werror)
 endif()
 
+# dkb_unit_test(PROGRAM LABEL files ...) declares a program of unit tests, which the sanitizers run, and gives LABEL what
+# its tests are labelled: `unit`, or `unit.threads` where a file of them or a header beside it has to do with threads, and
+# ThreadSanitizer looks at them too.
+function(dkb_unit_test program label)
+  set_property(GLOBAL APPEND PROPERTY DKB_UNIT_TESTS ${program})
+  set(found unit)
+  foreach(file ${ARGN})
+    string(REGEX REPLACE "(_test)?\\.cpp$" ".h" header ${file})
+    foreach(one ${file} ${header})
+      if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${one})
+        file(STRINGS ${CMAKE_CURRENT_SOURCE_DIR}/${one} threads LIMIT_COUNT 1
+          REGEX "#include (<(thread|mutex|atomic|condition_variable)>|\"dkb/util/(bounded_queue|due_stage)\\.h\")")
+        if(threads)
+          set(found unit.threads)
+        endif()
+      endif()
+    endforeach()
+  endforeach()
+  if(found STREQUAL unit.threads)
+    set_property(GLOBAL APPEND PROPERTY DKB_THREAD_TESTS ${program})
+  endif()
+  set(${label} ${found} PARENT_SCOPE)
+endfunction()
+
 # dkb_room(NAME [NOT_INSTALLED] SOURCES a.cpp ... TESTS a_test.cpp ... DEPENDS lower rooms and libraries PRIVATE_DEPENDS ... TEST_DEPENDS ...)
 #
 # One folder, one static library dkb_NAME, one test program dkb_NAME_test. A room names only rooms below it. The
@@ -42,8 +66,8 @@ function(dkb_room name)
   endif()
   if(BUILD_TESTING AND ROOM_TESTS)
     add_executable(dkb_${name}_test ${ROOM_TESTS})
-    set_property(GLOBAL APPEND PROPERTY DKB_UNIT_TESTS dkb_${name}_test)
+    dkb_unit_test(dkb_${name}_test label ${ROOM_SOURCES} ${ROOM_TESTS})
     target_link_libraries(dkb_${name}_test PRIVATE dkb_${name} dkb_warnings ${ROOM_TEST_DEPENDS} GTest::gtest GTest::gtest_main)
-    gtest_discover_tests(dkb_${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS unit)
+    gtest_discover_tests(dkb_${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS ${label})
   endif()
 endfunction()

@@ -70,7 +70,7 @@ TEST_F(Bench, ReportsEveryRunAndDoesNotRepeatIt) {
   const std::string markdown = read_text(temp_.path() / "out" / "results.md");
   for (const char* says : {"| short | ORB | 2 | 6 |", "## Against ORB", "## Times and memory"})
     EXPECT_NE(markdown.find(says), std::string::npos) << says;
-  EXPECT_NE(read_text(temp_.path() / "out" / "results.html").find("<svg"), std::string::npos);
+  EXPECT_NE(read_text(temp_.path() / "out" / "report.html").find("<svg"), std::string::npos);
   for (const char* plot : {"ape.svg", "short-bars.svg", "short-paths.svg"})
     EXPECT_TRUE(fs::exists(temp_.path() / "out" / "plots" / plot)) << plot;
   EXPECT_FALSE(fs::exists(temp_.path() / "out" / "work")) << "nothing is left of the runs";
@@ -148,7 +148,7 @@ TEST_F(Bench, MergedShardsEqualTheWhole) {
   const Finished merged = bench({"--merge", (temp_ / "parts").string(), "--out", out("merged"), "--no-times"});
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
   EXPECT_NE(merged.out.find("4 of 4 runs"), std::string::npos) << merged.out;
-  for (const char* name : {"results.md", "results.html", "results.json"})
+  for (const char* name : {"results.md", "report.html", "results.json"})
     EXPECT_EQ(read_text(temp_ / "whole" / name), read_text(temp_ / "merged" / name)) << name;
   for (const auto& plot : fs::directory_iterator(temp_ / "whole" / "plots"))
     EXPECT_EQ(read_text(plot.path()), read_text(temp_ / "merged" / "plots" / plot.path().filename().string()));

@@ -52,7 +52,7 @@ std::vector<bool> chosen(const std::vector<std::string>& names, const std::vecto
 }
 
 void say_report(const fs::path& folder) {
-  fmt::print("{}: results.md, results.html, results.json, plots/\n", folder.string());
+  fmt::print("{}: results.md, report.html, results.json, plots/\n", folder.string());
 }
 
 // `--merge DIR`: DIR may be a results folder, or hold several of them.

@@ -409,7 +409,7 @@ void write_report(const std::filesystem::path& folder, const Report& report) {
   make_output_folder(folder / "plots");
   for (const auto& [name, svg] : report.plots) write_file_atomically(folder / "plots" / name, svg);
   write_file_atomically(folder / "results.json", report.json);
-  write_file_atomically(folder / "results.html", report.html);
+  write_file_atomically(folder / "report.html", report.html);
   write_file_atomically(folder / "results.md", report.markdown);
 }
 

@@ -74,7 +74,7 @@ struct Report {
 // `folder` gives the trajectories for the plots.
 Report make_report(const ResultsFolder& folder, const ReportOptions& options);
 
-// results.md, results.html, results.json and plots/*.svg. Throws OutputError.
+// results.md, report.html, results.json and plots/*.svg. Throws OutputError.
 void write_report(const std::filesystem::path& folder, const Report& report);
 
 }  // namespace dkb::bench
