@@ -54,7 +54,7 @@ test-asan: deps
 test-tsan: deps
 	cmake --preset tsan
 	$(NO_ASLR) cmake --build build-tsan --target thread_tests -j $(JOBS)
-	TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1 \
+	TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1:suppressions=$(CURDIR)/cmake/threads.supp:print_suppressions=0 \
 	$(NO_ASLR) ctest --test-dir build-tsan -L threads --output-on-failure --no-tests=error -j $(JOBS)
 
 # These want sequences made for them: docs/benchmarks.md.
