@@ -76,7 +76,7 @@ TEST(Simulate, ABlackoutThatIsNoTimeIsRefused) {
     const Finished run =
         run_program({"simulate", "--out", (folder / "s").string(), std::string("--blackout=") + value});
     EXPECT_EQ(run.exit_code, 2) << value;
-    EXPECT_NE(run.err.find("blackout."), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("--blackout "), std::string::npos) << run.err;
   }
 }
 
