@@ -108,8 +108,9 @@ Statistics statistics_with(const Slam& slam, const RunFacts& facts) {
   return s;
 }
 
-void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
-  write_by_map(folder, "trajectory", trajectories_by_map(slam.trajectory(), facts.stamps));
+void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
+                   const RunFacts& facts) {
+  write_by_map(folder, "trajectory", trajectories);
   write_by_map(folder, "trajectory_online", trajectories_by_map(slam.online_trajectory(), facts.stamps));
   write_by_map(folder, "keyframes", trajectories_by_map(slam.keyframes(), facts.stamps));
   if (facts.writes_map) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dkb/dataset/movers_file.h"
+#include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
 
@@ -30,8 +31,10 @@ double seconds_since_process_start();
 // The system's statistics, with the stages that it does not have.
 Statistics statistics_with(const Slam& slam, const RunFacts& facts);
 
-// Writes every result of the contract into `folder`, each file atomically. Throws OutputError.
-void write_outputs(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
+// Writes every result of the contract into `folder`, each file atomically; `trajectories` are Slam's by map, which
+// takes a moment to smooth. Throws OutputError.
+void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
+                   const RunFacts& facts);
 
 // dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws
 // OutputError.

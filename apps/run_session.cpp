@@ -102,7 +102,7 @@ DetectorChoice detector_choice(const RunArguments& args, const Options& options,
 }
 
 report::ReportFacts report_facts(const RunArguments& args, const Source& source, const Options& options,
-                                 const Slam& slam, const RunFacts& facts) {
+                                 const Slam& slam, const Trajectory& trajectory, const RunFacts& facts) {
   report::ReportFacts r;
   r.name = source_name(args.source);
   r.source = source.description();
@@ -113,7 +113,7 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   r.skipped = facts.skipped;
   r.wall_s = facts.wall_s;
   r.statistics = statistics_with(slam, facts);
-  r.trajectory = trajectories_by_map(slam.trajectory(), facts.stamps).front();
+  r.trajectory = trajectory;
   r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
   r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
   r.seed = options.seed;
@@ -260,8 +260,9 @@ void RunSession::write(double seconds) {
     const std::string line = write_dense_map(out_, map, building.ms() / 1000);
     if (!args_.quiet) fmt::print("{}\n", line);
   }
-  write_outputs(out_, *slam_, facts_);
-  const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, facts_);
+  const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
+  write_outputs(out_, *slam_, trajectories, facts_);
+  const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
   write_file_atomically(out_ / "report.html",
                         report_html(*log_, reported, report::truth_beside(args_.source, reported.trajectory)));
   if (args_.cv_orb && interrupted_.empty()) write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));

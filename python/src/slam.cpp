@@ -360,7 +360,7 @@ frame is not counted then and the next one goes on. Shows a SlamWarning when a d
       .def("trajectory", &trajectory, py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
            R"(trajectory(*, map=0, online=False) -> (stamps_ns, poses)
 
-Every tracked frame by the map as it is now; complete after finish(). From any thread.
+Every tracked frame by the map as it is now, smoothed by the frames around it; complete after finish(). From any thread.
 
 stamps_ns: int64 [N]; poses: float64 [N, 4, 4], world_from_cam, [m]. map: 0 = the first one; maps that were never joined
 have worlds of their own. online: as each frame was published.)")
