@@ -64,13 +64,13 @@ void print_info(const std::string& path) {
   fmt::print("pyramid: {} levels of {}\n", file.context.levels, file.context.scale_factor);
 }
 
-struct ExportArguments {
+struct MapExportArguments {
   std::string file, format, out, images;
   DetectorChoice detection;
 };
 
 // A model for photogrammetry or splatting, with pictures and masks where their source is given.
-void export_model(const ExportArguments& arguments) {
+void export_model(const MapExportArguments& arguments) {
   const MapFile file = load_map(arguments.file);
   const bool colmap = arguments.format == "colmap";
   const std::filesystem::path out = arguments.out;
@@ -97,7 +97,7 @@ void export_model(const ExportArguments& arguments) {
              file.map.point_count(), pictures);
 }
 
-void export_map(const ExportArguments& arguments) {
+void export_map(const MapExportArguments& arguments) {
   if (arguments.format == "colmap" || arguments.format == "nerfstudio") return export_model(arguments);
   const MapFile file = load_map(arguments.file);
   const std::string cloud = arguments.format == "ply"   ? point_cloud_ply(file.map)
@@ -148,7 +148,7 @@ void register_map(CLI::App& app, int& exit_code) {
   });
 
   CLI::App* cloud = command->add_subcommand("export", "Write the map for other tools");
-  auto arguments = std::make_shared<ExportArguments>();
+  auto arguments = std::make_shared<MapExportArguments>();
   cloud->add_option("FILE", arguments->file, "map.dkb")->required();
   cloud->add_option("--format", arguments->format, "ply, pcd, json: the points as a cloud; colmap, nerfstudio: a model")
       ->required()

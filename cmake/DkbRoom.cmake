@@ -6,7 +6,10 @@ target_compile_features(dkb_compile_options INTERFACE cxx_std_20)
 # -ffp-contract=off: the same source gives the same bits whatever the compiler would like to fuse.
 target_compile_options(dkb_compile_options INTERFACE -ffp-contract=off)
 if(DKB_SANITIZE)
-  target_compile_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE} -fno-omit-frame-pointer -g1 -fno-sanitize-recover=all)
+  # A null pointer that is used is a crash, which AddressSanitizer tells of: to look for it before each use as well takes
+  # a fifth of the build's time.
+  target_compile_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE} -fno-sanitize=null -fno-omit-frame-pointer -g1
+    -fno-sanitize-recover=all)
   target_link_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE})
 endif()
 if(DKB_FUZZ AND CMAKE_CXX_COMPILER_ID MATCHES Clang)

@@ -12,7 +12,7 @@
 namespace dkb::report {
 namespace {
 
-constexpr double kWidth = 320;  // [px] wanted
+constexpr double kWantedWidth = 320;  // [px] wanted
 constexpr int kQuality = 72;
 
 // Means over blocks of `factor` pixels a side. `channels` bytes a pixel.
@@ -99,7 +99,7 @@ std::string base64(const std::string& bytes) {
 
 OverlayPicture take_picture(size_t row, const Frame& frame, const FrameResult& result) {
   const int full_width = frame.grey().width, full_height = frame.grey().height;
-  const int factor = std::max(1, static_cast<int>(std::lround(full_width / kWidth)));
+  const int factor = std::max(1, static_cast<int>(std::lround(full_width / kWantedWidth)));
   OverlayPicture picture{row, full_width / factor, full_height / factor, 1.0 / factor, jpeg_of(frame, factor), {}, {},
                          {}};
   for (const FeatureReport& f : result.features)

@@ -67,6 +67,7 @@ def _build():
     folder = ROOT / f"build-{_tag()}"
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
     _run("cmake", "-S", ROOT, "-B", folder, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF",
+         "-DCMAKE_UNITY_BUILD=ON", "-DCMAKE_UNITY_BUILD_BATCH_SIZE=6",
          "-DDKB_PYTHON=ON", f"-DPython_EXECUTABLE={sys.executable}", *shlex.split(os.environ.get("CMAKE_ARGS", "")))
     _run("cmake", "--build", folder, "--target", "dkb_python", "-j", os.cpu_count() or 1)
     return folder

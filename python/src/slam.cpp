@@ -390,7 +390,7 @@ have worlds of their own. online: as each frame was published.)")
             return text;
           },
           "config_yaml() -> str\n\nThe preset and every setting, a line each with its unit and meaning.")
-      .def("__repr__", &repr_of);
+      .def("__repr__", [](const PySlam& slam) { return repr_of(slam); });
 }
 
 }  // namespace dkb::python

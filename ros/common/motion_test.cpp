@@ -8,7 +8,7 @@
 namespace dkb_ros {
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kMillisecond = 1'000'000;
 
 // The camera on a robot: 0.2 m ahead of the base, 0.5 m up, looking ahead.
 Rigid3 mount() {
@@ -60,28 +60,28 @@ TEST(Covariance, OfTheBaseIsThatOfPosesDrawnAroundTheCamera) {
 
 TEST(OdometryHistory, GivesTheMotionBetweenItsMessages) {
   OdometryHistory history(0.02);
-  for (int64_t t = 0; t <= 1000; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMs)));
-  const auto prior = history.between(333 * kMs, 366 * kMs);
+  for (int64_t t = 0; t <= 1000; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMillisecond)));
+  const auto prior = history.between(333 * kMillisecond, 366 * kMillisecond);
   ASSERT_TRUE(prior);
   const Rigid3 truth = on_circle(0.333).inverse() * on_circle(0.366);
   EXPECT_LT((prior->previous_from_current.translation - truth.translation).norm(), 1e-4);
   EXPECT_LT(prior->previous_from_current.rotation.angularDistance(truth.rotation), 1e-4);
   // Beyond the newest message by its twist, but not far; and not before the first.
-  EXPECT_TRUE(history.between(980 * kMs, 1033 * kMs));
-  EXPECT_FALSE(history.between(980 * kMs, 1133 * kMs));
-  EXPECT_FALSE(history.between(-10 * kMs, 33 * kMs));
+  EXPECT_TRUE(history.between(980 * kMillisecond, 1033 * kMillisecond));
+  EXPECT_FALSE(history.between(980 * kMillisecond, 1133 * kMillisecond));
+  EXPECT_FALSE(history.between(-10 * kMillisecond, 33 * kMillisecond));
   // 2% of 0.0165 m and 1 mm.
   EXPECT_NEAR(std::sqrt(prior->covariance(0, 0)), 0.02 * 0.0165 + 1e-3, 1e-4);
 }
 
 TEST(OdometryHistory, LeavesOutWhatIsLateOrNoNumber) {
   OdometryHistory history(0.02);
-  EXPECT_TRUE(history.add(odometry_at(20 * kMs)));
-  EXPECT_FALSE(history.add(odometry_at(20 * kMs)));
-  OdometryMessage broken = odometry_at(40 * kMs);
+  EXPECT_TRUE(history.add(odometry_at(20 * kMillisecond)));
+  EXPECT_FALSE(history.add(odometry_at(20 * kMillisecond)));
+  OdometryMessage broken = odometry_at(40 * kMillisecond);
   broken.pose.translation.x() = NAN;
   EXPECT_FALSE(history.add(broken));
-  EXPECT_FALSE(history.between(20 * kMs, 20 * kMs + 1'000'000'000));
+  EXPECT_FALSE(history.between(20 * kMillisecond, 20 * kMillisecond + 1'000'000'000));
 }
 
 TEST(GyroHistory, AddsUpRotations) {
@@ -89,23 +89,23 @@ TEST(GyroHistory, AddsUpRotations) {
   ImuMessage m;
   m.angular_velocity = {0, 0, 0.4};
   for (int64_t t = 0; t <= 100; t += 5) {
-    m.stamp_ns = t * kMs;
+    m.stamp_ns = t * kMillisecond;
     EXPECT_TRUE(history.add(m));
   }
-  const auto prior = history.between(3 * kMs, 98 * kMs);
+  const auto prior = history.between(3 * kMillisecond, 98 * kMillisecond);
   ASSERT_TRUE(prior);
   EXPECT_TRUE(prior->rotation_only);
   EXPECT_LT(prior->previous_from_current.rotation.angularDistance(rotation_by({0, 0, 0.4 * 0.095})), 1e-9);
-  EXPECT_FALSE(history.between(3 * kMs, 300 * kMs));
-  m.stamp_ns = 200 * kMs;
+  EXPECT_FALSE(history.between(3 * kMillisecond, 300 * kMillisecond));
+  m.stamp_ns = 200 * kMillisecond;
   m.covariance(0, 0) = -1;  // an imu without a gyroscope
   EXPECT_FALSE(history.add(m));
 }
 
 TEST(MotionPrior, OfTheBaseIsTheCamerasAfterTheMount) {
   OdometryHistory history(0.02);
-  for (int64_t t = 0; t <= 100; t += 20) history.add(odometry_at(t * kMs));
-  const auto prior = history.between(20 * kMs, 80 * kMs);
+  for (int64_t t = 0; t <= 100; t += 20) history.add(odometry_at(t * kMillisecond));
+  const auto prior = history.between(20 * kMillisecond, 80 * kMillisecond);
   ASSERT_TRUE(prior);
   const dkb::MotionPrior moved = moved_to_camera(*prior, mount().inverse());
   const Rigid3 truth = (on_circle(0.02) * mount()).inverse() * (on_circle(0.08) * mount());

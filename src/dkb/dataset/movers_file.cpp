@@ -11,6 +11,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -19,13 +20,6 @@ namespace {
 constexpr std::string_view kHeader = "timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h";
 constexpr std::array<const char*, 14> kColumns{"timestamp", "id", "class",       "x",     "y",     "z",     "vx",
                                                "vy",        "vz", "position_sd", "box_x", "box_y", "box_w", "box_h"};
-
-std::string excerpt(std::string_view text) {
-  std::string out(text.substr(0, 40));
-  std::replace_if(
-      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
-  return text.size() > 40 ? out + "..." : out;
-}
 
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> columns;

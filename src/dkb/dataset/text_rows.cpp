@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -36,13 +37,6 @@ double read_number(std::string_view text, const std::string& place, const std::s
   if (!std::isfinite(value))
     throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a finite number");
   return value;
-}
-
-std::string excerpt(std::string_view text) {
-  std::string out(text.substr(0, 60));
-  for (char& c : out)
-    if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) == 0x7F) c = '?';
-  return text.size() > 60 ? out + "..." : out;
 }
 
 }  // namespace dkb

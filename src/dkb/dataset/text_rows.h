@@ -17,7 +17,4 @@ void for_each_row(
 // A finite number, else InputError `place: what "text" is not a number`.
 double read_number(std::string_view text, const std::string& place, const std::string& what);
 
-// Quotes a piece of input for a message: printable, at most 60 characters.
-std::string excerpt(std::string_view text);
-
 }  // namespace dkb

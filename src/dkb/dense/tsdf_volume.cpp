@@ -10,7 +10,6 @@
 namespace dkb {
 namespace {
 
-constexpr int kSide = VoxelBlock::kSide;
 constexpr int kMinViews = 2;          // keyframes that must see a surface
 constexpr double kFreeShare = 0.08;   // of a voxel's keyframes that may have seen through it (docs/benchmarks.md)
 constexpr int kAllocationStride = 2;  // view pixels: a block is much larger than what lies between them
@@ -29,7 +28,7 @@ std::vector<VoxelIndex> blocks_at_surface(const PlacedView& placed, const ViewCa
   const DepthView& view = *placed.view;
   const Rigid3 world_from_cam = placed.cam_from_world.inverse();
   const Eigen::Matrix3d r = world_from_cam.matrix3();
-  const double block = options.voxel * kSide;
+  const double block = options.voxel * VoxelBlock::kSide;
   std::vector<VoxelIndex> result;
   for (int y = 0; y < view.depth.height(); y += kAllocationStride)
     for (int x = 0; x < view.depth.width(); x += kAllocationStride) {
@@ -88,7 +87,7 @@ class BlockFuser {
 
   void fuse(VoxelBlock* block) {
     sums_.fill({});
-    const double side = options_.voxel * kSide;
+    const double side = options_.voxel * VoxelBlock::kSide;
     const Eigen::Vector3d first =
         side * Eigen::Vector3d(block->index.x, block->index.y, block->index.z);  // centre of the first voxel
     const Eigen::Vector3d centre = first + Eigen::Vector3d::Constant(0.5 * (side - options_.voxel));
@@ -108,7 +107,7 @@ class BlockFuser {
   static constexpr float kMinFacing = 0.15F;   // depths of surfaces seen at a flatter angle are not worth much
 
   bool visible(const Eigen::Vector3d& centre) const {
-    const double radius = 0.87 * options_.voxel * kSide;
+    const double radius = 0.87 * options_.voxel * VoxelBlock::kSide;
     if (centre.z() < 0.05 || centre.z() - radius > options_.max_depth + 4.0) return false;
     const auto outside = [&](double across, double f, double c, int size) {
       const double low = c / f, high = (size - c) / f;
@@ -127,11 +126,11 @@ class BlockFuser {
     const auto truncation = static_cast<float>(options_.truncation), max_depth = static_cast<float>(options_.max_depth);
     const auto width = static_cast<float>(camera_.width), height = static_cast<float>(camera_.height);
     Sums* sums = sums_.data();
-    for (int k = 0; k < kSide; ++k)
-      for (int j = 0; j < kSide; ++j) {
+    for (int k = 0; k < VoxelBlock::kSide; ++k)
+      for (int j = 0; j < VoxelBlock::kSide; ++j) {
         const Eigen::Vector3f row =
             (first + options_.voxel * (j * rotation.col(1) + k * rotation.col(2))).cast<float>();
-        for (int i = 0; i < kSide; ++i, ++sums) {
+        for (int i = 0; i < VoxelBlock::kSide; ++i, ++sums) {
           const auto t = static_cast<float>(i);
           const float z = row.z() + t * step_x.z();
           if (z < 0.05F) continue;

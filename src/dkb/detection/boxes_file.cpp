@@ -8,13 +8,13 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
 
-constexpr double kSameStamp = 0.002;  // [s]
 constexpr std::string_view kSpace = " \t\r\v\f";
 
 std::vector<std::string_view> split(std::string_view line) {
@@ -26,13 +26,6 @@ std::vector<std::string_view> split(std::string_view line) {
     columns.push_back(line.substr(0, line.find_first_of(kSpace)));
     line.remove_prefix(columns.back().size());
   }
-}
-
-std::string excerpt(std::string_view text) {
-  std::string out(text.substr(0, 40));
-  std::replace_if(
-      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
-  return text.size() > 40 ? out + "..." : out;
 }
 
 double number(std::string_view text, const std::string& place, const char* what) {
@@ -111,16 +104,8 @@ FileDetector::FileDetector(const std::filesystem::path& path, int width, int hei
     : boxes_(read_boxes(path, width, height)) {}
 
 Detections FileDetector::detect(const DetectorInput& image) {
-  const double stamp = seconds_from_ns(image.stamp_ns);
-  const auto after = std::lower_bound(boxes_.begin(), boxes_.end(), stamp,
-                                      [](const TimedBoxes& t, double at) { return t.timestamp < at; });
-  const TimedBoxes* nearest = nullptr;
-  double distance = kSameStamp;
-  for (auto it = after == boxes_.begin() ? after : after - 1; it != boxes_.end() && it <= after; ++it)
-    if (std::abs(it->timestamp - stamp) <= distance) {
-      nearest = &*it;
-      distance = std::abs(it->timestamp - stamp);
-    }
+  const TimedBoxes* nearest =
+      find_same_stamp(boxes_, seconds_from_ns(image.stamp_ns), [](const TimedBoxes& t) { return t.timestamp; });
   return nearest == nullptr ? Detections{} : Detections{nearest->boxes, {}};
 }
 

@@ -13,8 +13,6 @@ namespace dkb {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kSameStamp = 0.002;  // [s]
-
 // Pixels first ... last of one row; `parent` links the runs of a region to its first one.
 struct Run {
   int y = 0, first = 0, last = 0, parent = 0;
@@ -104,16 +102,8 @@ MaskFolder::MaskFolder(const fs::path& folder, Reader reader, const std::vector<
 }
 
 const fs::path* MaskFolder::find(double stamp) const {
-  const auto after =
-      std::lower_bound(files_.begin(), files_.end(), stamp, [](const auto& f, double s) { return f.first < s; });
-  const fs::path* nearest = nullptr;
-  double distance = kSameStamp;
-  for (auto it = after == files_.begin() ? after : after - 1; it != files_.end() && it <= after; ++it)
-    if (std::abs(it->first - stamp) <= distance) {
-      nearest = &it->second;
-      distance = std::abs(it->first - stamp);
-    }
-  return nearest;
+  const auto* found = find_same_stamp(files_, stamp, [](const auto& file) { return file.first; });
+  return found == nullptr ? nullptr : &found->second;
 }
 
 GreyImage MaskFolder::read(const fs::path& path) const {

@@ -9,11 +9,11 @@
 namespace dkb {
 namespace {
 
-constexpr int kCell = 4;           // [px] grid on which depth is looked at
+constexpr int kMaskCell = 4;       // [px] grid on which depth is looked at
 constexpr double kCore = 0.5;      // share of the box's width and height around its centre where the object is sought
 constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
-constexpr double kLayer = 0.15;    // [1] half-width of that layer relative to its depth
-constexpr double kMargin = 0.05;   // share of the box's size by which it is widened
+constexpr double kRelativeLayer = 0.15;  // [1] half-width of that layer relative to its depth
+constexpr double kWidening = 0.05;       // share of the box's size by which it is widened
 
 struct CellRange {
   int x0, y0, x1, y1;  // half open
@@ -64,7 +64,7 @@ float object_depth(const Image<float>& grid, const CellRange& core) {
   if (samples.empty()) return 0;
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.depth < b.depth; });
   // Slide a window of the layer's relative width from near to far; the first local maximum that is heavy enough wins.
-  const float ratio = static_cast<float>((1 + kLayer) / (1 - kLayer));
+  const float ratio = static_cast<float>((1 + kRelativeLayer) / (1 - kRelativeLayer));
   const float needed = static_cast<float>(kMinShare) * total;
   float weight = 0, best_weight = 0, best_depth = samples[samples.size() / 2].depth;
   size_t end = 0;
@@ -101,7 +101,7 @@ class Surfaces {
         const Cell n{x + dx, y + dy};
         if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y)) continue;
         const double z = depth_(n.x, n.y);
-        if (std::abs(z - d) > noise_.max_depth_jump(std::min<double>(z, d), kCell, focal_)) continue;
+        if (std::abs(z - d) > noise_.max_depth_jump(std::min<double>(z, d), kMaskCell, focal_)) continue;
         seen_(n.x, n.y) = 1;
         cells.push_back(n);
       }
@@ -151,17 +151,17 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
 MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
                       const SensorNoise& noise, const SilhouetteOptions& options) {
   MoverMask mask;
-  mask.cell = kCell;
+  mask.cell = kMaskCell;
   if (boxes.empty()) return mask;
-  const int columns = (depth.width() + kCell - 1) / kCell, rows = (depth.height() + kCell - 1) / kCell;
+  const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
   mask.cells = Image<uint8_t>(columns, rows);
   Image<float> grid(columns, rows);
   for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, kCell);
+    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
 
   for (const Detection& detection : boxes) {
-    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kMargin), kCell, columns, rows);
-    const CellRange core = cells_of(scaled(detection.box, kCore), kCell, columns, rows);
+    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
+    const CellRange core = cells_of(scaled(detection.box, kCore), kMaskCell, columns, rows);
     const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
@@ -177,7 +177,7 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (near_layer(x, y, kLayer * layer)) seeds.push_back({x, y});
+        if (near_layer(x, y, kRelativeLayer * layer)) seeds.push_back({x, y});
     for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.

@@ -12,7 +12,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kPadding = 32;  // bytes on both sides of a score row
+constexpr int kRowPadding = 32;  // bytes on both sides of a score row
 
 // Offsets of the 16 pixels of the circle in order, for rows `stride` bytes apart.
 std::array<ptrdiff_t, 16> circle_offsets(ptrdiff_t stride) {
@@ -65,23 +65,19 @@ void emit_scalar(const uint8_t* above, const uint8_t* here, const uint8_t* below
 }
 
 #if defined(__x86_64__)
-DKB_TARGET_AVX2 inline __m256i load(const uint8_t* p) {
-  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
-}
-
 // Scores of 32 pixels; pixels at or below the threshold score 0. With kEarlyOut blocks without any corner cost less.
 template <bool kEarlyOut>
 DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::array<ptrdiff_t, 16>& circle,
                                              __m256i threshold) {
   const __m256i zero = _mm256_setzero_si256();
-  const __m256i c = load(centre);
+  const __m256i c = load_avx2(centre);
   // An arc of 9 holds two neighbours of any four pixels at right angles: the larger of one diameter and the larger of
   // the other must both be brighter (or the smaller ones darker).
   __m256i may = _mm256_set1_epi8(-1);
   __m256i bright_bound = may, dark_bound = zero;
   for (size_t i = 0; kEarlyOut && i < 4; i += 2) {
-    const __m256i a = load(centre + circle[i]), b = load(centre + circle[i + 8]);
-    const __m256i d = load(centre + circle[i + 4]), e = load(centre + circle[i + 12]);
+    const __m256i a = load_avx2(centre + circle[i]), b = load_avx2(centre + circle[i + 8]);
+    const __m256i d = load_avx2(centre + circle[i + 4]), e = load_avx2(centre + circle[i + 12]);
     bright_bound = _mm256_min_epu8(bright_bound, _mm256_min_epu8(_mm256_max_epu8(a, b), _mm256_max_epu8(d, e)));
     dark_bound = _mm256_max_epu8(dark_bound, _mm256_max_epu8(_mm256_min_epu8(a, b), _mm256_min_epu8(d, e)));
     const __m256i contrast = _mm256_max_epu8(_mm256_subs_epu8(bright_bound, c), _mm256_subs_epu8(c, dark_bound));
@@ -89,7 +85,7 @@ DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::a
     if (_mm256_testz_si256(may, may)) return zero;
   }
   __m256i p[16];
-  for (size_t i = 0; i < 16; ++i) p[i] = load(centre + circle[i]);
+  for (size_t i = 0; i < 16; ++i) p[i] = load_avx2(centre + circle[i]);
   __m256i pairs[8], fours[8];
   for (size_t k = 0; k < 8; ++k) pairs[k] = _mm256_min_epu8(p[2 * k + 1], p[(2 * k + 2) & 15]);
   for (size_t k = 0; k < 8; ++k) fours[k] = _mm256_min_epu8(pairs[k], pairs[(k + 1) & 7]);
@@ -132,12 +128,12 @@ DKB_TARGET_AVX2 void score_row_avx2(const uint8_t* row, int begin, int end, cons
 DKB_TARGET_AVX2 void emit_avx2(const uint8_t* above, const uint8_t* here, const uint8_t* below, int begin, int end,
                                int y, std::vector<PixelCorner>& corners) {
   for (int x = begin; x < end; x += 32) {
-    const __m256i s = load(here + x);
+    const __m256i s = load_avx2(here + x);
     if (_mm256_testz_si256(s, s)) continue;
-    __m256i m = _mm256_max_epu8(load(here + x - 1), load(here + x + 1));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load(above + x - 1), load(above + x)));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load(above + x + 1), load(below + x - 1)));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load(below + x), load(below + x + 1)));
+    __m256i m = _mm256_max_epu8(load_avx2(here + x - 1), load_avx2(here + x + 1));
+    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above + x - 1), load_avx2(above + x)));
+    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above + x + 1), load_avx2(below + x - 1)));
+    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(below + x), load_avx2(below + x + 1)));
     const __m256i not_above = _mm256_cmpeq_epi8(_mm256_subs_epu8(s, m), _mm256_setzero_si256());
     uint32_t peaks = ~static_cast<uint32_t>(_mm256_movemask_epi8(not_above));
     if (end - x < 32) peaks &= (1u << (end - x)) - 1;
@@ -175,9 +171,9 @@ void FastCornerFinder::find(const GreyImage& image, int threshold, int border, s
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
   const bool vectorised = simd_ == Simd::avx2 && score_end - score_begin >= 32;
 
-  const size_t stride = static_cast<size_t>(image.width() + 2 * kPadding);
+  const size_t stride = static_cast<size_t>(image.width() + 2 * kRowPadding);
   scores_.assign(3 * stride, 0);
-  const auto score_row = [&](int y) { return scores_.data() + static_cast<size_t>(y % 3) * stride + kPadding; };
+  const auto score_row = [&](int y) { return scores_.data() + static_cast<size_t>(y % 3) * stride + kRowPadding; };
   const auto fill_row = [&](int y) {
     uint8_t* scores = score_row(y);
     if (y < 3 || y >= image.height() - 3) {

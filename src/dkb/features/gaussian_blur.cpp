@@ -22,10 +22,6 @@ inline uint8_t weighted(const uint8_t* p, ptrdiff_t step) {
 }
 
 #if defined(__x86_64__)
-DKB_TARGET_AVX2 inline __m256i load(const uint8_t* p) {
-  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
-}
-
 // 32 outputs from seven samples `step` bytes apart. Sums reach 65408, so they wrap as signed 16-bit numbers and are
 // read as unsigned ones; no product of a pair exceeds 26265, so none saturates.
 DKB_TARGET_AVX2 inline __m256i weighted_avx2(const uint8_t* p, ptrdiff_t step) {
@@ -33,8 +29,9 @@ DKB_TARGET_AVX2 inline __m256i weighted_avx2(const uint8_t* p, ptrdiff_t step) {
   const __m256i middle = _mm256_set1_epi16(static_cast<int16_t>(kWeights[2] | (kWeights[2] << 8)));
   const __m256i inner = _mm256_set1_epi16(static_cast<int16_t>(kWeights[1] | (kWeights[1] << 8)));
   const __m256i centre = _mm256_set1_epi16(static_cast<int16_t>(kWeights[0]));
-  const __m256i a = load(p - 3 * step), b = load(p + 3 * step), c = load(p - 2 * step), d = load(p + 2 * step);
-  const __m256i e = load(p - step), f = load(p + step), g = load(p);
+  const __m256i a = load_avx2(p - 3 * step), b = load_avx2(p + 3 * step), c = load_avx2(p - 2 * step),
+                d = load_avx2(p + 2 * step);
+  const __m256i e = load_avx2(p - step), f = load_avx2(p + step), g = load_avx2(p);
   const __m256i zero = _mm256_setzero_si256(), half = _mm256_set1_epi16(128);
   __m256i low = _mm256_add_epi16(_mm256_maddubs_epi16(_mm256_unpacklo_epi8(a, b), outer),
                                  _mm256_maddubs_epi16(_mm256_unpacklo_epi8(c, d), middle));

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
 #include <cstdint>
 
 namespace dkb {
@@ -20,4 +24,12 @@ inline Simd best_simd() {
 
 #if defined(__x86_64__)
 #define DKB_TARGET_AVX2 __attribute__((target("avx2,popcnt")))
+
+namespace dkb {
+
+DKB_TARGET_AVX2 inline __m256i load_avx2(const uint8_t* p) {
+  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
+}
+
+}  // namespace dkb
 #endif

@@ -3,15 +3,13 @@
 
 #include <algorithm>
 
+#include "dkb/recordings/bag_format.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
-constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr uint32_t kMaxHeader = 1 << 16, kMaxConnection = 1 << 22;  // [bytes] beyond which a record is taken for broken
-
-enum Op : uint8_t { kMessage = 2, kBagHeader = 3, kIndexData = 4, kChunk = 5, kChunkInfo = 6, kConnection = 7 };
 
 template <class T>
 T little(std::string_view bytes) {
@@ -55,9 +53,9 @@ struct BagStream::Record {
 
 bool BagStream::fits(RecordingFile& file) {
   constexpr std::string_view kAnyBag = "#ROSBAG V";
-  const std::string begin(file.peek(0, kMagic.size()));
+  const std::string begin(file.peek(0, bag::kMagic.size()));
   if (begin.rfind(kAnyBag, 0) != 0) return false;
-  if (begin != kMagic)
+  if (begin != bag::kMagic)
     throw InputError(file.name() + ": is a bag of version " + begin.substr(kAnyBag.size(), 3) +
                      "; version 2.0 is read, and `rosbag fix` writes it");
   return true;
@@ -65,7 +63,7 @@ bool BagStream::fits(RecordingFile& file) {
 
 BagStream::BagStream(std::unique_ptr<RecordingFile> file) : file_(std::move(file)) {
   Record header;
-  if (record_at(kMagic.size(), &header) != Found::record || header.op != kBagHeader)
+  if (record_at(bag::kMagic.size(), &header) != Found::record || header.op != bag::kBagHeader)
     throw InputError(file_->name() + ": is a bag without its header; it cannot be read");
   if (const auto encryptor = field(header.header, "encryptor"); encryptor && !encryptor->empty())
     throw InputError(file_->name() + ": is encrypted; `rosbag decrypt` makes it readable");
@@ -94,7 +92,7 @@ BagStream::Found BagStream::record_at(uint64_t at, Record* record) {
   record->data_size = little<uint32_t>(whole.substr(4 + header_size));
   record->data_at = at + 8 + header_size;
   const std::optional<uint8_t> op = number<uint8_t>(record->header, "op");
-  if (!op || *op < kMessage || *op > kConnection) return Found::broken;
+  if (!op || *op < bag::kMessage || *op > bag::kConnection) return Found::broken;
   record->op = *op;
   return Found::record;
 }
@@ -115,8 +113,8 @@ void BagStream::read_index(uint64_t at) {
       chunks_.clear();  // the rest is not known, so none is passed over
       return;
     }
-    if (record.op == kConnection) add_connection(record.header, data);
-    if (record.op == kChunkInfo) add_chunk_info(record.header, data);
+    if (record.op == bag::kConnection) add_connection(record.header, data);
+    if (record.op == bag::kChunkInfo) add_chunk_info(record.header, data);
     at = record.end();
   }
 }
@@ -183,9 +181,9 @@ bool BagStream::next_chunk() {
       continue;
     }
     at_ = record.end();
-    if (record.op == kConnection && record.data_size <= kMaxConnection)
+    if (record.op == bag::kConnection && record.data_size <= kMaxConnection)
       add_connection(record.header, file_->peek(record.data_at, record.data_size));
-    if (record.op != kChunk || !chunk_wanted(at)) continue;
+    if (record.op != bag::kChunk || !chunk_wanted(at)) continue;
     chunk_at_ = at;
     open_chunk(record);
     if (!rest_.empty()) return true;
@@ -236,8 +234,8 @@ std::optional<RecordedMessage> BagStream::next_in_chunk() {
       rest_ = {};
       break;
     }
-    if (*op == kConnection) add_connection(*header, *data);
-    if (*op != kMessage) continue;
+    if (*op == bag::kConnection) add_connection(*header, *data);
+    if (*op != bag::kMessage) continue;
     const std::optional<uint32_t> connection = number<uint32_t>(*header, "conn");
     const std::optional<uint64_t> time = number<uint64_t>(*header, "time");
     const auto topic = connection ? topic_of_.find(*connection) : topic_of_.end();

@@ -3,14 +3,15 @@
 
 #include <algorithm>
 
+#include "dkb/recordings/bag_format.h"
 #include "dkb/recordings/ros_messages.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
-constexpr size_t kChunk = 768 << 10;  // [bytes] at which a chunk is closed
-constexpr size_t kBagHeader = 4096;   // [bytes] set aside for the header, which is filled in at the end
+constexpr size_t kChunkLimit = 768 << 10;  // [bytes] at which a chunk is closed
+constexpr size_t kHeaderRecord = 4096;     // [bytes] set aside for the header, which is filled in at the end
 constexpr size_t kMaxMessage = 1U << 30;
 
 uint64_t bag_time(int64_t ns) {
@@ -49,7 +50,7 @@ std::string sized(std::string_view bytes) {
   return out.take();
 }
 
-std::string record(const Fields& header, std::string_view data) {
+std::string bag_record(const Fields& header, std::string_view data) {
   return sized(header.bytes()) + sized(data);
 }
 
@@ -57,17 +58,17 @@ std::string record(const Fields& header, std::string_view data) {
 
 BagWriter::BagWriter(const std::filesystem::path& path, Compression compression)
     : file_(path), compression_(compression) {
-  file_.append("#ROSBAG V2.0\n");
+  file_.append(bag::kMagic);
   file_.append(bag_header(0));
 }
 
 std::string BagWriter::bag_header(uint64_t index_at) const {
   const Fields header = Fields()
-                            .u8("op", 3)
+                            .u8("op", bag::kBagHeader)
                             .u64("index_pos", index_at)
                             .u32("conn_count", static_cast<uint32_t>(connections_.size()))
                             .u32("chunk_count", static_cast<uint32_t>(chunks_.size()));
-  return record(header, std::string(kBagHeader - 8 - header.bytes().size(), ' '));
+  return bag_record(header, std::string(kHeaderRecord - 8 - header.bytes().size(), ' '));
 }
 
 size_t BagWriter::add_topic(const std::string& name, const std::string& type, bool latched) {
@@ -77,7 +78,8 @@ size_t BagWriter::add_topic(const std::string& name, const std::string& type, bo
   data.text("topic", name).text("type", type).text("md5sum", definition.md5sum);
   data.text("message_definition", definition.text);
   if (latched) data.text("latching", "1");
-  connections_.push_back(record(Fields().u8("op", 7).u32("conn", id).text("topic", name), data.bytes()));
+  connections_.push_back(
+      bag_record(Fields().u8("op", bag::kConnection).u32("conn", id).text("topic", name), data.bytes()));
   told_.push_back(false);
   return id;
 }
@@ -86,7 +88,7 @@ void BagWriter::write(size_t topic, int64_t recorded_ns, std::string_view bytes)
   if (bytes.size() > kMaxMessage) throw OutputError("a message of more than 1 GiB; a bag cannot hold it");
   // ROS takes the time 0 for none.
   recorded_ns = std::clamp<int64_t>(recorded_ns, 1, int64_t{UINT32_MAX} * 1'000'000'000);
-  if (!chunk_.empty() && chunk_.size() + bytes.size() > kChunk) flush_chunk();
+  if (!chunk_.empty() && chunk_.size() + bytes.size() > kChunkLimit) flush_chunk();
   if (!told_[topic]) chunk_ += connections_[topic];
   told_[topic] = true;
 
@@ -96,7 +98,7 @@ void BagWriter::write(size_t topic, int64_t recorded_ns, std::string_view bytes)
   info_.first_ns = std::min(info_.first_ns, recorded_ns), info_.last_ns = std::max(info_.last_ns, recorded_ns);
   ++info_.counts[connection];
   entries_[connection].push_back({time, static_cast<uint32_t>(chunk_.size())});
-  chunk_ += sized(Fields().u8("op", 2).u32("conn", connection).u64("time", time).bytes());
+  chunk_ += sized(Fields().u8("op", bag::kMessage).u32("conn", connection).u64("time", time).bytes());
   ByteWriter size;
   size.u32(static_cast<uint32_t>(bytes.size()));
   chunk_ += size.bytes();
@@ -110,7 +112,7 @@ void BagWriter::flush_chunk() {
   const std::string& stored = compression_ == Compression::none ? chunk_ : packed;
   info_.at = file_.size();
   const Fields header =
-      Fields().u8("op", 5).text("compression", name).u32("size", static_cast<uint32_t>(chunk_.size()));
+      Fields().u8("op", bag::kChunk).text("compression", name).u32("size", static_cast<uint32_t>(chunk_.size()));
   ByteWriter size;
   size.u32(static_cast<uint32_t>(stored.size()));
   file_.append(sized(header.bytes()) + size.bytes());
@@ -118,9 +120,12 @@ void BagWriter::flush_chunk() {
   for (const auto& [connection, entries] : entries_) {
     ByteWriter data;
     for (const Entry& entry : entries) data.u64(entry.time), data.u32(entry.offset);
-    file_.append(record(
-        Fields().u8("op", 4).u32("ver", 1).u32("conn", connection).u32("count", static_cast<uint32_t>(entries.size())),
-        data.bytes()));
+    file_.append(bag_record(Fields()
+                                .u8("op", bag::kIndexData)
+                                .u32("ver", 1)
+                                .u32("conn", connection)
+                                .u32("count", static_cast<uint32_t>(entries.size())),
+                            data.bytes()));
   }
   chunks_.push_back(info_);
   info_ = {};
@@ -135,16 +140,16 @@ void BagWriter::close() {
   for (const ChunkInfo& chunk : chunks_) {
     ByteWriter data;
     for (const auto& [connection, count] : chunk.counts) data.u32(connection), data.u32(count);
-    file_.append(record(Fields()
-                            .u8("op", 6)
-                            .u32("ver", 1)
-                            .u64("chunk_pos", chunk.at)
-                            .u64("start_time", bag_time(chunk.first_ns))
-                            .u64("end_time", bag_time(chunk.last_ns))
-                            .u32("count", static_cast<uint32_t>(chunk.counts.size())),
-                        data.bytes()));
+    file_.append(bag_record(Fields()
+                                .u8("op", bag::kChunkInfo)
+                                .u32("ver", 1)
+                                .u64("chunk_pos", chunk.at)
+                                .u64("start_time", bag_time(chunk.first_ns))
+                                .u64("end_time", bag_time(chunk.last_ns))
+                                .u32("count", static_cast<uint32_t>(chunk.counts.size())),
+                            data.bytes()));
   }
-  file_.overwrite(std::string_view("#ROSBAG V2.0\n").size(), bag_header(index_at));
+  file_.overwrite(bag::kMagic.size(), bag_header(index_at));
   file_.commit();
 }
 

@@ -11,8 +11,6 @@
 namespace dkb {
 namespace {
 
-using namespace mcap;
-
 constexpr uint64_t kMaxSmall = 1 << 24;        // [bytes] of a record that is no chunk and no message
 constexpr size_t kMaxTexts = size_t{1} << 26;  // [bytes] of all metadata
 
@@ -35,21 +33,22 @@ struct McapStream::Record {
 };
 
 bool McapStream::fits(RecordingFile& file) {
-  const std::string_view begin = file.peek(0, kMagic.size());
-  if (begin.substr(0, 5) != kMagic.substr(0, 5)) return false;
-  if (begin != kMagic) throw InputError(file.name() + ": is an mcap file of another version than 0, which is read");
+  const std::string_view begin = file.peek(0, mcap::kMagic.size());
+  if (begin.substr(0, 5) != mcap::kMagic.substr(0, 5)) return false;
+  if (begin != mcap::kMagic)
+    throw InputError(file.name() + ": is an mcap file of another version than 0, which is read");
   return true;
 }
 
 McapStream::McapStream(std::unique_ptr<RecordingFile> file) : file_(std::move(file)) {
-  at_ = start_ = kMagic.size();
+  at_ = start_ = mcap::kMagic.size();
   end_ = file_->size();
   if (!read_summary()) {
     schemas_.clear(), chunks_.clear();
     // What stands before the first messages.
     for (uint64_t at = start_; at < end_;) {
       const std::optional<Record> record = record_at(at);
-      if (!record || record->op == kChunk || record->op == kMessage || record->op == kDataEnd) break;
+      if (!record || record->op == mcap::kChunk || record->op == mcap::kMessage || record->op == mcap::kDataEnd) break;
       take_small(*record);
       at = record->end();
     }
@@ -57,13 +56,13 @@ McapStream::McapStream(std::unique_ptr<RecordingFile> file) : file_(std::move(fi
 }
 
 std::optional<McapStream::Record> McapStream::record_at(uint64_t at) {
-  const std::string_view start = file_->peek(at, kRecordStart);
-  if (start.size() < kRecordStart) return std::nullopt;
+  const std::string_view start = file_->peek(at, mcap::kRecordStart);
+  if (start.size() < mcap::kRecordStart) return std::nullopt;
   ByteReader in(start, "");
   Record record;
   record.op = in.u8();
   record.size = in.u64();
-  record.at = at + kRecordStart;
+  record.at = at + mcap::kRecordStart;
   if (record.size > UINT64_MAX / 2) return std::nullopt;
   return record;
 }
@@ -77,13 +76,13 @@ bool McapStream::read_summary() {
   const std::string cut =
       "has no end: it is cut off, or its recorder was stopped. It is read up to where it ends; "
       "`mcap recover` repairs it";
-  constexpr uint64_t kTail = kRecordStart + kFooterSize + kMagic.size();
-  if (file_->size() < kMagic.size() + kTail) return told_cut_ = true, read_through(cut);
+  constexpr uint64_t kTail = mcap::kRecordStart + mcap::kFooterSize + mcap::kMagic.size();
+  if (file_->size() < mcap::kMagic.size() + kTail) return told_cut_ = true, read_through(cut);
   const uint64_t footer_at = file_->size() - kTail;
   const std::string tail(file_->peek(footer_at, kTail));
   ByteReader in(tail, "footer");
-  const bool footer = in.u8() == kFooter && in.u64() == kFooterSize;
-  if (!footer || std::string_view(tail).substr(tail.size() - kMagic.size()) != kMagic)
+  const bool footer = in.u8() == mcap::kFooter && in.u64() == mcap::kFooterSize;
+  if (!footer || std::string_view(tail).substr(tail.size() - mcap::kMagic.size()) != mcap::kMagic)
     return told_cut_ = true, read_through(cut);
   const uint64_t summary = in.u64();
   in.u64();
@@ -92,7 +91,7 @@ bool McapStream::read_summary() {
   if (summary == 0) return false;
   const std::string broken = "its summary is broken; it is read from front to back";
   if (summary < start_ || summary > footer_at) return read_through(broken);
-  if (crc != 0 && !summary_sound(summary, footer_at + kRecordStart + 16, crc)) return read_through(broken);
+  if (crc != 0 && !summary_sound(summary, footer_at + mcap::kRecordStart + 16, crc)) return read_through(broken);
   for (uint64_t at = summary; at < footer_at;) {
     const std::optional<Record> record = record_at(at);
     if (!record || record->op == 0 || record->end() > footer_at) return read_through(broken);
@@ -117,8 +116,9 @@ bool McapStream::summary_sound(uint64_t from, uint64_t to, uint32_t crc) {
 
 // A record that is neither a chunk nor a message.
 void McapStream::take_small(const Record& record) {
-  const bool known = record.op == kSchema || record.op == kChannel || record.op == kMetadata ||
-                     record.op == kMetadataIndex || record.op == kChunkIndex || record.op == kStatistics;
+  const bool known = record.op == mcap::kSchema || record.op == mcap::kChannel || record.op == mcap::kMetadata ||
+                     record.op == mcap::kMetadataIndex || record.op == mcap::kChunkIndex ||
+                     record.op == mcap::kStatistics;
   if (!known || record.end() > file_->size()) return;
   if (record.size > kMaxSmall) return warn_of_record(record.at, "is too large and left out");
   const std::string bytes(file_->peek(record.at, static_cast<size_t>(record.size)));
@@ -131,10 +131,10 @@ void McapStream::take_small(const Record& record) {
 
 void McapStream::take(uint8_t op, std::string_view bytes) {
   ByteReader in(bytes, "record");
-  if (op == kSchema) {
+  if (op == mcap::kSchema) {
     const uint16_t id = u16(in);
     schemas_[id] = text(in);
-  } else if (op == kChannel) {
+  } else if (op == mcap::kChannel) {
     const uint16_t id = u16(in), schema = u16(in);
     const std::string topic(text(in)), encoding(text(in));
     if (topic_of_.count(id)) return;
@@ -146,18 +146,18 @@ void McapStream::take(uint8_t op, std::string_view bytes) {
       topic_of_[id] = std::nullopt;
       if (foreign_.size() < 5) foreign_.insert(encoding.empty() ? "no name" : encoding);
     }
-  } else if (op == kMetadata) {
+  } else if (op == mcap::kMetadata) {
     add_metadata(in);
-  } else if (op == kMetadataIndex) {
+  } else if (op == mcap::kMetadataIndex) {
     const uint64_t at = in.u64();
     const std::optional<Record> record = record_at(at);
     // The index may name one record any number of times.
-    if (!record || record->op != kMetadata || record->size > kMaxTexts - metadata_read_) return;
+    if (!record || record->op != mcap::kMetadata || record->size > kMaxTexts - metadata_read_) return;
     metadata_read_ += record->size;
     take_small(*record);
-  } else if (op == kChunkIndex) {
+  } else if (op == mcap::kChunkIndex) {
     add_chunk_index(in);
-  } else if (op == kStatistics) {
+  } else if (op == mcap::kStatistics) {
     in.raw(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);
     for (ByteReader counts(text(in), "counts"); counts.left() > 0;) {
       const uint16_t channel = u16(counts);
@@ -213,7 +213,7 @@ void McapStream::rewind() {
 }
 
 void McapStream::warn_of_record(uint64_t at, const std::string& what) {
-  warnings_.add(file_->name() + ": the record at byte " + std::to_string(at - kRecordStart) + " " + what);
+  warnings_.add(file_->name() + ": the record at byte " + std::to_string(at - mcap::kRecordStart) + " " + what);
 }
 
 void McapStream::tell_cut(uint64_t at) {
@@ -245,22 +245,23 @@ bool McapStream::next_record() {
       at_ = later->first;
       continue;
     }
-    if (!record || (record->end() > file_->size() && record->op != kChunk)) {
+    if (!record || (record->end() > file_->size() && record->op != mcap::kChunk)) {
       tell_cut(at);
       break;
     }
     at_ = record->end();
-    if (record->op == kDataEnd || record->op == kFooter) break;
+    if (record->op == mcap::kDataEnd || record->op == mcap::kFooter) break;
     chunk_at_ = at;
-    if (record->op == kChunk) {
+    if (record->op == mcap::kChunk) {
       if (chunk_wanted(at)) open_chunk(*record);
-    } else if (record->op == kMessage) {
+    } else if (record->op == mcap::kMessage) {
       const std::string_view id = file_->peek(record->at, 2);
       ByteReader in(id, "channel");
       size_t topic = 0;
       if (id.size() < 2 || !wanted(u16(in), &topic)) continue;
       // As a chunk that holds this record alone.
-      const ChunkState loaded = load_chunk(*file_, Compression::none, at, kRecordStart + record->size, 0, &chunk_);
+      const ChunkState loaded =
+          load_chunk(*file_, Compression::none, at, mcap::kRecordStart + record->size, 0, &chunk_);
       if (loaded.state == ChunkState::whole)
         rest_ = chunk_.view();
       else
@@ -316,21 +317,21 @@ std::optional<RecordedMessage> McapStream::next_in_chunk() {
       ByteReader in(rest_, "record");
       const uint8_t op = in.u8();
       const uint64_t size = in.u64();
-      if (size > rest_.size() - kRecordStart) throw InputError("");
-      const std::string_view content = rest_.substr(kRecordStart, static_cast<size_t>(size));
-      rest_.remove_prefix(kRecordStart + content.size());
-      if (op == kSchema || op == kChannel) take(op, content);
-      if (op != kMessage) continue;
+      if (size > rest_.size() - mcap::kRecordStart) throw InputError("");
+      const std::string_view content = rest_.substr(mcap::kRecordStart, static_cast<size_t>(size));
+      rest_.remove_prefix(mcap::kRecordStart + content.size());
+      if (op == mcap::kSchema || op == mcap::kChannel) take(op, content);
+      if (op != mcap::kMessage) continue;
       ByteReader message(content, "message");
       size_t topic = 0;
       const bool asked_for = wanted(u16(message), &topic);
       message.u32();
       const uint64_t logged = message.u64();
       message.u64();
-      if (asked_for) return RecordedMessage{topic, static_cast<int64_t>(logged), content.substr(kMessageStart)};
+      if (asked_for) return RecordedMessage{topic, static_cast<int64_t>(logged), content.substr(mcap::kMessageStart)};
     }
   } catch (const InputError&) {
-    if (!cut_in_chunk_) warn_of_record(chunk_at_ + kRecordStart, "is broken; the rest of it is left out");
+    if (!cut_in_chunk_) warn_of_record(chunk_at_ + mcap::kRecordStart, "is broken; the rest of it is left out");
     rest_ = {};
   }
   return std::nullopt;

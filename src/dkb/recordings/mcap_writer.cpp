@@ -14,8 +14,6 @@
 namespace dkb {
 namespace {
 
-using namespace mcap;
-
 constexpr size_t kChunkSize = 1 << 20;  // [bytes] at which a chunk is closed
 
 uint32_t crc_of(std::string_view bytes) {
@@ -31,14 +29,14 @@ void text(ByteWriter& out, std::string_view v) {
   out.raw(v);
 }
 
-std::string record_start(Op op, size_t size) {
+std::string record_start(mcap::Op op, size_t size) {
   ByteWriter out;
   out.u8(op);
   out.u64(size);
   return out.take();
 }
 
-std::string record(Op op, const ByteWriter& content) {
+std::string record(mcap::Op op, const ByteWriter& content) {
   return record_start(op, content.bytes().size()) + content.bytes();
 }
 
@@ -50,11 +48,11 @@ const char* name_of(Compression compression) {
 
 McapWriter::McapWriter(const std::filesystem::path& path, Compression compression)
     : file_(path), compression_(compression) {
-  file_.append(kMagic);
+  file_.append(mcap::kMagic);
   ByteWriter header;
   text(header, "ros1");
   text(header, "dkb-slam " DKB_SLAM_VERSION);
-  file_.append(record(kHeader, header));
+  file_.append(record(mcap::kHeader, header));
 }
 
 size_t McapWriter::add_topic(const std::string& name, const std::string& type, bool latched) {
@@ -64,7 +62,7 @@ size_t McapWriter::add_topic(const std::string& name, const std::string& type, b
     ByteWriter out;
     u16(out, schema->second);
     text(out, type), text(out, "ros1msg"), text(out, definition.text);
-    file_.append(schemas_.emplace_back(record(kSchema, out)));
+    file_.append(schemas_.emplace_back(record(mcap::kSchema, out)));
   }
   ByteWriter pairs;
   if (latched) text(pairs, "latching"), text(pairs, "1");
@@ -73,7 +71,7 @@ size_t McapWriter::add_topic(const std::string& name, const std::string& type, b
   ByteWriter out;
   u16(out, static_cast<uint16_t>(channels_.size())), u16(out, schema->second);
   text(out, name), text(out, "ros1"), text(out, pairs.bytes());
-  file_.append(channels_.emplace_back(record(kChannel, out)));
+  file_.append(channels_.emplace_back(record(mcap::kChannel, out)));
   counts_.push_back(0);
   return channels_.size() - 1;
 }
@@ -83,11 +81,11 @@ void McapWriter::add_text(const std::string& name, const std::string& content) {
   text(pairs, name), text(pairs, content);
   ByteWriter out;
   text(out, name), text(out, pairs.bytes());
-  const std::string bytes = record(kMetadata, out);
+  const std::string bytes = record(mcap::kMetadata, out);
   ByteWriter index;
   index.u64(file_.size()), index.u64(bytes.size());
   text(index, name);
-  metadata_index_.push_back(record(kMetadataIndex, index));
+  metadata_index_.push_back(record(mcap::kMetadataIndex, index));
   file_.append(bytes);
 }
 
@@ -104,7 +102,7 @@ void McapWriter::write(size_t topic, int64_t recorded_ns, std::string_view bytes
   u16(start, channel);
   start.u32(static_cast<uint32_t>(counts_[topic]++));
   start.u64(time), start.u64(time);
-  chunk_ += record_start(kMessage, kMessageStart + bytes.size());
+  chunk_ += record_start(mcap::kMessage, mcap::kMessageStart + bytes.size());
   chunk_ += start.bytes();
   chunk_ += bytes;
 }
@@ -120,7 +118,7 @@ void McapWriter::flush_chunk() {
   text(start, name_of(compression_));
   start.u64(stored.size());
   index_.at = file_.size();
-  file_.append(record_start(kChunk, start.bytes().size() + stored.size()) + start.bytes());
+  file_.append(record_start(mcap::kChunk, start.bytes().size() + stored.size()) + start.bytes());
   file_.append(stored);
   index_.length = file_.size() - index_.at;
   index_.packed = stored.size(), index_.size = chunk_.size();
@@ -131,7 +129,7 @@ void McapWriter::flush_chunk() {
     u16(out, channel);
     text(out, pairs.bytes());
     index_.index_at[channel] = file_.size();
-    file_.append(record(kMessageIndex, out));
+    file_.append(record(mcap::kMessageIndex, out));
   }
   index_.index_length = file_.size() - index_.at - index_.length;
   chunks_.push_back(index_);
@@ -152,14 +150,14 @@ std::string McapWriter::statistics() const {
   ByteWriter pairs;
   for (size_t i = 0; i < counts_.size(); ++i) u16(pairs, static_cast<uint16_t>(i)), pairs.u64(counts_[i]);
   text(out, pairs.bytes());
-  return record(kStatistics, out);
+  return record(mcap::kStatistics, out);
 }
 
 void McapWriter::close() {
   flush_chunk();
   ByteWriter no_crc;
   no_crc.u32(0);
-  file_.append(record(kDataEnd, no_crc));
+  file_.append(record(mcap::kDataEnd, no_crc));
 
   std::vector<std::string> chunk_index;
   for (const ChunkIndex& chunk : chunks_) {
@@ -172,11 +170,11 @@ void McapWriter::close() {
     out.u64(chunk.index_length);
     text(out, name_of(compression_));
     out.u64(chunk.packed), out.u64(chunk.size);
-    chunk_index.push_back(record(kChunkIndex, out));
+    chunk_index.push_back(record(mcap::kChunkIndex, out));
   }
   const uint64_t summary_at = file_.size();
   std::string summary, offsets;
-  const auto add_group = [&](Op op, const std::vector<std::string>& records) {
+  const auto add_group = [&](mcap::Op op, const std::vector<std::string>& records) {
     if (records.empty()) return;
     ByteWriter out;
     out.u8(op);
@@ -184,23 +182,23 @@ void McapWriter::close() {
     const size_t before = summary.size();
     for (const std::string& bytes : records) summary += bytes;
     out.u64(summary.size() - before);
-    offsets += record(kSummaryOffset, out);
+    offsets += record(mcap::kSummaryOffset, out);
   };
-  add_group(kSchema, schemas_);
-  add_group(kChannel, channels_);
-  add_group(kStatistics, {statistics()});
-  add_group(kChunkIndex, chunk_index);
-  add_group(kMetadataIndex, metadata_index_);
+  add_group(mcap::kSchema, schemas_);
+  add_group(mcap::kChannel, channels_);
+  add_group(mcap::kStatistics, {statistics()});
+  add_group(mcap::kChunkIndex, chunk_index);
+  add_group(mcap::kMetadataIndex, metadata_index_);
   const uint64_t offsets_at = summary_at + summary.size();
   summary += offsets;
 
   ByteWriter footer;
   footer.u64(summary_at), footer.u64(offsets_at);
-  summary += record_start(kFooter, kFooterSize) + footer.bytes();
+  summary += record_start(mcap::kFooter, mcap::kFooterSize) + footer.bytes();
   ByteWriter crc;
   crc.u32(crc_of(summary));
   file_.append(summary + crc.bytes());
-  file_.append(kMagic);
+  file_.append(mcap::kMagic);
   file_.commit();
 }
 

@@ -20,7 +20,7 @@ Rigid3 on_the_circle(double t) {
 }
 
 // Looks along the robot's x axis, 0.3 m in front of its middle.
-const Rigid3 kMount{Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {0.3, 0, 0.2}};
+const Rigid3 kTurnedMount{Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {0.3, 0, 0.2}};
 
 int64_t ns(double t) {
   return kFirst + static_cast<int64_t>(t * 1e9);
@@ -40,13 +40,13 @@ ImuMessage imu_at(double t) {
 }
 
 void expect_motion(const MotionPrior& prior, double from, double to, double tolerance) {
-  const Rigid3 truth = (on_the_circle(from) * kMount).inverse() * (on_the_circle(to) * kMount);
+  const Rigid3 truth = (on_the_circle(from) * kTurnedMount).inverse() * (on_the_circle(to) * kTurnedMount);
   EXPECT_LT((prior.previous_from_current.translation - truth.translation).norm(), tolerance);
   EXPECT_LT(prior.previous_from_current.rotation.angularDistance(truth.rotation), tolerance);
 }
 
 TEST(RecordedMotion, OdometryGivesTheMotionInTheCamerasAxes) {
-  RecordedMotion motion(kMount);
+  RecordedMotion motion(kTurnedMount);
   for (int i = 0; i < 40; ++i) motion.add(odometry_at(0.02 * i));
   const auto prior = motion.between(ns(0.31), ns(0.343));
   ASSERT_TRUE(prior);
@@ -88,7 +88,7 @@ TEST(RecordedMotion, CovariancesOfThePoseGoBeforeThoseOfTheTwist) {
 TEST(RecordedMotion, CovariancesAreCarriedToTheCamera) {
   OdometryMessage first = odometry_at(0), second = odometry_at(0.1);
   second.twist_covariance[35] = 1;
-  RecordedMotion motion(kMount);
+  RecordedMotion motion(kTurnedMount);
   motion.add(first), motion.add(second);
   const Matrix6d covariance = motion.between(ns(0), ns(0.1))->covariance;
   EXPECT_NEAR(covariance(4, 4), 0.01, 1e-4);         // about the camera's y
@@ -112,7 +112,7 @@ TEST(RecordedMotion, GapsAndWhatLiesOutsideGiveNone) {
 }
 
 TEST(RecordedMotion, AnInertialUnitGivesTheRotation) {
-  RecordedMotion motion(kMount);
+  RecordedMotion motion(kTurnedMount);
   for (int i = 0; i < 100; ++i) motion.add(imu_at(0.005 * i));
   const auto prior = motion.between(ns(0.1013), ns(0.1346));
   ASSERT_TRUE(prior);
@@ -175,7 +175,7 @@ TEST(RecordedMotion, AClockThatWasSetBackDoesNotEndIt) {
 // The odometry of each interval is recorded 50 ms after the images that end it.
 TEST(RecordedMotion, ComesWithTheFramesOfARecording) {
   MessageList list;
-  list.add("/tf_static", "tf2_msgs/TFMessage", 0, TransformsMessage{transform_message("base", "camera", kMount)});
+  list.add("/tf_static", "tf2_msgs/TFMessage", 0, TransformsMessage{transform_message("base", "camera", kTurnedMount)});
   list.add("/rgb/camera_info", "sensor_msgs/CameraInfo", 0, info_message(small_camera(), "camera"));
   int odometry = 0;
   for (int n = 0; n < 20; ++n) {

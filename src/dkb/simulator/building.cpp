@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "dkb/simulator/interior.h"
 #include "dkb/simulator/noise.h"
@@ -17,7 +18,6 @@ using Eigen::Vector2d;
 //        |  R0 | R1  |  R2 | R3  |  R4 | R5  |            | corridors at x 0, 13, 26, 39
 //     A  ======================================  y 0
 //        |   S0    |   S1    |   S2    |   S3  |
-constexpr double kPi = 3.141592653589793;
 constexpr double kHeight = 2.6, kWall = 0.15, kPitch = 13, kNorth = 12, kHalf = 1.0, kSouth = -6.2, kDoor = 1.1;  // [m]
 
 class FloorPlan {
@@ -132,7 +132,7 @@ void furnish_north(const Footprint& r, Furnisher f) {
   const double d = r.y1 - r.y0;
   f.line_wall({r.x1, r.y0 + 0.2}, {0, 1}, d - 0.4, 0.7);
   for (const double share : {0.25, 0.6})
-    f.desk(placed(r.x0 + 0.01, r.y0 + share * d, 0, -kPi / 2), 1.4, 0.75, Clutter::monitors);
+    f.desk(placed(r.x0 + 0.01, r.y0 + share * d, 0, -std::numbers::pi / 2), 1.4, 0.75, Clutter::monitors);
 }
 
 void hang_posters(FloorPlan* plan, int corridor, const std::vector<std::array<double, 2>>& places, uint64_t look) {
@@ -140,7 +140,7 @@ void hang_posters(FloorPlan* plan, int corridor, const std::vector<std::array<do
   const Footprint r = plan->area(corridor);
   Furnisher f = plan->furnisher(corridor, look, 0);
   for (const auto& [x, side] : places) {
-    const Rigid3 wall = side > 0 ? placed(x, r.y1, 0, kPi) : placed(x, r.y0, 0, 0);
+    const Rigid3 wall = side > 0 ? placed(x, r.y1, 0, std::numbers::pi) : placed(x, r.y0, 0, 0);
     f.picture_on_wall(wall, -0.35, 1.0, 0.7, 0.9, Material::poster);
   }
 }
@@ -200,8 +200,8 @@ Scene build_building(const SceneRequest& request) {
     plan.join(across, b, x - kHalf, x + kHalf, FloorPlan::Gap::doorway);
     Furnisher f = plan.furnisher(across, 20 + static_cast<uint64_t>(i), 0);
     const Footprint r = plan.area(across);
-    f.picture_on_wall(placed(r.x1, r.y0 + 6.5, 0, kPi / 2), 0, 1.0, 0.7, 0.9, Material::poster);
-    f.picture_on_wall(placed(r.x0, r.y0 + 3.5, 0, -kPi / 2), 0, 1.0, 0.6, 0.8, Material::picture);
+    f.picture_on_wall(placed(r.x1, r.y0 + 6.5, 0, std::numbers::pi / 2), 0, 1.0, 0.7, 0.9, Material::poster);
+    f.picture_on_wall(placed(r.x0, r.y0 + 3.5, 0, -std::numbers::pi / 2), 0, 1.0, 0.6, 0.8, Material::picture);
   }
   std::vector<int> north, south;
   for (int i = 0; i < 6; ++i) {
@@ -242,9 +242,9 @@ Scene build_building(const SceneRequest& request) {
                 {33.5, -1}},
                30);
   hang_posters(&plan, b, {{1.8, 1}, {9.2, 1}, {12.4, 1}, {15.0, -1}, {24.0, 1}, {33.0, 1}, {36.5, 1}}, 31);
-  plan.furnisher(a, 32, 0).plant(placed(-kHalf + 0.01, 0, 0, -kPi / 2));
-  plan.furnisher(a, 33, 0).plant(placed(east - 0.01, 0, 0, kPi / 2));
-  plan.furnisher(b, 34, 0).plant(placed(-kHalf + 0.01, kNorth, 0, -kPi / 2));
+  plan.furnisher(a, 32, 0).plant(placed(-kHalf + 0.01, 0, 0, -std::numbers::pi / 2));
+  plan.furnisher(a, 33, 0).plant(placed(east - 0.01, 0, 0, std::numbers::pi / 2));
+  plan.furnisher(b, 34, 0).plant(placed(-kHalf + 0.01, kNorth, 0, -std::numbers::pi / 2));
 
   const uint64_t seed = hash64(request.seed, 11);
   const double duration = (std::max(scene.frames, 6000) - 1) / request.fps;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "dkb/simulator/rasteriser.h"
@@ -15,8 +16,6 @@ namespace dkb::sim {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double kPi = 3.141592653589793;
 
 Scene building(uint64_t seed = 1) {
   SceneRequest request;
@@ -33,9 +32,10 @@ double heading(const Rigid3& scene_from_cam) {
 TEST(Route, RoundsCornersAndTurnsNoFasterThanAllowed) {
   // 4 m east, a quarter of a circle of 1 m, 2 m north.
   const Route route({{{0, 0}, 0}, {{5, 0}, 1}, {{5, 3}, 0}});
-  EXPECT_NEAR(route.length(), 4 + kPi / 2 + 2, 1e-9);
-  EXPECT_NEAR((route.at(4 + kPi / 4).position - Vector2d(4 + std::sqrt(0.5), 1 - std::sqrt(0.5))).norm(), 0, 1e-9);
-  EXPECT_NEAR(route.at(4 + kPi / 4).heading, kPi / 4, 1e-9);
+  EXPECT_NEAR(route.length(), 4 + std::numbers::pi / 2 + 2, 1e-9);
+  EXPECT_NEAR((route.at(4 + std::numbers::pi / 4).position - Vector2d(4 + std::sqrt(0.5), 1 - std::sqrt(0.5))).norm(),
+              0, 1e-9);
+  EXPECT_NEAR(route.at(4 + std::numbers::pi / 4).heading, std::numbers::pi / 4, 1e-9);
   const std::vector<TimedPose> poses = route.drive(15, {0.5, 0.6, 1.1, -0.1});
   EXPECT_EQ(poses.front().time, 0);
   EXPECT_NEAR(poses.back().time, 15, 1e-6);
@@ -69,7 +69,8 @@ TEST(Building, WayIsTwoHundredMetresInThreeLoops) {
     if (i == 0) continue;
     length += (poses.back().translation - poses[poses.size() - 2].translation).head<2>().norm();
     fastest_turn = std::max(
-        fastest_turn, std::abs(std::remainder(heading(poses.back()) - heading(poses[poses.size() - 2]), 2 * kPi)) * 30);
+        fastest_turn,
+        std::abs(std::remainder(heading(poses.back()) - heading(poses[poses.size() - 2]), 2 * std::numbers::pi)) * 30);
   }
   EXPECT_NEAR(length, 200, 10);
   EXPECT_LT(fastest_turn, 1.25);  // the robot's 60 degrees a second, and the camera's tremor
@@ -80,7 +81,7 @@ TEST(Building, WayIsTwoHundredMetresInThreeLoops) {
     for (int k = 0; k + 600 < i; k += 6) {
       const size_t a = static_cast<size_t>(i), b = static_cast<size_t>(k);
       if ((poses[a].translation - poses[b].translation).norm() > 0.4 ||
-          std::abs(std::remainder(heading(poses[a]) - heading(poses[b]), 2 * kPi)) > 0.3)
+          std::abs(std::remainder(heading(poses[a]) - heading(poses[b]), 2 * std::numbers::pi)) > 0.3)
         continue;
       returns += i - last > 600;
       last = i;

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <numbers>
 
 #include "dkb/simulator/interior.h"
 #include "dkb/simulator/noise.h"
 #include "dkb/simulator/scene.h"
 
 namespace dkb::sim {
-namespace {
-
-constexpr double kPi = 3.141592653589793;
-
-}  // namespace
+namespace {}  // namespace
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -66,15 +63,15 @@ Scene build_corridor(const SceneRequest& request) {
   interior.wall({area.x1, area.y0}, {area.x1, area.y1});
   interior.wall({area.x0, area.y1}, {area.x0, area.y0});
 
-  const Rigid3 right_wall = placed(0, area.y0, 0, 0), left_wall = placed(0, area.y1, 0, kPi);
+  const Rigid3 right_wall = placed(0, area.y0, 0, 0), left_wall = placed(0, area.y1, 0, std::numbers::pi);
   f.picture_on_wall(right_wall, 0.3, 1.0, 0.6, 0.85, Material::poster);
   f.picture_on_wall(right_wall, 1.4, 1.1, 0.5, 0.7, Material::poster);
   f.picture_on_wall(left_wall, -0.7, 1.0, 0.6, 0.8, Material::picture);
   f.picture_on_wall(left_wall, -3.3, 1.0, 0.9, 0.7, Material::poster);
-  f.plant(placed(0.2, area.y1 - 0.01, 0, kPi));
+  f.plant(placed(0.2, area.y1 - 0.01, 0, std::numbers::pi));
   f.picture_on_wall(placed(0, area.y0 - deep, 0, 0), 12.6, 0.9, 0.7, 0.9, Material::poster);
   f.plant(placed(12.25, area.y0 - deep, 0, 0));
-  f.picture_on_wall(placed(0, area.y1 + deep, 0, kPi), -21.2, 1.0, 0.9, 0.8, Material::picture);
+  f.picture_on_wall(placed(0, area.y1 + deep, 0, std::numbers::pi), -21.2, 1.0, 0.9, 0.8, Material::picture);
   Surfaces mat;  // black: no depth
   const int rubber = scene.materials.get(Material::rubber, 8, 1.2, 1.0);
   mat.add_box({1.3, -0.9, 0}, {1.2, 0, 0}, {0, 1.0, 0}, {0, 0, 0.008}, {rubber, rubber, rubber, rubber, -1, rubber});

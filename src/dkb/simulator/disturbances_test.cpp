@@ -9,26 +9,18 @@
 #include <numeric>
 
 #include "dkb/simulator/simulator.h"
+#include "dkb/simulator/simulator_test_tools.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
 
-SimulatorOptions small(const std::string& scene, int frames = 0) {
-  SimulatorOptions o;
-  o.scene = scene;
-  o.frames = frames;
-  o.width = 160;
-  o.height = 120;
-  return o;
-}
-
-double mean_grey(const GreyImage& image) {
-  return std::accumulate(image.data(), image.data() + image.size(), 0.0) / static_cast<double>(image.size());
+SimulatorOptions tiny(const std::string& scene, int frames = 0) {
+  return test::small_images(scene, frames, 160, 120);
 }
 
 TEST(Rate, SamePoseAndPeopleAtTheSameTime) {
-  SimulatorOptions o = small("crowd");
+  SimulatorOptions o = tiny("crowd");
   const Simulator usual(o);
   o.rate = 10;
   const Simulator slow(o);
@@ -46,7 +38,7 @@ TEST(Rate, SamePoseAndPeopleAtTheSameTime) {
 
 TEST(Rate, StampsAreExactAndFramesAreCountedAtTheRate) {
   for (const double rate : {1.0, 7.0, 29.97, 60.0}) {
-    SimulatorOptions o = small("loop", 40);
+    SimulatorOptions o = tiny("loop", 40);
     o.rate = rate;
     const Simulator s(o);
     EXPECT_EQ(s.frames(), 40);
@@ -90,7 +82,7 @@ TEST(Dropouts, AreSingleFramesAndBursts) {
 }
 
 TEST(Dropouts, WhatIsLeftIsAsItWasWithoutThem) {
-  SimulatorOptions o = small("crowd", 30);
+  SimulatorOptions o = tiny("crowd", 30);
   const Simulator all(o);
   o.dropouts = 0.5;
   const Simulator some(o);
@@ -105,18 +97,18 @@ TEST(Dropouts, WhatIsLeftIsAsItWasWithoutThem) {
 }
 
 TEST(Flicker, BrightnessStepsAndIsCut) {
-  SimulatorOptions o = small("rush", 150);
+  SimulatorOptions o = tiny("rush", 150);
   o.people = 0;  // the camera stands still, nothing moves
   const Simulator steady(o);
   o.flicker = true;
   const Simulator flickers(o), again(o);
-  const double usual = mean_grey(steady.render(0).image.grey);
-  EXPECT_NEAR(mean_grey(steady.render(149).image.grey), usual, 0.2);
-  double before = mean_grey(flickers.render(0).image.grey), darkest = usual, brightest = usual;
+  const double usual = test::mean_grey(steady.render(0).image.grey);
+  EXPECT_NEAR(test::mean_grey(steady.render(149).image.grey), usual, 0.2);
+  double before = test::mean_grey(flickers.render(0).image.grey), darkest = usual, brightest = usual;
   int jumps = 0;
   for (int i = 3; i < 150; i += 3) {  // the lamps are back at the same phase after three frames
     const SimulatedFrame f = flickers.render(i);
-    const double now = mean_grey(f.image.grey);
+    const double now = test::mean_grey(f.image.grey);
     jumps += std::abs(now / before - 1) > 0.1;
     darkest = std::min(darkest, now);
     brightest = std::max(brightest, now);
@@ -143,7 +135,7 @@ TEST(Flicker, LampsAreBandsButForAShutterOfTheirPeriod) {
 
 TEST(StandStill, PeopleStandInViewFirstAndWalkAfterwards) {
   for (const char* scene : {"crowd", "straight", "rush", "cover", "room"}) {
-    SimulatorOptions o = small(scene, 150);
+    SimulatorOptions o = tiny(scene, 150);
     o.people = std::string(scene) == "cover" ? 1 : 3;
     o.stand_still = 2;
     const Simulator s(o);
@@ -163,7 +155,7 @@ TEST(StandStill, PeopleStandInViewFirstAndWalkAfterwards) {
 
 TEST(StandStill, WhoStandsSwaysByMillimetres) {
   // The camera of rush stands still, so the outlines move with the people alone.
-  SimulatorOptions o = small("rush", 90);
+  SimulatorOptions o = tiny("rush", 90);
   o.stand_still = 3;
   o.width = 640;
   o.height = 480;
@@ -181,7 +173,7 @@ TEST(StandStill, WhoStandsSwaysByMillimetres) {
 }
 
 TEST(StandStill, SaysWhereNobodyIs) {
-  SimulatorOptions o = small("room");
+  SimulatorOptions o = tiny("room");
   o.stand_still = 5;
   const Simulator s(o);
   ASSERT_EQ(s.notes().size(), 1U);

@@ -8,6 +8,7 @@
 #include "dkb/features/fast_corners.h"
 #include "dkb/simulator/sensor.h"
 #include "dkb/simulator/simulator.h"
+#include "dkb/simulator/simulator_test_tools.h"
 
 namespace dkb {
 namespace {
@@ -17,10 +18,6 @@ SimulatorOptions named(const std::string& scene, uint64_t seed = 1) {
   o.scene = scene;
   o.seed = seed;
   return o;
-}
-
-double mean_grey(const GreyImage& image) {
-  return std::accumulate(image.data(), image.data() + image.size(), 0.0) / static_cast<double>(image.size());
 }
 
 TEST(Corridor, IsTwentyMetresOfFewCornersAndMuchDepth) {
@@ -51,7 +48,7 @@ TEST(Dim, IsTheRoomWithLittleContrastAndALongExposure) {
   EXPECT_EQ(dim.exposure(), 0.030);
   EXPECT_EQ(dim.world_from_cam(3).translation, room.world_from_cam(3).translation);
   // 0.02 x 10 x 30 ms / 14 ms
-  const double ratio = mean_grey(dim.render(30).image.grey) / mean_grey(room.render(30).image.grey);
+  const double ratio = test::mean_grey(dim.render(30).image.grey) / test::mean_grey(room.render(30).image.grey);
   EXPECT_NEAR(ratio, 0.43, 0.02);
 }
 

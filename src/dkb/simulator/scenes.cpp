@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "dkb/simulator/noise.h"
@@ -12,8 +13,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.141592653589793;
 
 Rigid3 looking_at(const Vector3d& eye, const Vector3d& target, double t, double strength, uint64_t seed) {
   const Vector3d d = target - eye;
@@ -30,7 +29,7 @@ void line_room(const Footprint& r, const std::array<double, 4>& depth_limit, Fur
 }
 
 void desk_facing_south(double x, double y, Furnisher* f) {
-  f->desk(placed(x, y + 0.75, 0, kPi), 1.4, 0.75, Clutter::monitors);
+  f->desk(placed(x, y + 0.75, 0, std::numbers::pi), 1.4, 0.75, Clutter::monitors);
 }
 
 int frames_of(const SceneRequest& request, int usual) {
@@ -126,7 +125,7 @@ Scene build_rush(const SceneRequest& request) {
   line_room(scene.inside, {0.45, 0.2, 0.45, 0.2}, &f);
   desk_facing_south(-1.0, 1.35, &f);
   desk_facing_south(0.9, 1.4, &f);
-  const Rigid3 pose = camera_pose({0, -2.2, 1.3}, kPi / 2, -0.12);
+  const Rigid3 pose = camera_pose({0, -2.2, 1.3}, std::numbers::pi / 2, -0.12);
   scene.path = [pose](double) { return pose; };
   const int people = people_of(request, 5);
   const double duration = scene.frames / request.fps;
@@ -204,7 +203,7 @@ Scene build_cover(const SceneRequest& request) {
       s.velocity = (where(t + 0.01) - where(t - 0.01)) / 0.02;
       const double speed = s.velocity.norm(),
                    inside = eased((t - arrive + 0.5) / 0.5, 0.3) * (1 - eased((t - leave) / 0.5, 0.3));
-      s.heading = kPi + (kPi / 2) * inside;  // walks along -x, turns to the camera
+      s.heading = std::numbers::pi + (std::numbers::pi / 2) * inside;  // walks along -x, turns to the camera
       s.stride = std::min(1.2, speed / 1.1) * (1 - inside) + 0.1 * inside;
       phase += Track::kStep * 6.2832 * (0.2 + 0.5 * speed);
       s.phase = phase;
@@ -283,14 +282,14 @@ Scene build_loop(const SceneRequest& request) {
         f.line_wall({x1, y - 0.05}, {-1, 0}, x1 - x0, 0.1);
       }
     }
-  f.desk(placed(-0.4, -3.05, 0, kPi), 1.4, 0.75, Clutter::monitors);
+  f.desk(placed(-0.4, -3.05, 0, std::numbers::pi), 1.4, 0.75, Clutter::monitors);
 
   const uint64_t seed = hash64(request.seed, 8);
   const double duration = (std::max(scene.frames, 900) - 1) / request.fps;
   scene.path = [seed, duration](double t) {
     // Rounded rectangle, anticlockwise from the middle of the south side.
     const double a = 3.2, b = 2.2, radius = 0.95;
-    const double straight_x = 2 * (a - radius), straight_y = 2 * (b - radius), arc = radius * kPi / 2;
+    const double straight_x = 2 * (a - radius), straight_y = 2 * (b - radius), arc = radius * std::numbers::pi / 2;
     const double round = 2 * (straight_x + straight_y) + 4 * arc, length = round + 0.8;
     double s = std::fmod(length * eased(t / duration, 0.03) + straight_x / 2, round), heading = 0;
     Vector2d p(-(a - radius), -b);
@@ -311,7 +310,7 @@ Scene build_loop(const SceneRequest& request) {
       }
       s -= arc;
       p += radius * (along + left);
-      heading += kPi / 2;
+      heading += std::numbers::pi / 2;
     }
     return shaken({p.x(), p.y(), 1.35}, heading - 0.3, -0.14, t, 1, seed);
   };
@@ -332,7 +331,7 @@ Scene build_twins(const SceneRequest& request) {
     f.shell(x0, south, x1, north, h, Material::planks);
     f.line_wall({x1 - 0.1, north}, {-1, 0}, width - 0.2, 0.6);
     f.line_wall({x0 + 0.6, south}, {1, 0}, width - 1.2, 0.4);
-    f.desk(placed(x0 + 2.3, 1.6, 0, kPi), 1.4, 0.65, Clutter::monitors);
+    f.desk(placed(x0 + 2.3, 1.6, 0, std::numbers::pi), 1.4, 0.65, Clutter::monitors);
   }
   Furnisher f(&scene.materials, &scene.furnishing, hash64(request.seed, 0x7713));
   f.shell(width + 0.1, south, width + 0.1 + corridor, 1.7, h, Material::planks);
@@ -357,8 +356,8 @@ Scene build_twins(const SceneRequest& request) {
   scene.path = [seed, duration, pitch_x](double t) {
     // From room to room the camera does exactly the same; only the hand's tremor differs.
     const double x = 0.75 + 9.9 * eased(t / duration, 0.03), along = 6.283185307 * (x - 0.75) / pitch_x;
-    return shaken({x, 0.06 * std::sin(along), 1.36 + 0.04 * std::sin(2 * along)}, kPi / 2 + 0.14 * std::cos(along),
-                  -0.16, t, 1, seed);
+    return shaken({x, 0.06 * std::sin(along), 1.36 + 0.04 * std::sin(2 * along)},
+                  std::numbers::pi / 2 + 0.14 * std::cos(along), -0.16, t, 1, seed);
   };
   if (request.people > 0) add_walkers(&scene, WalkArea{}, request.people, scene.frames / request.fps, request);
   return scene;
@@ -374,7 +373,7 @@ void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed
   if (kind == "person")
     m.look = make_person_look(&scene->materials, seed);
   else
-    m.rigid = Furnisher::make_chair(&scene->materials, seed).moved(placed(0, 0, 0, -kPi / 2));
+    m.rigid = Furnisher::make_chair(&scene->materials, seed).moved(placed(0, 0, 0, -std::numbers::pi / 2));
   scene->movers.push_back(std::move(m));
 }
 

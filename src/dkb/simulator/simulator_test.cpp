@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/simulator/simulator.h"
+#include "dkb/simulator/simulator_test_tools.h"
 
 #include <gtest/gtest.h>
 
@@ -23,12 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 SimulatorOptions small(const std::string& scene, int frames = 0) {
-  SimulatorOptions o;
-  o.scene = scene;
-  o.frames = frames;
-  o.width = 320;
-  o.height = 240;
-  return o;
+  return test::small_images(scene, frames, 320, 240);
 }
 
 double degrees_between(const Rigid3& a, const Rigid3& b) {

@@ -4,13 +4,13 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <deque>
 #include <exception>
 #include <mutex>
 #include <utility>
 
 #include "dkb/image/skipped_motion.h"
 #include "dkb/map/map_file.h"
+#include "dkb/slam/event_outlet.h"
 #include "dkb/slam/pipeline.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/thrown.h"
@@ -36,48 +36,6 @@ void DetectionSchedule::check() const {
   require_option(every >= 1, "detector.every", every, "at least 1 frame");
   require_option(latency >= 0, "detector.latency", latency, "at least 0 frames");
 }
-
-namespace {
-
-constexpr size_t kMaxEvents = 10000;
-
-// The events that nobody has taken yet, and whoever is called for them.
-class EventOutlet {
- public:
-  void deliver(std::vector<Event> events) {
-    if (events.empty()) return;
-    if (!callback_) {
-      const std::lock_guard lock(mutex_);
-      for (Event& e : events) waiting_.push_back(std::move(e));
-      while (waiting_.size() > kMaxEvents) waiting_.pop_front();
-      return;
-    }
-    for (const Event& e : events) {
-      if (executor_)
-        executor_([callback = callback_, e] { callback(e); });
-      else
-        callback_(e);
-    }
-  }
-  std::vector<Event> take() {
-    const std::lock_guard lock(mutex_);
-    std::vector<Event> events(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
-    waiting_.clear();
-    return events;
-  }
-  void set(std::function<void(const Event&)> callback, Slam::Executor executor) {
-    callback_ = std::move(callback);
-    executor_ = std::move(executor);
-  }
-
- private:
-  std::function<void(const Event&)> callback_;  // the feeding thread's
-  Slam::Executor executor_;
-  std::mutex mutex_;
-  std::deque<Event> waiting_;
-};
-
-}  // namespace
 
 class Slam::Impl {
  public:

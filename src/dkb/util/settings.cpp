@@ -43,13 +43,6 @@ std::string number_to_text(T value) {
   return std::string(buffer, end);
 }
 
-// What a message quotes of `text`.
-std::string excerpt(std::string text) {
-  text = one_line(std::move(text));
-  if (text.size() > 120) text = text.substr(0, 117) + "...";
-  return text;
-}
-
 std::string place(const std::string& file, const YAML::Mark& mark) {
   return mark.is_null() ? file : file + ":" + std::to_string(mark.line + 1);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -34,6 +35,25 @@ std::optional<int64_t> parse_stamp_ns(std::string_view text);
 
 // The stamp as decimal seconds, with six digits or, where these do not suffice, nine.
 std::string stamp_text(int64_t ns);
+
+// Timed observations about one image may differ from its stamp by the digits that were kept of it.
+inline constexpr double kSameStamp = 0.002;  // [s]
+
+// The element of `items`, which stand by rising stamps, whose stamp is nearest to `stamp` [s] and the same as it, the
+// earlier one of two as near; null when there is none. `stamp_of` gives an element's stamp.
+template <class Items, class StampOf>
+auto find_same_stamp(const Items& items, double stamp, const StampOf& stamp_of) -> decltype(&*items.begin()) {
+  const auto after = std::lower_bound(items.begin(), items.end(), stamp,
+                                      [&](const auto& item, double at) { return stamp_of(item) < at; });
+  decltype(&*items.begin()) nearest = nullptr;
+  double distance = kSameStamp;
+  for (auto it = after == items.begin() ? after : after - 1; it != items.end() && it <= after; ++it)
+    if (std::abs(stamp_of(*it) - stamp) <= distance) {
+      nearest = &*it;
+      distance = std::abs(stamp_of(*it) - stamp);
+    }
+  return nearest;
+}
 
 // [1/s] by the median of the intervals between rising stamps, rounded, 1 ... 1000; 30 where there is none.
 double frame_rate_of(const std::vector<int64_t>& stamps_ns);

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <iterator>
+#include <mutex>
+#include <vector>
+
+#include "dkb_slam/slam.h"
+
+namespace dkb {
+
+// The events that nobody has taken yet, and whoever is called for them.
+class EventOutlet {
+ public:
+  void deliver(std::vector<Event> events) {
+    if (events.empty()) return;
+    if (!callback_) {
+      const std::lock_guard lock(mutex_);
+      for (Event& e : events) waiting_.push_back(std::move(e));
+      while (waiting_.size() > kMaxEvents) waiting_.pop_front();
+      return;
+    }
+    for (const Event& e : events) {
+      if (executor_)
+        executor_([callback = callback_, e] { callback(e); });
+      else
+        callback_(e);
+    }
+  }
+  std::vector<Event> take() {
+    const std::lock_guard lock(mutex_);
+    std::vector<Event> events(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+    waiting_.clear();
+    return events;
+  }
+  void set(std::function<void(const Event&)> callback, Slam::Executor executor) {
+    callback_ = std::move(callback);
+    executor_ = std::move(executor);
+  }
+
+ private:
+  static constexpr size_t kMaxEvents = 10000;
+
+  std::function<void(const Event&)> callback_;  // the feeding thread's
+  Slam::Executor executor_;
+  std::mutex mutex_;
+  std::deque<Event> waiting_;
+};
+
+}  // namespace dkb
