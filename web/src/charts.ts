@@ -125,13 +125,13 @@ export class Charts {
       make(this.timeBox, " ms", [
         // The sums, the largest first: what is drawn later covers what lies below.
         ...[...parts].reverse().map((s): uPlot.Series => ({ stroke: colour("--" + s), fill: colour("--" + s), width: 0, points: { show: false } })),
-        { stroke: colour("--dynamic"), width: 1.5, dash: [6, 4], points: { show: false } },
+        { stroke: colour("--on-mover"), width: 1.5, dash: [6, 4], points: { show: false } },
         ...beside.map(() => dots(colour("--text"), "●", 3)),
       ], (_min, max) => [0, Math.max(1.2 * this.budget, Math.min(max * 1.1, 6 * this.budget))]),
       make(this.pointsBox, "", [
         { stroke: colour("--used"), width: 1, points: { show: false } },
         ...this.rules.map((_rule, i) => dots(ruleColours[i % 4], shapes[i % 4])),
-        dots(colour("--dynamic"), "×"),
+        dots(colour("--on-mover"), "×"),
       ], (_min, max) => [0, Math.max(10, max * 1.15)]),
     ];
     this.ruleBox.replaceChildren(...this.rules.map((rule, i) => {

@@ -2,7 +2,7 @@
 // One session on the page: what its messages tell goes to the 3-D view, the picture, the charts and the lists.
 import { Charts } from "./charts";
 import { EventList, type SessionEvent } from "./events";
-import { features, Picture } from "./picture";
+import { features, featureWords, Picture } from "./picture";
 import { Kind, type Message } from "./stream";
 import { layers, View, type Hello, type Layer, type Mode } from "./view";
 
@@ -15,7 +15,7 @@ const layerColours: Record<Layer, string> = {
   points: "var(--text)", keyframes: "var(--keyframe)", covisibility: "var(--covisibility)", path: "var(--path)",
   movers: "var(--mover)", truth: "var(--truth)", loops: "var(--loop)", surface: "var(--text)", grid: "var(--flow)",
 };
-const marks: Record<string, string> = { used: "○", outlier: "×", dynamic: "□", unused: "·" };
+const marks: Record<string, string> = { used: "○", disagrees: "×", "on-mover": "□", moved: "◇", unused: "·" };
 const modes: Mode[] = ["follow", "free", "top"];
 
 const text = new TextDecoder();
@@ -67,6 +67,11 @@ export class Panel {
     this.at("measure").onclick = () => this.onWish({ what: "measure", on: !this.measuring });
     this.at("shot").onclick = () => this.onWish({ what: "shoot" });
     this.view.onMeasure = (words) => (this.at("measured").textContent = words);
+    const image = this.at<HTMLCanvasElement>("picture");
+    image.addEventListener("pointermove", (e) => {
+      const box = image.getBoundingClientRect();
+      image.title = this.picture.tell(((e.clientX - box.left) * image.width) / box.width, ((e.clientY - box.top) * image.height) / box.height);
+    });
     let pressed: [number, number] | null = null;
     const canvas = this.at("view");
     canvas.addEventListener("pointerdown", (e) => (pressed = [e.clientX, e.clientY]));
@@ -194,9 +199,7 @@ export class Panel {
         this.view.takeFrame(frame.camera, frame.movers, frame.world_from_truth);
         this.picture.take(new DataView(data.buffer, data.byteOffset + 4 + length, data.byteLength - 4 - length), frame.movers, frame.boxes);
         for (const kind of features)
-          this.boxes.get("overlay-" + kind)!.nextElementSibling!.textContent = `${marks[kind]} ${kind} ${this.picture.counts[kind] ?? 0}`;
-        this.boxes.get("overlay-dynamic")!.parentElement!.title = this.boxes.get("overlay-outlier")!.parentElement!.title =
-          ["on a mover", "moved", "disagrees"].map((r) => `${r} ${this.picture.counts[r] ?? 0}`).join(", ");
+          this.boxes.get("overlay-" + kind)!.nextElementSibling!.textContent = `${marks[kind]} ${featureWords[kind]} ${this.picture.counts[kind] ?? 0}`;
         this.at("decision").textContent = frame.explanation;
         break;
       }

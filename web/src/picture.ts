@@ -2,13 +2,16 @@
 // The current image with what became of its features, the movers' mask and boxes.
 import type { Mover } from "./view";
 
-export const features = ["used", "outlier", "dynamic", "unused"] as const;
+// What became of a feature, by the stage that said so: the pose used it; it disagrees with the point that it was matched
+// with; it lies on a mover; it moved otherwise than the camera's motion explains; nothing was matched with it.
+export const features = ["used", "disagrees", "on-mover", "moved", "unused"] as const;
 export type Feature = (typeof features)[number];
-const states: Feature[] = ["unused", "used", "outlier", "dynamic"]; // as numbers of the stream
-const reasons = ["", "on a mover", "moved", "disagrees"];
+export const featureWords: Record<Feature, string> = { used: "used", disagrees: "disagrees", "on-mover": "on a mover", moved: "moved", unused: "unused" };
+const states: Feature[] = ["unused", "used", "disagrees", "on-mover"]; // by the stream's state, where no reason is given
+const reasons: (Feature | null)[] = [null, "on-mover", "moved", "disagrees"];
 
 export class Picture {
-  readonly shown = new Set<string>(["used", "outlier", "dynamic", "mask", "boxes"]);
+  readonly shown = new Set<string>(["used", "disagrees", "on-mover", "moved", "mask", "boxes"]);
   depth = false;
   counts: Record<string, number> = {};
   private image: ImageBitmap | null = null;
@@ -49,13 +52,28 @@ export class Picture {
     const counts: Record<string, number> = {};
     const n = report.getUint32(0, true);
     for (let i = 0; i < n; i++) {
-      const state = states[report.getUint8(4 + 8 * i + 4)] ?? "unused";
-      counts[state] = (counts[state] ?? 0) + 1;
-      const reason = reasons[report.getUint8(4 + 8 * i + 5)];
-      if (reason) counts[reason] = (counts[reason] ?? 0) + 1;
+      const fate = this.fate(i);
+      counts[fate] = (counts[fate] ?? 0) + 1;
     }
     this.counts = counts;
     this.refresh();
+  }
+  private fate(i: number): Feature {
+    const at = 4 + 8 * i;
+    return reasons[this.report!.getUint8(at + 5)] ?? states[this.report!.getUint8(at + 4)] ?? "unused";
+  }
+  // In words, what became of the feature nearest to a place in the canvas [its pixels]; "" when none is near.
+  tell(x: number, y: number): string {
+    const report = this.report, s = this.canvas.width / this.width;
+    let best = 10, words = "";
+    for (let i = 0, n = report ? report.getUint32(0, true) : 0; i < n; i++) {
+      const fate = this.fate(i), u = report!.getUint16(4 + 8 * i, true) / 16, v = report!.getUint16(6 + 8 * i, true) / 16;
+      const distance = Math.hypot(u * s - x, v * s - y);
+      if (!this.shown.has(fate) || distance >= best) continue;
+      best = distance;
+      words = `${featureWords[fate]} (${u.toFixed(1)}, ${v.toFixed(1)})`;
+    }
+    return words;
   }
   refresh(): void {
     if (this.waiting) return;
@@ -80,8 +98,9 @@ export class Picture {
     if (this.shown.has("mask")) this.drawMask(g, report, 4 + 8 * n, s, colour("--mover"));
     const shapes: Record<Feature, (x: number, y: number) => void> = {
       used: (x, y) => { g.moveTo(x + 4.5, y); g.arc(x, y, 4.5, 0, 7); },
-      outlier: (x, y) => { g.moveTo(x - 4, y - 4); g.lineTo(x + 4, y + 4); g.moveTo(x + 4, y - 4); g.lineTo(x - 4, y + 4); },
-      dynamic: (x, y) => g.rect(x - 4, y - 4, 8, 8),
+      disagrees: (x, y) => { g.moveTo(x - 4, y - 4); g.lineTo(x + 4, y + 4); g.moveTo(x + 4, y - 4); g.lineTo(x - 4, y + 4); },
+      "on-mover": (x, y) => g.rect(x - 4, y - 4, 8, 8),
+      moved: (x, y) => { g.moveTo(x, y - 5); g.lineTo(x + 5, y); g.lineTo(x, y + 5); g.lineTo(x - 5, y); g.closePath(); },
       unused: (x, y) => g.rect(x - 1, y - 1, 2, 2),
     };
     g.lineWidth = 2;
@@ -90,7 +109,7 @@ export class Picture {
       g.beginPath();
       for (let i = 0; i < n; i++) {
         const at = 4 + 8 * i;
-        if (states[report.getUint8(at + 4)] !== kind) continue;
+        if (this.fate(i) !== kind) continue;
         shapes[kind]((report.getUint16(at, true) / 16) * s, (report.getUint16(at + 2, true) / 16) * s);
       }
       g.strokeStyle = colour("--" + kind);
@@ -110,7 +129,7 @@ export class Picture {
       g.fillStyle = "#fff";
       g.fillText(text, box[0] * s + 3, y);
     };
-    for (const b of this.boxes) frame(b.box, b.class, [6, 4], colour("--dynamic"));
+    for (const b of this.boxes) frame(b.box, b.class, [6, 4], colour("--on-mover"));
     for (const m of this.movers) frame(m.box, `${m.class} ${m.id}`, [], colour("--mover"));
   }
   private drawMask(g: CanvasRenderingContext2D, report: DataView, at: number, s: number, colour: string): void {

@@ -108,6 +108,19 @@ await page.click("#overlay-used");
 await page.waitForTimeout(200);
 assert.notEqual((await pixels()).sum, withFeatures.sum, "the overlay went");
 await page.click("#overlay-used");
+// Each stage's verdict is an overlay of its own, and what lies under the pointer is told in words.
+for (const fate of ["used", "disagrees", "on-mover", "moved", "unused"])
+  assert.match(await page.textContent(`label:has(#overlay-${fate})`), / \d+$/, "counts of " + fate);
+const told = await page.evaluate(() => {
+  const c = document.getElementById("picture"), box = c.getBoundingClientRect(), words = new Set();
+  for (let y = 4; y < box.height; y += 6)
+    for (let x = 4; x < box.width; x += 6) {
+      c.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + x, clientY: box.top + y }));
+      if (c.title) words.add(c.title.replace(/ \(.*/, ""));
+    }
+  return [...words];
+});
+assert.ok(told.includes("used"), "told of features: " + told);
 await page.click("#overlay-depth");
 await page.waitForTimeout(1500);
 assert.ok((await pixels()).colours > 20, "depth is there");

@@ -9,6 +9,7 @@ namespace dkb {
 namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr float kMinDepth = 0.1f;  // [m] in front of the camera
 
 void resize(Image<float>& image, int width, int height) {
   if (image.width() != width || image.height() != height) image = Image<float>(width, height);
@@ -57,9 +58,20 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
   r2_max_ *= 1.02f;  // far outside the image the distortion polynomial folds back
 }
 
+bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
+  if (!(point.z() > kMinDepth)) return false;
+  const float a = point.x() / point.z(), b = point.y() / point.z(), r2 = a * a + b * b;
+  if (!(r2 <= r2_max_)) return false;
+  const float radial = 1.0f + r2 * (k1_ + r2 * (k2_ + r2 * k3_));
+  const float u = fx_ * (a * radial + 2.0f * p1_ * a * b + p2_ * (r2 + 2.0f * a * a)) + cx_;
+  const float v = fy_ * (b * radial + p1_ * (r2 + 2.0f * b * b) + 2.0f * p2_ * a * b) + cy_;
+  if (!(u >= 0 && v >= 0 && u < static_cast<float>(width_) && v < static_cast<float>(height_))) return false;
+  *x = static_cast<int>(u), *y = static_cast<int>(v);
+  return true;
+}
+
 void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here,
                          MotionProjection& result) const {
-  constexpr float kMinDepth = 0.1f;  // [m] in front of the camera
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);

@@ -25,6 +25,13 @@ class MotionRays {
   int width() const { return width_; }    // [cells]
   int height() const { return height_; }  // [cells]
 
+  // Through the middle of a cell, at depth 1.
+  Eigen::Vector3f ray(int x, int y) const {
+    const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
+    return {x_[i], y_[i], 1};
+  }
+  // The cell that sees a point of the camera's; false when none does.
+  bool find_cell(const Eigen::Vector3f& point, int* x, int* y) const;
   // Projects what each cell sees at `depth` [m], `missing` standing in for depth that is not above 0, into the camera
   // that `there_from_here` leads to.
   void project(const Image<float>& depth, float missing, const Rigid3& there_from_here, MotionProjection& result) const;

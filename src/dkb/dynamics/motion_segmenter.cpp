@@ -50,7 +50,8 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       noise_(noise),
       options_(options),
       rays_(camera, options.cell),
-      smoothing_(camera, noise, options.cell, options.smoothing) {
+      smoothing_(camera, noise, options.cell, options.smoothing),
+      alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
@@ -102,6 +103,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->time = image.depth_timestamp;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
+  find_pose();
   for (size_t i = 0; i < tolerance_.size(); ++i)
     tolerance_.data()[i] = static_cast<float>(noise_.surface_tolerance(current_->depth.data()[i]));
   carry_scores();
@@ -119,6 +121,23 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
 MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
   observe(image, cam_from_world_expected);
   return mask();
+}
+
+// The velocity does not last: what a hand changes it by between slow frames is more than the comparison forgives. The
+// surfaces of the frame before tell where the camera is.
+void MotionSegmenter::find_pose() {
+  constexpr double kAcceleration = 1.0;         // [m/s^2] standard deviation
+  constexpr double kAngularAcceleration = 3.0;  // [rad/s^2]
+  aligned_ = false;
+  if (!previous_) return;
+  const double interval = current_->time - previous_->time;
+  if (!(interval > 0)) return;
+  const double half_square = 0.5 * interval * interval;
+  const Rigid3 expected = previous_->cam_from_world * current_->cam_from_world.inverse();
+  const Rigid3 found = alignment_.align(*current_, *previous_, rays_, expected, kAcceleration * half_square,
+                                        kAngularAcceleration * half_square);
+  current_->cam_from_world = found.inverse() * previous_->cam_from_world;
+  aligned_ = true;
 }
 
 // Each cell takes over the score of the same surface in the frame before.

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dkb/dynamics/depth_alignment.h"
 #include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
@@ -39,6 +40,11 @@ class MotionSegmenter {
   MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected);
   // The same for those who want score() alone.
   void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected);
+  // Pose of the image last given, not committed yet, as its depth shows it beside what was expected; nothing when there
+  // was no view to hold it against.
+  std::optional<Rigid3> aligned_pose() const {
+    return aligned_ ? std::optional(depth_from_colour_.inverse() * current_->cam_from_world) : std::nullopt;
+  }
   // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
   void commit(const std::optional<Rigid3>& cam_from_world);
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
@@ -55,6 +61,7 @@ class MotionSegmenter {
   };
 
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
+  void find_pose();
   void carry_scores();
   void compare(MotionDepthGrid& view);
   void find_openings();
@@ -71,12 +78,14 @@ class MotionSegmenter {
   MotionOptions options_;
   MotionRays rays_;
   MotionSmoothing smoothing_;
+  DepthAlignment alignment_;
   std::unique_ptr<MotionDepthGrid> current_, previous_;
   std::vector<std::unique_ptr<MotionDepthGrid>> views_;  // oldest first
   std::vector<std::unique_ptr<MotionDepthGrid>> spare_;
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
+  bool aligned_ = false;
   size_t turn_ = 0;
   int frames_ = 0;
   MotionProjection projection_;

@@ -175,6 +175,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .features = features,
                                          .appearance = &appearance,
                                          .prior = frame.prior() ? &*frame.prior() : nullptr,
+                                         .expected = scene.cam_from_world ? &*scene.cam_from_world : nullptr,
                                          .may_start_map = !localize_only_});
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));

@@ -13,8 +13,8 @@
 
 namespace dkb {
 
-// Which poses of the frames: as they were published; hanging on the keyframes, since the world may still move; or those,
-// smoothed by each other.
+// Which poses of the frames: as they were published; hanging on the keyframes, since the world may still move; or
+// those, smoothed by each other.
 enum class TrajectoryKind { online, by_map, smoothed };
 
 // What a run has brought so far. The pipeline writes on its thread; any thread reads.

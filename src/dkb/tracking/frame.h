@@ -54,6 +54,7 @@ struct TrackingInput {
   PointAppearance* appearance =
       nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
   const MotionPrior* prior = nullptr;  // may be null
+  const Rigid3* expected = nullptr;    // cam_from_world as depth shows it; may be null
   bool may_start_map = true;           // else a frame that finds no map stays without a pose
 };
 

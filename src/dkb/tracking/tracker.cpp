@@ -326,13 +326,13 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
 // rolling shutter, and it may have been a mistake: it counts once this frame follows from it.
-bool Tracker::confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior) {
+bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input) {
   if (!unconfirmed_) return false;
   const TrackingState before = state_;
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
-  if (last_->index + 1 == frame.index && track_from_last(frame, prior)) return true;
+  if (last_->index + 1 == frame.index && track_from_last(frame, input)) return true;
   last_ = std::move(before_loss);
   state_ = before;
   return false;
@@ -380,8 +380,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   const auto predicted = predict(frame.index, frame.timestamp, input.prior);
   if (predicted) frame.predicted_cam_from_world = predicted->cam_from_world;
   const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
-  bool followed = has_map && track_from_last(frame, input.prior);
-  bool found_again = has_map && !followed && confirm_relocalisation(frame, input.prior);
+  bool followed = has_map && track_from_last(frame, input);
+  bool found_again = has_map && !followed && confirm_relocalisation(frame, input);
   if (has_map && !followed && !found_again && relocalise(frame, input.appearance, expected)) {
     // At once where it is but a step from the frame before, or where it was expected; else when the next frame agrees.
     followed = moved_plausibly_from_last(frame) || (expected != nullptr && expected->agrees(frame.cam_from_world));

@@ -101,8 +101,8 @@ class Tracker {
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                          std::vector<PointId>& points) const;
   std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;
-  std::vector<Rigid3> expected_poses(double dt, const MotionPrior* prior) const;
-  bool track_from_last(TrackedFrame& frame, const MotionPrior* prior);
+  std::vector<Rigid3> expected_poses(double dt, const TrackingInput& input) const;
+  bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   std::optional<PosePrediction> predict(FrameIndex index, double timestamp, const MotionPrior* prior) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame);
@@ -112,7 +112,7 @@ class Tracker {
                                         PointAppearance* appearance) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
   bool moved_plausibly_from_last(const TrackedFrame& frame) const;
-  bool confirm_relocalisation(TrackedFrame& frame, const MotionPrior* prior);
+  bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);
   Rigid3 express_anew(TrackedFrame& frame) const;
   bool within_travel_distance(const PoseProposal& found, double timestamp) const;
   bool start_map(TrackedFrame& frame, const PosePrediction* expected);

@@ -73,24 +73,26 @@ std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::
 }
 
 // Where the camera is expected: by the prior where there is one, else by the motion so far.
-std::vector<Rigid3> Tracker::expected_poses(double dt, const MotionPrior* prior) const {
+std::vector<Rigid3> Tracker::expected_poses(double dt, const TrackingInput& input) const {
+  const MotionPrior* prior = input.prior;
   std::vector<Rigid3> steps;
   if (prior != nullptr) {
     Rigid3 step = prior->previous_from_current.inverse();
     if (prior->rotation_only) step.translation = expected_motion(dt).translation;
     steps.push_back(step);
   }
+  if (input.expected != nullptr) steps.push_back(*input.expected * last_->cam_from_world.inverse());
   if (velocity_) steps.push_back(expected_motion(dt));
   for (Rigid3& step : steps) step = step * last_->cam_from_world;
   return steps;
 }
 
-bool Tracker::track_from_last(TrackedFrame& frame, const MotionPrior* prior) {
+bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   if (state_ == TrackingState::lost || !last_) return false;
   const MatchableFeatures features = frame.matchable();
   std::vector<PointId> points(frame.points.size(), kNoPoint);
   std::optional<Rigid3> pose;
-  for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, prior))
+  for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, input))
     if (!pose) pose = track_last_frame(expected, search_radius(kRadiusLastFrame), features, points);
   if (!pose) pose = match_last_frame(frame, points);
   if (!pose) pose = track_last_frame(last_->cam_from_world, kRadiusWide, features, points);

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/depth_alignment.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace dkb {
+namespace {
+
+constexpr int kStride = 3;        // [cells] between those that are asked
+constexpr int kReach = 2;         // [cells] to both sides, over which a normal is taken
+constexpr int kIterations = 6;    // at most
+constexpr double kTukey = 4.685;  // [standard deviations]: 95 % efficiency with Gaussian noise
+// The noise of depth hangs together over some ten pixels, and the sensor's calibration over far more: so many cells say
+// no more than one.
+constexpr double kTogether = 25;
+constexpr size_t kEnoughCells = 100;
+constexpr float kMoves = 0.3f;                            // score from which a cell is left out
+constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
+constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
+
+}  // namespace
+
+DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays)
+    : noise_(noise), focal_(focal), normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()) {}
+
+void DepthAlignment::find_normals(const MotionDepthGrid& grid, const MotionRays& rays) {
+  const Image<float>& depth = grid.depth;
+  const auto place = [&](int x, int y) -> Eigen::Vector3f { return depth(x, y) * rays.ray(x, y); };
+  constexpr int k = kReach;
+  for (int y = k; y + k < rays.height(); ++y)
+    for (int x = k; x + k < rays.width(); ++x) {
+      Eigen::Vector3f& normal = normals_(x, y);
+      normal.setZero();
+      const float z = depth(x, y);
+      if (!(z > 0) || grid.score(x, y) >= kMoves) continue;
+      const auto& [least, most] = std::minmax({depth(x - k, y), depth(x + k, y), depth(x, y - k), depth(x, y + k)});
+      const auto jump = static_cast<float>(noise_.max_depth_jump(z, k * rays.cell(), focal_));
+      if (!(least > 0) || z - least > jump || most - z > jump) continue;
+      normal = (place(x + k, y) - place(x - k, y)).cross(place(x, y + k) - place(x, y - k)).normalized();
+    }
+}
+
+Rigid3 DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
+                             const Rigid3& expected, double position_sd, double rotation_sd) {
+  find_normals(there, rays);
+  const auto position_variance = static_cast<float>(position_sd * position_sd);
+  const auto rotation_variance = static_cast<float>(rotation_sd * rotation_sd);
+  Vector6d prior;
+  prior << Eigen::Vector3d::Constant(1 / (position_sd * position_sd)),
+      Eigen::Vector3d::Constant(1 / (rotation_sd * rotation_sd));
+  Rigid3 pose = expected;
+  double doubt = 1;  // share of the expectation's variance that the robust cost still allows for
+  for (int iteration = 0; iteration < kIterations; ++iteration, doubt *= kDoubtLeft) {
+    const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
+    const Eigen::Vector3f translation = pose.translation.cast<float>();
+    Matrix6d information = Matrix6d::Zero();
+    Vector6d gradient = Vector6d::Zero();
+    size_t cells = 0;
+    for (int y = kStride / 2; y < rays.height(); y += kStride)
+      for (int x = kStride / 2; x < rays.width(); x += kStride) {
+        const float depth = here.depth(x, y);
+        if (!(depth > 0)) continue;
+        const Eigen::Vector3f point = rotation * (depth * rays.ray(x, y)) + translation;
+        int u = 0, v = 0;
+        if (!rays.find_cell(point, &u, &v)) continue;
+        const Eigen::Vector3f& normal = normals_(u, v);
+        if (normal.isZero()) continue;
+        const float z = there.depth(u, v);
+        const float distance = normal.dot(point - z * rays.ray(u, v));
+        Eigen::Matrix<float, 6, 1> jacobian;
+        jacobian << normal, point.cross(normal);
+        const auto sigma = static_cast<float>(noise_.flat_depth_sigma(z));
+        const float variance = 2 * sigma * sigma;
+        const float allowed = variance + static_cast<float>(doubt) *
+                                             (position_variance + rotation_variance * jacobian.tail<3>().squaredNorm());
+        const float share = distance * distance / (static_cast<float>(kTukey * kTukey) * allowed);
+        if (share >= 1) continue;
+        const float weight = (1 - share) * (1 - share) / (static_cast<float>(kTogether) * variance);
+        const Vector6d row = jacobian.cast<double>();
+        information.noalias() += static_cast<double>(weight) * row * row.transpose();
+        gradient += static_cast<double>(weight * distance) * row;
+        ++cells;
+      }
+    if (cells < kEnoughCells) return expected;
+    information.diagonal() += prior;
+    gradient += prior.cwiseProduct(tangent_from_rigid3(pose * expected.inverse()));
+    const Vector6d step = -information.ldlt().solve(gradient);
+    pose = rigid3_from_tangent(step) * pose;
+    if (step.head<3>().norm() < kSmallStep && step.tail<3>().norm() < kSmallTurn) break;
+  }
+  return pose;
+}
+
+}  // namespace dkb

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "dkb/dynamics/motion_depth_grid.h"
+#include "dkb/geometry/sensor_noise.h"
+
+namespace dkb {
+
+// Where a depth image was taken, by the surfaces that an earlier one saw: point-to-plane distances with projective
+// association (Blais and Levine, PAMI 1995; Chen and Medioni, IVC 1992) under a robust cost (Tukey's), beside what was
+// expected. What the surfaces leave open stays as it was expected. Deterministic.
+class DepthAlignment {
+ public:
+  DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays);
+
+  // there_from_here of the two grids' cameras. `expected` may be off by `position_sd` [m] and `rotation_sd` [rad].
+  // Cells of `there` whose score says that they move are left out.
+  Rigid3 align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
+               const Rigid3& expected, double position_sd, double rotation_sd);
+
+ private:
+  void find_normals(const MotionDepthGrid& grid, const MotionRays& rays);
+
+  SensorNoise noise_;
+  double focal_;                    // [px]
+  Image<Eigen::Vector3f> normals_;  // of the cells of `there`; zero where there is none
+};
+
+}  // namespace dkb

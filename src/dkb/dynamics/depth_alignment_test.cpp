@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/dynamics/depth_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kPositionSd = 0.03, kRotationSd = 0.03;
+
+struct Plane {
+  Eigen::Vector3d normal;  // of unit length
+  double offset;           // normal . x = offset
+};
+
+CameraModel small_camera() {
+  CameraModel c;
+  c.width = 320, c.height = 240;
+  c.fx = c.fy = 262;
+  c.cx = 159.5, c.cy = 119.5;
+  return c;
+}
+
+// What a camera sees of planes, each hiding those behind it, with the sensor's noise.
+DepthImage view_of(const std::vector<Plane>& planes, const Rigid3& cam_from_world, uint64_t seed) {
+  const CameraModel c = small_camera();
+  const Rigid3 world_from_cam = cam_from_world.inverse();
+  Random random(seed);
+  DepthImage depth(c.width, c.height);
+  for (int y = 0; y < c.height; ++y)
+    for (int x = 0; x < c.width; ++x) {
+      const Eigen::Vector3d ray = world_from_cam.rotation * c.unproject(Eigen::Vector2d(x, y), 1.0);
+      double nearest = 1e9;
+      for (const Plane& p : planes) {
+        const double z = (p.offset - p.normal.dot(world_from_cam.translation)) / p.normal.dot(ray);
+        if (z > 0.1 && z < nearest) nearest = z;
+      }
+      depth(x, y) = static_cast<float>(nearest + SensorNoise().flat_depth_sigma(nearest) * random.normal());
+    }
+  return depth;
+}
+
+const std::vector<Plane> kCorner{
+    {Eigen::Vector3d(0, 0, 1), 3.0}, {Eigen::Vector3d(1, 0, 0.4).normalized(), 1.5}, {Eigen::Vector3d(0, 1, 0), 1.0}};
+
+class DepthAlignmentTest : public testing::Test {
+ protected:
+  static MotionDepthGrid grid_of(const DepthImage& depth, const MotionRays& rays) {
+    MotionDepthGrid grid;
+    grid.set_depth(depth, rays);
+    std::fill(grid.score.data(), grid.score.data() + grid.score.size(), 0.0f);
+    return grid;
+  }
+  Rigid3 align(const MotionDepthGrid& here, const MotionDepthGrid& there, const Rigid3& expected = {}) {
+    return alignment_.align(here, there, rays_, expected, kPositionSd, kRotationSd);
+  }
+  static double degrees(const Rigid3& error) { return vector_from_rotation(error.rotation).norm() * 57.29578; }
+
+  MotionRays rays_{small_camera(), 4};
+  DepthAlignment alignment_{SensorNoise(), small_camera().fx, rays_};
+  // The camera has come nearer, to the left, and turned by two degrees.
+  const Rigid3 moved_{rotation_from_vector({0.01, 0.03, -0.015}), {0.03, -0.01, -0.04}};  // there_from_here
+};
+
+TEST_F(DepthAlignmentTest, FindsTheMotionInACorner) {
+  const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
+  const MotionDepthGrid here = grid_of(view_of(kCorner, moved_.inverse(), 2), rays_);
+  const Rigid3 error = align(here, there) * moved_.inverse();
+  EXPECT_LT(error.translation.norm(), 0.01);
+  EXPECT_LT(degrees(error), 0.25);
+}
+
+TEST_F(DepthAlignmentTest, WhatAWallLeavesOpenStaysAsExpected) {
+  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  const MotionDepthGrid there = grid_of(view_of(wall, {}, 1), rays_);
+  const Rigid3 moved(rotation_from_vector({0.01, 0.02, 0.02}), {0.02, 0.01, 0.03});
+  const MotionDepthGrid here = grid_of(view_of(wall, moved.inverse(), 2), rays_);
+  const Rigid3 found = align(here, there);
+  EXPECT_NEAR(found.translation.z(), 0.03, 0.002);
+  EXPECT_NEAR(vector_from_rotation(found.rotation).x(), 0.01, 0.001);
+  EXPECT_NEAR(vector_from_rotation(found.rotation).y(), 0.02, 0.001);
+  EXPECT_NEAR(vector_from_rotation(found.rotation).z(), 0, 0.003);
+  EXPECT_NEAR(found.translation.x(), 0, 0.005);
+  EXPECT_NEAR(found.translation.y(), 0, 0.005);
+}
+
+TEST_F(DepthAlignmentTest, SomebodyBeforeAThirdOfTheImageDoesNotPullThePoseAlong) {
+  const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
+  DepthImage depth = view_of(kCorner, moved_.inverse(), 2);
+  for (int y = 0; y < 240; ++y)
+    for (int x = 60; x < 170; ++x) depth(x, y) = 0.8f;
+  const Rigid3 error = align(grid_of(depth, rays_), there) * moved_.inverse();
+  EXPECT_LT(error.translation.norm(), 0.015);
+  EXPECT_LT(degrees(error), 0.25);
+}
+
+TEST_F(DepthAlignmentTest, SurfacesThatMovedBeforeAreLeftOut) {
+  DepthImage first = view_of(kCorner, {}, 1), second = view_of(kCorner, moved_.inverse(), 2);
+  // Nearly half of the image is somebody who goes along with the camera.
+  for (int y = 0; y < 240; ++y)
+    for (int x = 0; x < 140; ++x) first(x, y) = second(x, y) = 1.2f + 0.001f * static_cast<float>(x);
+  MotionDepthGrid there = grid_of(first, rays_);
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 35; ++x) there.score(x, y) = 1;
+  const Rigid3 error = align(grid_of(second, rays_), there) * moved_.inverse();
+  EXPECT_LT(error.translation.norm(), 0.02);
+  EXPECT_LT(degrees(error), 0.3);
+}
+
+TEST_F(DepthAlignmentTest, WithoutDepthNothingIsFound) {
+  const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
+  const Rigid3 found = align(grid_of(DepthImage(320, 240), rays_), there, moved_);
+  EXPECT_EQ(tangent_from_rigid3(found), tangent_from_rigid3(moved_));
+}
+
+}  // namespace
+}  // namespace dkb
