@@ -22,22 +22,13 @@ void box_regions(Detections& detections) {
 
 }  // namespace
 
-void clear_still(MoverMask& mask, const DepthImage& depth, double focal, const Image<float>& score, int score_cell) {
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
   constexpr float kStill = -0.3f;  // the score runs from -1 to 3
-  constexpr double kFoot = 0.12;   // [m] a foot is no higher
-  for (int x = 0; x < mask.cells.width(); ++x) {
-    int foot_end = 0;  // rows before this one may be a foot of what is marked above
-    for (int y = 0; y < mask.cells.height(); ++y) {
-      if (mask.cells(x, y) == 0) continue;
-      const int px = x * mask.cell + mask.cell / 2, py = y * mask.cell + mask.cell / 2;
-      const int sx = px / score_cell, sy = py / score_cell;
-      if (score.contains(sx, sy) && score(sx, sy) < kStill) {
-        if (y >= foot_end) mask.cells(x, y) = 0;
-      } else if (depth.contains(px, py) && depth(px, py) > 0) {
-        foot_end = y + 1 + static_cast<int>(kFoot * focal / (static_cast<double>(depth(px, py)) * mask.cell));
-      }
+  for (int y = 0; y < mask.cells.height(); ++y)
+    for (int x = 0; x < mask.cells.width(); ++x) {
+      const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;
+      if (score.contains(sx, sy) && score(sx, sy) < kStill) mask.cells(x, y) = 0;
     }
-  }
 }
 
 CarriedObjects::CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options)
@@ -107,7 +98,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
       const Detections there = carry_to(*source, *p.pyramid, detections, std::abs(p.frame - from));
       LateMask mask{p.frame, silhouettes(p.image->depth, there.mask.empty() ? there.boxes : std::vector<Detection>(),
                                          camera_, noise_, options_.silhouette)};
-      if (!p.still_score.empty()) clear_still(mask.mask, p.image->depth, camera_.fx, p.still_score, score_cell);
+      if (!p.still_score.empty()) clear_still(mask.mask, p.still_score, score_cell);
       if (!there.mask.empty()) unite(mask.mask, {1, there.mask}, camera_.width, camera_.height);
       late.push_back(std::move(mask));
     }

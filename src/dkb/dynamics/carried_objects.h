@@ -59,8 +59,6 @@ class CarriedObjects {
 };
 
 // Takes out of `mask` what the motion segmentation saw standing still before the object came: it is no part of it.
-// Right below what stays, as far as a foot is high, nothing is taken: where a foot is on the floor the two have one
-// depth.
-void clear_still(MoverMask& mask, const DepthImage& depth, double focal, const Image<float>& score, int score_cell);
+void clear_still(MoverMask& mask, const Image<float>& score, int score_cell);
 
 }  // namespace dkb

@@ -146,35 +146,6 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
   for (const Cell& c : limbs) mine(c.x, c.y) = 255;
 }
 
-// What a box shows, and the depth layer it was sought at.
-struct Sought {
-  const Detection* detection = nullptr;
-  float layer = 0;  // [m] 0 = the core has no depth
-};
-
-// Depths of `grid` without those of silhouettes found before. Nearer ones belong to somebody else, who stands before
-// whom the box is of, unless most of one lies in this box: then both boxes are of the same.
-Image<float> without_others(const Image<float>& grid, const CellRange& range,
-                            const std::vector<std::vector<Cell>>& found) {
-  Image<float> rest = grid;
-  for (const std::vector<Cell>& cells : found) {
-    const auto inside = static_cast<size_t>(std::count_if(cells.begin(), cells.end(), [&](const Cell& c) {
-      return c.x >= range.x0 && c.y >= range.y0 && c.x < range.x1 && c.y < range.y1;
-    }));
-    if (2 * inside > cells.size()) continue;
-    for (const Cell& c : cells) rest(c.x, c.y) = 0;
-  }
-  return rest;
-}
-
-// Share of the core's cells with depth that are left in `rest`.
-double share_left(const Image<float>& grid, const Image<float>& rest, const CellRange& core) {
-  int before = 0, after = 0;
-  for (int y = core.y0; y < core.y1; ++y)
-    for (int x = core.x0; x < core.x1; ++x) before += grid(x, y) > 0, after += rest(x, y) > 0;
-  return before == 0 ? 0 : static_cast<double>(after) / before;
-}
-
 }  // namespace
 
 MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
@@ -188,19 +159,10 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
 
-  // From near to far: who stands behind is found beside those before him.
-  std::vector<Sought> order;
-  for (const Detection& d : boxes)
-    order.push_back({&d, object_depth(grid, cells_of(scaled(d.box, kCore), kMaskCell, columns, rows))});
-  std::stable_sort(order.begin(), order.end(), [](const Sought& a, const Sought& b) { return a.layer < b.layer; });
-  std::vector<std::vector<Cell>> found;
-  for (const auto& [detection, nearest_layer] : order) {
-    const CellRange range = cells_of(scaled(detection->box, 1 + 2 * kWidening), kMaskCell, columns, rows);
-    const CellRange core = cells_of(scaled(detection->box, kCore), kMaskCell, columns, rows);
-    float layer = nearest_layer;
-    Image<float> rest = without_others(grid, range, found);
-    if (share_left(grid, rest, core) < kMinShare) rest = grid;
-    if (layer > 0) layer = object_depth(rest, core);
+  for (const Detection& detection : boxes) {
+    const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
+    const CellRange core = cells_of(scaled(detection.box, kCore), kMaskCell, columns, rows);
+    const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
         for (int x = range.x0; x < range.x1; ++x) mask.cells(x, y) = 255;
@@ -215,9 +177,8 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (rest(x, y) > 0 && near_layer(x, y, kRelativeLayer * layer)) seeds.push_back({x, y});
-    found.push_back(surfaces.grow(std::move(seeds), within_depth));
-    for (const Cell& c : found.back()) mine(c.x, c.y) = 255;
+        if (near_layer(x, y, kRelativeLayer * layer)) seeds.push_back({x, y});
+    for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.

@@ -20,7 +20,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   const Stopwatch working;
   const Scene scene = scenes_.look(extract(frame), undistort_, detections, expect(frame), outcome_);  // DKB 3.1
   retract_late(scene.late_masks);
-  const UsableFeatures usable = usable_features(scene, options_.dynamics.motion.smoothing.distance, context_.camera.fx);
+  const UsableFeatures usable = usable_features(scene, context_.camera.fx);
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
   const KeyframeDecision decision = decide(scene, tracked);  // DKB 3.2

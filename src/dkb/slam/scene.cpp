@@ -6,9 +6,11 @@
 
 namespace dkb {
 
-UsableFeatures usable_features(const Scene& scene, double spread, double focal) {
+UsableFeatures usable_features(const Scene& scene, double focal) {
+  // Beside what is near the projector's light is hidden from the sensor, by no more than the two lie apart.
+  constexpr double kBaseline = 0.075;  // [m] of the Kinect
   UsableFeatures usable;
-  const MoverMask around = spread_into_holes(scene.mask, scene.extracted.image().depth, spread, focal);
+  const MoverMask around = spread_into_holes(scene.mask, scene.extracted.image().depth, kBaseline, focal);
   const OrbFeatures& orb = scene.extracted.orb;
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     if (scene.rejected[i] == FeatureReason::moved) continue;

@@ -39,8 +39,8 @@ struct UsableFeatures {
   std::vector<int> corner;  // per feature: its index among all corners of the scene
   std::vector<FeatureMotion> motion;
 };
-// `spread`, `focal`: how far [m] a mover reaches into what lacks depth beside it, and the camera's focal length [px].
-UsableFeatures usable_features(const Scene& scene, double spread, double focal);
+// `focal`: the camera's focal length [px].
+UsableFeatures usable_features(const Scene& scene, double focal);
 
 // What became of every corner in the end. `tracked.source` are indices of `usable`.
 std::vector<FeatureReport> report_features(const Scene& scene, const UsableFeatures& usable,

@@ -97,7 +97,7 @@ MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_f
 MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                               const MoverMask& moving) const {
   MoverMask mask = silhouettes(image.depth, unmasked, camera_, noise_, options_.carried.silhouette);
-  if (motion_) clear_still(mask, image.depth, camera_.fx, motion_->score(), options_.motion.cell);
+  if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
   unite(mask, given, camera_.width, camera_.height);
   if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);
   return mask;
