@@ -61,7 +61,6 @@ OrtLibrary read_table(const Function* table) {
   take(9, &library.run);
   take(10, &library.create_options);
   take(17, &library.disable_memory_pattern);
-  take(19, &library.disable_arena);
   take(23, &library.set_optimisation);
   take(24, &library.set_threads_within);
   take(25, &library.set_threads_between);

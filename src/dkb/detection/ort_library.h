@@ -34,7 +34,6 @@ struct OrtLibrary {
 
   OrtStatus* (*create_options)(OrtOptions**);
   OrtStatus* (*disable_memory_pattern)(OrtOptions*);
-  OrtStatus* (*disable_arena)(OrtOptions*);
   OrtStatus* (*set_optimisation)(OrtOptions*, int);  // 99 = all
   OrtStatus* (*set_threads_within)(OrtOptions*, int);
   OrtStatus* (*set_threads_between)(OrtOptions*, int);

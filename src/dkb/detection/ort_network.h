@@ -14,7 +14,7 @@ namespace dkb {
 // load_onnxruntime(), and a small known graph computed rightly by it.
 std::optional<OrtLibrary> find_onnxruntime(std::string* reason);
 
-// A network computed by ONNX Runtime: on the calling thread alone, and without keeping memory between images.
+// A network computed by ONNX Runtime, on the calling thread alone.
 // Throws InputError naming the file (`name`) when the graph cannot be read.
 std::unique_ptr<OnnxNetwork> open_ort_network(const OrtLibrary& library, std::string_view bytes,
                                               const std::string& input, const std::string& name);
