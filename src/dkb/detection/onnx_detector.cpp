@@ -181,10 +181,10 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 OnnxDetector::~OnnxDetector() = default;
 
 int OnnxDetector::frames_per_detection(double frames_per_second) const {
-  constexpr double kNanoBytes = 8e6;   // the nano models, on which the time per pixel was measured, lie below
-  constexpr double kReserve = 1.15;    // p95 above the mean
-  constexpr double kEveryFrame = 0.5;  // of a frame's time: tracking and mapping want the cores, too
-  const double ms_per_pixel = inference() == Inference::onnxruntime ? 0.08e-3 : 0.45e-3;
+  constexpr double kNanoBytes = 8e6;       // the nano models, on which the time per pixel was measured, lie below
+  constexpr double kReserve = 1.15;        // p95 above the mean
+  constexpr double kEveryFrame = 2.0 / 3;  // of a frame's time: tracking and mapping want the cores, too
+  const double ms_per_pixel = inference() == Inference::onnxruntime ? 0.11e-3 : 0.45e-3;
   const double ms =
       ms_per_pixel * input_width_ * input_height_ * std::max(1.0, static_cast<double>(model_bytes_) / kNanoBytes);
   const double frames = kReserve * ms * frames_per_second / 1000;

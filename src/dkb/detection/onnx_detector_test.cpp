@@ -298,7 +298,7 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
 
 INSTANTIATE_TEST_SUITE_P(
     Models, RealModelTest,
-    testing::Combine(testing::Values(RealModel{"yolov5n_640x480.onnx", YoloHead::v5, 640, 480, 2, 6},
+    testing::Combine(testing::Values(RealModel{"yolov5n_640x480.onnx", YoloHead::v5, 640, 480, 3, 6},
                                      RealModel{"yolov5n_320x256.onnx", YoloHead::v5, 320, 256, 1, 3},
                                      RealModel{"yolox_nano.onnx", YoloHead::yolox, 416, 416, 1, 4}),
                      testing::Values(Inference::onnxruntime, Inference::opencv)));
