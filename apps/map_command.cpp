@@ -157,6 +157,7 @@ void register_map(CLI::App& app, int& exit_code) {
   cloud->add_option("--images", arguments->images, "source of the map: keyframes' images and masks go into the model");
   cloud->add_option("--detector", arguments->detection.kinds, "of the masks: auto, yolo, motion, none");
   cloud->add_option("--model", arguments->detection.model, "ONNX file of the yolo detector");
+  cloud->add_option("--inference", arguments->detection.inference, "What computes it: auto, onnxruntime, opencv");
   cloud->callback([arguments, &exit_code] {
     export_map(*arguments);
     exit_code = 0;

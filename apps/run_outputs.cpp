@@ -78,6 +78,7 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.points_retracted}};
   j["detector"] = {
       {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
+  if (!s.detector_inference.empty()) j["detector"]["inference"] = s.detector_inference;
   j["mapping"] = {{"points_created", s.points_created},
                   {"points_culled", s.points_culled},
                   {"points_fused", s.points_fused},

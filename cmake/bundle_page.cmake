@@ -25,7 +25,7 @@ if(EXISTS ${WORK}/fetched)
 endif()
 set(result 0)
 if(NOT fetched STREQUAL lock)
-  execute_process(COMMAND ${NPM} ci --ignore-scripts --omit=dev --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-retry-maxtimeout=5000 --fetch-timeout=60000
+  execute_process(COMMAND ${NPM} ci --ignore-scripts --omit=dev --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-retry-mintimeout=1000 --fetch-retry-maxtimeout=5000 --fetch-timeout=60000
     WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output TIMEOUT 300)
   if(result EQUAL 0)
     file(WRITE ${WORK}/fetched ${lock})

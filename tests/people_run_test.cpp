@@ -21,9 +21,11 @@
 #include <gtest/gtest.h>
 
 #include <iostream>
+#include <map>
 
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/detection/onnx_network.h"
 #include "e2e_support.h"
 #include "mover_evaluation.h"
 #include "people_support.h"
@@ -170,8 +172,30 @@ TEST_P(PeopleByAnyNetwork, StayOutOfPosesFeaturesAndMap) {
   EXPECT_EQ(run.stats.at("detector").at("kind"), "yolo");
 }
 
-INSTANTIATE_TEST_SUITE_P(Named, PeopleByAnyNetwork, ::testing::Values("yolov5n_320x256", "yolox_nano"),
+INSTANTIATE_TEST_SUITE_P(Named, PeopleByAnyNetwork,
+                         ::testing::Values("yolov5n_320x256", "yolov5n_320x256_by_opencv", "yolox_nano"),
                          [](const auto& p) { return std::string(p.param); });
+
+// Which of both computes it is the user's choice, and what that costs in latency is known beforehand.
+TEST_F(PeopleByNetwork, IsComputedByWhatWasNamed) {
+  const Arguments detector = people_detector("yolov5n_320x256");
+  if (detector.empty()) GTEST_SKIP() << no_people_detector("yolov5n_320x256");
+  for (const auto& [name, latency] : std::map<std::string, int>{{"onnxruntime", 1}, {"opencv", 3}}) {
+    if (!available(inference_named(name))) continue;
+    const SlamRun run(people_sequence(), temp / name,
+                      PeopleRun::joined(detector, {"--inference", name, "--max-frames", "10"}));
+    ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+    EXPECT_EQ(run.stats.at("detector").at("inference"), name);
+    EXPECT_EQ(run.stats.at("detector").at("latency_frames"), latency);
+  }
+  const SlamRun missing(people_sequence(), temp / "missing",
+                        PeopleRun::joined(detector, {"--inference", "onnxruntime"}),
+                        {"DKB_ONNXRUNTIME=/no/such/library.so"});
+  EXPECT_EQ(missing.finished.exit_code, 2);
+  EXPECT_EQ(missing.finished.error_lines(), 1u) << missing.finished.err;
+  for (const char* said : {"/no/such/library.so", "make onnxruntime", "DKB_ONNXRUNTIME"})
+    EXPECT_NE(missing.finished.err.find(said), std::string::npos) << missing.finished.err;
+}
 
 // Every twelfth frame, known eight frames later: whoever came in meanwhile is in the map until the answer is there.
 TEST_F(PeopleByNetwork, AreRetractedWhenTheAnswerIsLate) {

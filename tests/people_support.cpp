@@ -77,12 +77,18 @@ std::vector<std::string> people_detector(const std::string& name) {
   if (name == "boxes") return {"--detector", "file", "--boxes", boxes};
   if (name == "masks") return {"--detector", "none", "--masks", masks};
   if (name == "motion_with_boxes") return {"--detector", "motion+file", "--boxes", boxes};
-  const std::string and_motion = "_with_motion";
-  const bool with_motion = name.ends_with(and_motion);
-  const std::string network = with_motion ? name.substr(0, name.size() - and_motion.size()) : name;
+  std::string network = name;
+  const auto ended_with = [&](const std::string& end) {
+    if (!network.ends_with(end)) return false;
+    network.resize(network.size() - end.size());
+    return true;
+  };
+  const bool by_opencv = ended_with("_by_opencv"), with_motion = ended_with("_with_motion");
   const fs::path model = outside_data("models/" + network + ".onnx");
   if (model.empty()) return {};
-  return {"--detector", with_motion ? "yolo+motion" : "yolo", "--model", model};
+  std::vector<std::string> arguments = {"--detector", with_motion ? "yolo+motion" : "yolo", "--model", model};
+  if (by_opencv) arguments.insert(arguments.end(), {"--inference", "opencv"});
+  return arguments;
 }
 
 std::string no_people_detector(const std::string& network) {

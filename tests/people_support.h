@@ -17,7 +17,8 @@ constexpr int kPeopleFrames = 90;
 std::filesystem::path people_sequence();
 
 // What `run` needs to find these people: "nothing", "motion", "boxes", "masks", "motion_with_boxes", or the name of a
-// network among the outside data's models, alone or followed by "_with_motion". Empty when that is not at hand.
+// network among the outside data's models, alone or followed by "_with_motion" and "_by_opencv". Empty when that is not
+// at hand.
 std::vector<std::string> people_detector(const std::string& name);
 std::string no_people_detector(const std::string& network);
 

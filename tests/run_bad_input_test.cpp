@@ -113,6 +113,7 @@ std::vector<Case> cases() {
       {"setting out of range", "pipeline.mapper_latency: 0 is out of range", [](const fs::path&) {}, {"--set", "pipeline.mapper_latency=0"}},
       {"unknown preset", "papre", [](const fs::path&) {}, {"--preset", "papre"}},
       {"unknown detector", "yolos", [](const fs::path&) {}, {"--detector", "yolos"}},
+      {"unknown inference", "onnxruntme", [](const fs::path&) {}, {"--inference", "onnxruntme"}},
       {"missing boxes file", "none.txt", [](const fs::path&) {}, {"--detector", "file", "--boxes", "@/none.txt"}},
       {"boxes that no detector reads",
        "--boxes",

@@ -53,7 +53,7 @@ TEST_P(SameBytesWithPeople, InAnyProcess) {
 
 INSTANTIATE_TEST_SUITE_P(By, SameBytesWithPeople,
                          ::testing::Values("nothing", "motion", "boxes", "masks", "motion_with_boxes",
-                                           "yolov5n_320x256"),
+                                           "yolov5n_320x256", "yolov5n_320x256_by_opencv"),
                          [](const auto& p) { return std::string(p.param); });
 
 }  // namespace

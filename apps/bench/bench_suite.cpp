@@ -12,6 +12,7 @@
 #include <set>
 
 #include "dkb/dataset/detector_choice.h"
+#include "dkb/detection/onnx_network.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
@@ -180,6 +181,7 @@ void check_options(const SuiteVariant& v, const Reader& reader) {
     options.disable(v.disabled());
     options.check();
     if (!v.detector.empty()) detector_kinds(v.detector, false);
+    if (!v.inference.empty()) inference_named(v.inference);
   } catch (const InputError& e) {
     reader.fail(e.what());
   }
@@ -196,6 +198,7 @@ SuiteVariant read_variant(const std::string& name, const Reader& reader) {
                      {"filter", to_text(&v.filter)},
                      {"model", to_text(&v.model)},
                      {"labels", to_text(&v.labels)},
+                     {"inference", to_text(&v.inference)},
                      {"boxes", to_text(&v.boxes)},
                      {"masks", to_text(&v.masks)},
                      {"set",
@@ -383,6 +386,7 @@ std::string suite_hash(const Suite& suite) {
                              {"detector", v.detector},
                              {"filter", v.filter},
                              {"files", {v.model, v.labels, v.boxes, v.masks}},
+                             {"inference", v.inference},
                              {"set", v.set}});
   uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
   for (const char c : j.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace))

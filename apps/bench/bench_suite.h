@@ -29,9 +29,9 @@ struct SuiteVariant {
   std::string name;
   std::string preset = "default";
   std::vector<std::string> disable;
-  std::string detector, filter, model, labels, boxes, masks;  // empty: as `run` chooses. model: may hold ${VARIABLE}s;
-                                                              // boxes, masks: below the sequence's folder
-  std::map<std::string, std::string> set;                     // settings by key
+  // Empty: as `run` chooses. model: may hold ${VARIABLE}s; boxes, masks: below the sequence's folder.
+  std::string detector, filter, model, labels, inference, boxes, masks;
+  std::map<std::string, std::string> set;  // settings by key
   std::string get;        // how to get what it needs, e.g. a model; with it, what is missing is named and left out
   std::string published;  // its name in the table of published numbers; empty: its own name
   std::optional<double> swept;  // its value, if it was made by the suite's sweep

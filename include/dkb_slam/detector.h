@@ -66,6 +66,7 @@ struct DKB_SLAM_API Detectors {
   std::vector<std::shared_ptr<Detector>> prompt;  ///< asked for every frame, on the feeding thread
   std::shared_ptr<Detector> slow;                 ///< asked on a thread of its own; its boxes and masks are carried
   DetectionSchedule schedule;                     ///< of the slow one
+  std::string inference;                          ///< what computes its network: "onnxruntime", "opencv"; else empty
 
   /// Without the motion segmentation.
   static Detectors none();
@@ -79,10 +80,13 @@ struct DetectorChoice {
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
   std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
   std::vector<int64_t> stamps_ns;  ///< of the images to come, where known: the masks' are held against them
-  int every = 0, latency = 0;      ///< [frames] the network's DetectionSchedule; 0 = by the model's size
+  int every = 0, latency = 0;      ///< [frames] the network's DetectionSchedule; 0 = by its size and what computes it
+  /// What computes it: "onnxruntime", "opencv", or "auto": ONNX Runtime where its library is found, else OpenCV. The
+  /// environment variable DKB_ONNXRUNTIME names that library or its folder.
+  std::string inference = "auto";
 };
 
-/// The detectors of that choice. A network runs by OpenCV's DNN module, loaded when the first one is made.
+/// The detectors of that choice. What computes a network is loaded when the first one is made.
 /// Throws InputError naming the file or option.
 DKB_SLAM_API Detectors make_detectors(const DetectorChoice& choice, const Camera& camera);
 

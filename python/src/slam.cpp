@@ -69,6 +69,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   choice.kinds = kinds;
   choice.model = text_or_empty(a, "model");
   choice.labels = text_or_empty(a, "labels");
+  choice.inference = argument<std::string>(a["inference"], "inference", "a str");
   choice.boxes = text_or_empty(a, "boxes");
   choice.masks = text_or_empty(a, "masks");
   choice.every = argument<int>(a["detect_every"], "detect_every", "an int");
@@ -272,6 +273,7 @@ py::dict statistics(const PySlam& slam) {
   d["keyframe_tests"] = s.keyframe_tests;
   d["detector"] = s.detector;
   d["detector_rate_hz"] = s.detector_rate_hz;
+  d["detector_inference"] = s.detector_inference;
   py::dict stages;
   for (const auto& [name, stage] : s.stages) {
     py::dict times;

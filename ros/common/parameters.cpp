@@ -29,6 +29,12 @@ std::vector<ParameterDescription> own_parameters() {
       {"detector", "auto", "what may move is found by: auto, yolo, motion, none; several joined by +"},
       {"model", "", "ONNX file of the yolo detector"},
       {"labels", "", "class names of that model, one per line; empty = COCO's"},
+      {"inference",
+       "auto",
+       "what computes it; auto = ONNX Runtime where it is found, else OpenCV",
+       -kInf,
+       kInf,
+       {"auto", "onnxruntime", "opencv"}},
       {"detect_every", int64_t{0}, "[frames] between detections; 0 = by the model's size", 0, 1000},
       {"detect_latency", int64_t{0}, "[frames] until a detection is used; 0 = by the model's size", 0, 1000},
       {"load_map", "", "map file to go on in"},
@@ -234,6 +240,7 @@ Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& 
   p.detector.kinds = values.text("detector");
   p.detector.model = values.text("model");
   p.detector.labels = values.text("labels");
+  p.detector.inference = values.text("inference");
   p.detector.every = values.number("detect_every");
   p.detector.latency = values.number("detect_latency");
   p.load_map = values.text("load_map");

@@ -10,6 +10,7 @@ int main(int, char** argv) try {
   dkb::DetectorChoice choice;
   choice.kinds = "yolo";
   choice.model = argv[1];
+  choice.inference = "opencv";
   const dkb::Detectors detectors = dkb::make_detectors(choice, dkb::Camera());
   std::ifstream maps("/proc/self/maps");
   for (std::string line; std::getline(maps, line);) {

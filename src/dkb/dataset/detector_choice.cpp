@@ -41,17 +41,20 @@ DetectorChoice choice_beside(const Options& options, const std::string& disabled
 
 Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   Detectors made;
+  const Inference inference = inference_named(choice.inference);
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !choice.model.empty());
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
   if (has("yolo")) {
     if (choice.model.empty())
       throw InputError(
           "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
-    auto detector = std::make_shared<OnnxDetector>(OnnxOptions{.model = choice.model, .labels = choice.labels},
-                                                   camera.width, camera.height);
+    auto detector = std::make_shared<OnnxDetector>(
+        OnnxOptions{.model = choice.model, .labels = choice.labels, .inference = inference}, camera.width,
+        camera.height);
     const int frames = detector->frames_per_detection(camera.fps > 0 ? camera.fps : 30);
-    made.schedule.every = choice.every > 0 ? choice.every : frames + 1;
-    made.schedule.latency = choice.latency > 0 ? choice.latency : frames + 1;
+    made.schedule.every = choice.every > 0 ? choice.every : frames;
+    made.schedule.latency = choice.latency > 0 ? choice.latency : frames;
+    made.inference = to_string(detector->inference());
     made.slow = std::move(detector);
   }
   if (!choice.boxes.empty() && !has("file"))

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "dkb/detection/onnx_file.h"
-#include "dkb/detection/onnx_network.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
@@ -142,9 +141,10 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
   require_option(height > 0, "height", height, "positive");
   const std::string name = options_.model.string();
   const std::string bytes = read_file(options_.model);
-  const auto declared = declared_input(read_onnx_input(bytes, name), name);
+  const OnnxInput input = read_onnx_input(bytes, name);
+  const auto declared = declared_input(input, name);
   labels_ = read_labels(options_.labels);
-  network_ = std::make_unique<OnnxNetwork>(bytes, name);
+  network_ = open_network(options_.inference, bytes, input.name, name);
   model_bytes_ = bytes.size();
   if (options_.input_size != 0)
     std::tie(input_width_, input_height_) = input_for(options_.input_size, width, height);
@@ -181,11 +181,14 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 OnnxDetector::~OnnxDetector() = default;
 
 int OnnxDetector::frames_per_detection(double frames_per_second) const {
-  constexpr double kMsPerPixel = 0.45e-3, kNanoBytes = 8e6;  // measured on the nano models, which lie below these bytes
-  constexpr double kReserve = 1.15;  // p95 above the mean
+  constexpr double kNanoBytes = 8e6;       // the nano models, on which the time per pixel was measured, lie below
+  constexpr double kReserve = 1.15;        // p95 above the mean
+  constexpr double kEveryFrame = 2.0 / 3;  // of a frame's time: tracking and mapping want the cores, too
+  const double ms_per_pixel = inference() == Inference::onnxruntime ? 0.11e-3 : 0.45e-3;
   const double ms =
-      kMsPerPixel * input_width_ * input_height_ * std::max(1.0, static_cast<double>(model_bytes_) / kNanoBytes);
-  return static_cast<int>(std::ceil(kReserve * ms * frames_per_second / 1000));
+      ms_per_pixel * input_width_ * input_height_ * std::max(1.0, static_cast<double>(model_bytes_) / kNanoBytes);
+  const double frames = kReserve * ms * frames_per_second / 1000;
+  return frames <= kEveryFrame ? 1 : static_cast<int>(std::ceil(frames)) + 1;
 }
 
 Detections OnnxDetector::detect(const DetectorInput& image) {
@@ -205,10 +208,6 @@ Detections OnnxDetector::detect(const DetectorInput& image) {
     break;
   }
   return found;
-}
-
-bool onnx_available() {
-  return OnnxNetwork::available();
 }
 
 }  // namespace dkb

@@ -2,85 +2,50 @@
 #include "dkb/detection/onnx_network.h"
 
 #include <algorithm>
-#include <array>
+#include <iterator>
 
+#include "dkb/detection/opencv_network.h"
+#include "dkb/detection/ort_network.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/module.h"
-#include "dkb/util/one_line.h"
+#include "dkb/util/settings.h"
 
 namespace dkb {
-namespace {
 
-// `reason`: why not, in one line, when the answer is null.
-const DkbOnnxApi* load_module(std::string* reason) {
-  const Module module{"libdkb_onnx.so", DKB_MODULE_LIBDIR, {DKB_MODULE_BUILD_DIR, DKB_MODULE_INSTALL_DIR}};
-  void* symbol = module_symbol(module, "dkb_onnx_api_1", reason);
-  return symbol == nullptr ? nullptr : reinterpret_cast<const DkbOnnxApi* (*)()>(symbol)();
+const char* to_string(Inference inference) {
+  return inference == Inference::onnxruntime ? "onnxruntime" : inference == Inference::opencv ? "opencv" : "auto";
 }
 
-std::string between(const std::string& text, const std::string& before, const std::string& after) {
-  const size_t start = text.find(before);
-  if (start == std::string::npos) return {};
-  const size_t end = text.find(after, start + before.size());
-  return end == std::string::npos ? std::string() : text.substr(start + before.size(), end - start - before.size());
-}
-
-// What to do about OpenCV's message, in one line with the layer first where it names one:
-// `Node [Gemm@ai.onnx]:(onnx_node!name) parse error: ... error: reason`, or `Can't create layer "..." of type "Gemm"`.
-std::string explain(const std::string& message) {
-  const std::string text = one_line(message);
-  std::string type = between(text, "Node [", "@"), layer = between(text, "]:(", ")");
-  if (type.empty()) type = between(text, "of type \"", "\"");
-  if (layer.empty()) layer = between(text, "Can't create layer \"", "\"");
-  if (layer.starts_with("onnx_node!")) layer.erase(0, 10);
-  std::string reason = text;
-  if (const size_t last = text.rfind("error: "); last != std::string::npos) reason = text.substr(last + 7);
-  if (const size_t code = reason.find(") "); reason.starts_with("(-") && code != std::string::npos)
-    reason.erase(0, code + 2);
-  while (!reason.empty() && (reason.back() == ' ' || reason.back() == '>')) reason.pop_back();
-  if (reason.size() > 160) reason = reason.substr(0, 160) + "...";
-  return (type.empty() ? "" : "at layer " + type + " \"" + layer + "\" ") + "(" + reason +
-         "); export it with opset 12, fixed size, 32-bit floats and without NMS, or simplify it (onnxsim)";
-}
-
-}  // namespace
-
-bool OnnxNetwork::available() {
-  std::string reason;
-  return load_module(&reason) != nullptr;
-}
-
-OnnxNetwork::OnnxNetwork(std::string_view bytes, std::string name) : name_(std::move(name)) {
-  std::string reason;
-  api_ = load_module(&reason);
-  if (api_ == nullptr)
-    throw InputError(name_ + ": this build cannot run ONNX models (" + reason +
-                     "); build with OpenCV's dnn module, or use --detector motion");
-  std::array<char, 2048> error{};
-  network_ = api_->open(bytes.data(), bytes.size(), error.data(), error.size());
-  if (network_ == nullptr) throw InputError(name_ + ": OpenCV cannot read the graph " + explain(error.data()));
-}
-
-OnnxNetwork::~OnnxNetwork() {
-  api_->close(network_);
-}
-
-std::vector<OnnxNetwork::Output> OnnxNetwork::forward(const std::vector<float>& blob, int width, int height) {
-  std::array<char, 2048> error{};
-  std::array<DkbOnnxTensor, 8> tensors{};
-  const int count = api_->forward(network_, blob.data(), width, height, tensors.data(),
-                                  static_cast<int>(tensors.size()), error.data(), error.size());
-  if (count < 0)
-    throw InputError(name_ + ": OpenCV cannot run the graph at " + std::to_string(width) + " x " +
-                     std::to_string(height) + " px " + explain(error.data()));
-  std::vector<Output> outputs;
-  for (int i = 0; i < std::min<int>(count, static_cast<int>(tensors.size())); ++i) {
-    const DkbOnnxTensor& tensor = tensors[static_cast<size_t>(i)];
-    size_t size = 1;
-    for (int d = 0; d < tensor.rank; ++d) size *= static_cast<size_t>(tensor.dims[d]);
-    outputs.push_back({{tensor.dims, tensor.dims + tensor.rank}, {tensor.data, size}});
+Inference inference_named(const std::string& name) {
+  std::vector<std::string> known;
+  for (const Inference inference : {Inference::automatic, Inference::onnxruntime, Inference::opencv}) {
+    known.emplace_back(to_string(inference));
+    if (name == known.back()) return inference;
   }
-  return outputs;
+  throw InputError("--inference: there is no \"" + name + "\"" + did_you_mean(name, known) +
+                   "; what computes a network: auto, onnxruntime, opencv");
+}
+
+std::unique_ptr<OnnxNetwork> open_network(Inference inference, std::string_view bytes, const std::string& input,
+                                          const std::string& name) {
+  std::string reason;
+  if (inference != Inference::opencv) {
+    if (const auto library = find_onnxruntime(&reason)) return open_ort_network(*library, bytes, input, name);
+    // A library that the user named is never passed over silently.
+    if (inference == Inference::onnxruntime || onnxruntime_is_named())
+      throw InputError(
+          name + ": ONNX Runtime cannot be used (" + reason +
+          "); `make onnxruntime` fetches it, $DKB_ONNXRUNTIME names another, --inference opencv needs none");
+  }
+  if (const DkbOnnxApi* api = load_opencv_module(&reason)) return open_opencv_network(*api, bytes, name);
+  throw InputError(
+      name + ": this build cannot run ONNX models by OpenCV (" + reason +
+      "); get ONNX Runtime (`make onnxruntime`), build with OpenCV's dnn module, or use --detector motion");
+}
+
+bool available(Inference inference) {
+  std::string reason;
+  return (inference != Inference::opencv && find_onnxruntime(&reason)) ||
+         (inference != Inference::onnxruntime && load_opencv_module(&reason) != nullptr);
 }
 
 }  // namespace dkb

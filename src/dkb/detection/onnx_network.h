@@ -7,11 +7,15 @@
 #include <string_view>
 #include <vector>
 
-#include "dkb/detection/onnx_module.h"
-
 namespace dkb {
 
-// An ONNX graph ready to run on the CPU, by the module that holds OpenCV's DNN, which is loaded on first use.
+// What computes a network. `automatic`: ONNX Runtime where its library is found, else OpenCV.
+enum class Inference { automatic, onnxruntime, opencv };
+const char* to_string(Inference inference);  // "auto", "onnxruntime", "opencv"
+// Throws InputError naming --inference and the known names.
+Inference inference_named(const std::string& name);
+
+// An ONNX graph ready to run on one core of the CPU.
 class OnnxNetwork {
  public:
   struct Output {
@@ -19,22 +23,19 @@ class OnnxNetwork {
     std::span<const float> values;  // valid until the next forward()
   };
 
-  // Throws InputError naming the file (`name`) when the graph cannot be parsed, or this build has no DNN.
-  OnnxNetwork(std::string_view bytes, std::string name);
-  ~OnnxNetwork();
-  OnnxNetwork(const OnnxNetwork&) = delete;
-  OnnxNetwork& operator=(const OnnxNetwork&) = delete;
-
-  // `blob`: 1 x 3 x height x width. Throws InputError naming the file and the layer that fails.
-  std::vector<Output> forward(const std::vector<float>& blob, int width, int height);
-
-  // Whether the module is there and loads.
-  static bool available();
-
- private:
-  const std::string name_;
-  const DkbOnnxApi* api_ = nullptr;
-  void* network_ = nullptr;
+  virtual ~OnnxNetwork() = default;
+  // The float tensors that the graph puts out for `blob`: 1 x 3 x height x width. Throws InputError naming the file and
+  // what fails.
+  virtual std::vector<Output> forward(const std::vector<float>& blob, int width, int height) = 0;
+  virtual Inference inference() const = 0;  // never `automatic`
 };
+
+// `bytes`: of the ONNX file `name`, whose one input is called `input`. Throws InputError naming the file when the graph
+// cannot be read; when what is to compute it is not here, with how to get it.
+std::unique_ptr<OnnxNetwork> open_network(Inference inference, std::string_view bytes, const std::string& input,
+                                          const std::string& name);
+
+// Whether open_network() would find what is to compute a network.
+bool available(Inference inference);
 
 }  // namespace dkb

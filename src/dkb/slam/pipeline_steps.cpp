@@ -351,6 +351,7 @@ void Pipeline::collect_times() {
     s.detector = scenes_.detector_kind();
     s.detector_rate_hz = scenes_.detector_rate_hz();
     s.detector_latency_frames = scenes_.detector_latency();
+    s.detector_inference = scenes_.detector_inference();
   };
   record_.add_stages(fill, times);
 }

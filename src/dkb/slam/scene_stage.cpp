@@ -22,6 +22,7 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
       schedule_(detectors.schedule),
       prompt_(detectors.prompt),
       slow_(detectors.slow),
+      inference_(detectors.inference),
       carried_(camera, noise, options.carried) {
   options_.rivals.flow = options_.carried.flow;
   if (options_.filter == FilterKind::none) return;

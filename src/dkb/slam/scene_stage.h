@@ -57,6 +57,7 @@ class SceneStage {
   std::string detector_kind() const;
   double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
   int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
+  std::string detector_inference() const { return slow_stage_ ? inference_ : std::string(); }
   // Durations of flow, motion, filter and of the detector since they were taken last.
   StageTimes take_times();
 
@@ -74,6 +75,7 @@ class SceneStage {
   DetectionSchedule schedule_;
   std::vector<std::shared_ptr<Detector>> prompt_;
   std::shared_ptr<Detector> slow_;
+  std::string inference_;  // of the slow detector's network
   std::optional<DetectionStage> slow_stage_;
   std::optional<RivalFilter> rival_;
   std::optional<MotionSegmenter> motion_;
