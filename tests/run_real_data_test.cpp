@@ -2,6 +2,9 @@
 // Recorded by a hand-held Kinect (TUM fr1_xyz), where the sequence is at hand.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <sstream>
+
 #include "dkb/util/test_data.h"
 #include "e2e_support.h"
 
@@ -19,6 +22,34 @@ TEST(RunRealData, FollowsEveryFrameOfAHandHeldKinect) {
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   EXPECT_EQ(run.stats.at("tracked"), 60);
   EXPECT_LT(ape_of(dataset, run.out / "trajectory.txt"), 0.02);
+}
+
+// Between slow frames a hand changes its velocity by more than a search for points forgives.
+TEST(RunRealData, EveryThirdFrameIsFollowedAsWell) {
+  const std::string name = "rgbd_dataset_freiburg1_xyz";
+  const fs::path dataset = outside_data(name);
+  if (dataset.empty()) GTEST_SKIP() << no_outside_data(name);
+  const TempFolder temp;
+  const fs::path slow = temp / "slow";
+  fs::create_directories(slow);
+  for (const char* part : {"rgb", "depth"}) fs::create_directory_symlink(dataset / part, slow / part);
+  std::ofstream rgb(slow / "rgb.txt"), depth(slow / "depth.txt"), pairs(slow / "associations.txt");
+  std::ifstream all(dataset / "associations.txt");
+  std::string line;
+  for (int row = 0; std::getline(all, line);) {
+    if (line.empty() || line[0] == '#' || row++ % 3 != 0) continue;
+    std::istringstream columns(line);
+    std::string colour_stamp, colour, depth_stamp, map;
+    columns >> colour_stamp >> colour >> depth_stamp >> map;
+    rgb << colour_stamp << ' ' << colour << '\n';
+    depth << depth_stamp << ' ' << map << '\n';
+    pairs << line << '\n';
+  }
+  rgb.close(), depth.close(), pairs.close();
+  const SlamRun run(slow, temp / "out", {"--camera", "fr1", "--detector", "motion"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), run.stats.at("frames"));
+  EXPECT_LT(ape_of(dataset, run.out / "trajectory.txt"), 0.009);
 }
 
 }  // namespace
