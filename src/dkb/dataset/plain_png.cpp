@@ -3,6 +3,9 @@
 
 #if DKB_HAS_DEFLATE
 #include <libdeflate.h>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include <algorithm>
 #include <bit>
@@ -56,11 +59,6 @@ std::string compressed_pixels(std::string_view bytes, char bits, char colour_typ
   return pixels;
 }
 
-#if defined(__clang__)
-#define DKB_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#else
-#define DKB_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, Lanes{__VA_ARGS__})
-#endif
 using Lanes = int16_t __attribute__((vector_size(16)));
 using LaneBytes = uint8_t __attribute__((vector_size(8)));
 
@@ -85,66 +83,94 @@ Lanes distance(Lanes a, Lanes b) {
 // Lanes of the rows moved to those of the row below, zeros to the first row's.
 template <int bpp>
 Lanes one_row_down(Lanes v) {
-  if constexpr (bpp == 1) return DKB_SHUFFLE(v, Lanes{}, 8, 0, 1, 2, 3, 4, 5, 6);
-  if constexpr (bpp == 2) return DKB_SHUFFLE(v, Lanes{}, 8, 9, 0, 1, 2, 3, 4, 5);
-  return DKB_SHUFFLE(v, Lanes{}, 8, 9, 10, 0, 1, 2, 3, 4);
+#if defined(__SSE2__)
+  return reinterpret_cast<Lanes>(_mm_slli_si128(reinterpret_cast<__m128i>(v), 2 * bpp));
+#else
+  Lanes down{};
+  for (int lane = bpp; lane < 8; ++lane) down[lane] = v[lane - bpp];
+  return down;
+#endif
 }
 
 template <int bpp>
 uint64_t load_pixel(const uint8_t* at) {
   uint64_t pixel = 0;
-  std::memcpy(&pixel, at, bpp);
+  for (int i = 0; i < bpp; ++i) pixel |= static_cast<uint64_t>(at[i]) << (8 * i);
   return pixel;
 }
 
-// Undoes the filters of as many rows at once as there is room for in 8 lanes, each a pixel behind the one above, so
-// that the pixels on the left, above and above left are known for all of them. `first`: the first pixel of the first
-// row, after the byte that names its filter. The row before the first one must be there.
+// As many rows as there is room for in 8 lanes, each a pixel behind the one above, so that the pixels on the left,
+// above and above left are known for all of them. `first`: the first pixel of the first row, after the byte that names
+// its filter. The row before the first one must be there.
 template <int bpp>
-void unfilter_rows(uint8_t* first, size_t pitch, int width) {
-  constexpr int kRows = 8 / bpp;
-  Lanes is_left{}, is_above{}, is_mean{}, is_paeth{};
-  for (int row = 0; row < kRows; ++row) {
-    const uint8_t filter = first[static_cast<ptrdiff_t>(row * pitch) - 1];
-    for (int lane = row * bpp; lane < (row + 1) * bpp; ++lane) {
-      is_left[lane] = filter == 1 ? -1 : 0, is_above[lane] = filter == 2 ? -1 : 0;
-      is_mean[lane] = filter == 3 ? -1 : 0, is_paeth[lane] = filter == 4 ? -1 : 0;
+class RowGroup {
+ public:
+  static constexpr int kRows = 8 / bpp;
+
+  RowGroup(uint8_t* first, size_t pitch) : first_(first), pitch_(pitch) {
+    for (int row = 0; row < kRows; ++row) {
+      const uint8_t filter = first[static_cast<ptrdiff_t>(row * pitch) - 1];
+      for (int lane = row * bpp; lane < (row + 1) * bpp; ++lane) {
+        is_left_[lane] = filter == 1 ? -1 : 0, is_above_[lane] = filter == 2 ? -1 : 0;
+        is_mean_[lane] = filter == 3 ? -1 : 0, is_paeth_[lane] = filter == 4 ? -1 : 0;
+      }
     }
   }
-  Lanes left{}, above{};
-  const auto step = [&](int x, auto exists) {
+
+  // Undoes the filter of pixel x of the first row, x - 1 of the second one, and so on, where these exist.
+  template <class Exists>
+  void step(int x, const Exists& exists) {
     uint64_t raw = 0;
     for (int row = 0; row < kRows; ++row)
-      if (exists(x - row)) raw |= load_pixel<bpp>(first + row * pitch + (x - row) * bpp) << (8 * bpp * row);
-    const Lanes above_left = above;
-    above = one_row_down<bpp>(left);
-    if (exists(x)) above |= widened(load_pixel<bpp>(first + x * bpp - pitch));
-    const Lanes both = left + above;
-    const Lanes from_left = distance(above, above_left), from_above = distance(left, above_left);
+      if (exists(x - row)) raw |= load_pixel<bpp>(at(x - row, row)) << (8 * bpp * row);
+    const Lanes above_left = above_;
+    above_ = one_row_down<bpp>(left_);
+    if (exists(x)) above_ |= widened(load_pixel<bpp>(at(x, 0) - pitch_));
+    const Lanes both = left_ + above_;
+    const Lanes from_left = distance(above_, above_left), from_above = distance(left_, above_left);
     const Lanes from_both = distance(both, above_left + above_left);
     const Lanes nearest = from_above < from_both ? from_above : from_both;
-    const Lanes nearer = from_above <= from_both ? above : above_left;
-    const Lanes simple = (left & is_left) | (above & is_above) | ((both >> 1) & is_mean);
-    const Lanes expected = ((from_left <= nearest ? left : nearer) & is_paeth) | simple;
-    left = (widened(raw) + expected) & 255;
-    const uint64_t pixels = narrowed(left);
+    const Lanes nearer = from_above <= from_both ? above_ : above_left;
+    const Lanes simple = (left_ & is_left_) | (above_ & is_above_) | ((both >> 1) & is_mean_);
+    const Lanes expected = ((from_left <= nearest ? left_ : nearer) & is_paeth_) | simple;
+    left_ = (widened(raw) + expected) & 255;
+    const uint64_t pixels = narrowed(left_);
     for (int row = 0; row < kRows; ++row)
       if (exists(x - row)) {
         const uint64_t pixel = pixels >> (8 * bpp * row);
-        std::memcpy(first + row * pitch + (x - row) * bpp, &pixel, bpp);
+        std::memcpy(at(x - row, row), &pixel, bpp);
       }
+  }
+
+ private:
+  uint8_t* at(int x, int row) const { return first_ + row * pitch_ + x * bpp; }
+
+  uint8_t* const first_;
+  const size_t pitch_;
+  Lanes is_left_{}, is_above_{}, is_mean_{}, is_paeth_{};
+  Lanes left_{}, above_{};
+};
+
+// Two groups at once, the second one behind the first: the processor works at one while it waits for the other.
+template <int bpp>
+void unfilter_rows(uint8_t* first, size_t pitch, int width) {
+  constexpr int kRows = RowGroup<bpp>::kRows;
+  RowGroup<bpp> upper(first, pitch), lower(first + kRows * pitch, pitch);
+  const auto step = [&](int x, const auto& exists) {
+    upper.step(x, exists);
+    lower.step(x - kRows, exists);
   };
   const auto checked = [width](int x) { return x >= 0 && x < width; };
   int x = 0;
-  for (; x < kRows - 1; ++x) step(x, checked);
+  for (; x < 2 * kRows - 1; ++x) step(x, checked);
   for (; x < width; ++x) step(x, [](int) { return true; });
-  for (; x < width + kRows - 1; ++x) step(x, checked);
+  for (; x < width + 2 * kRows - 1; ++x) step(x, checked);
 }
 
 template <int bpp>
 bool decode_rows(const std::string& compressed, int width, int height, uint8_t* out) {
   // One row of zeros, rows of a filter's number and pixels, and zeros up to a whole number of groups of rows.
-  constexpr int kRows = 8 / bpp;
+  constexpr int kRows = 2 * RowGroup<bpp>::kRows;
   const size_t pitch = static_cast<size_t>(width) * bpp + 1, rows = static_cast<size_t>(height);
   const size_t below = (kRows - rows % kRows) % kRows;
   const auto buffer = std::make_unique_for_overwrite<uint8_t[]>((1 + rows + below) * pitch);
