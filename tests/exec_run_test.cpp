@@ -2,6 +2,8 @@
 // A detector in a process of its own, end to end.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -45,6 +47,23 @@ TEST(ExecRun, ACommandThatFailsIsOneWarningAndTheRunGoesOn) {
     EXPECT_NE(run.finished.err.find("it is not asked again"), std::string::npos) << run.finished.err;
     EXPECT_EQ(run.finished.err.find("warning", at + 1), std::string::npos) << run.finished.err;
   }
+}
+
+// Orange of 10 x 5 px, from (3, 2) on.
+TEST(ExecRun, TheExampleFindsWhatIsOrange) {
+  if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) GTEST_SKIP() << "skipped: no numpy";
+  const TempFolder temp;
+  std::string pixels(3 * 20 * 10, '\x40');
+  for (int y = 2; y < 7; ++y)
+    for (int x = 3; x < 13; ++x) pixels.replace(static_cast<size_t>(3 * (20 * y + x)), 3, "\xF0\x90\x20");
+  write_text(temp / "frames", "frame 0 5 20 10\n" + pixels + "frame 1 6 1 1\n\x40\x40\x40");
+  const std::string script = DKB_SOURCE_DIR "/examples/python/exec_detector.py";
+  ASSERT_EQ(std::system(
+                ("/usr/bin/python3 " + script + " <" + (temp / "frames").string() + " >" + (temp / "answers").string())
+                    .c_str()),
+            0);
+  EXPECT_EQ(read_text(temp / "answers"),
+            "answer 0 1\narm 1 3 2 10 5\nmask 43 10 10 10 10 10 10 10 10 10 67\nend\nanswer 1 0\nend\n");
 }
 
 TEST(ExecRun, AnEmptyCommandIsRefused) {
