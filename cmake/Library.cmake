@@ -9,7 +9,7 @@ foreach(room ${rooms})
 endforeach()
 # What the objects need; the package's pkg-config and CMake files name the same.
 set(DKB_LINKED fmt::fmt yaml-cpp PNG::PNG ZLIB::ZLIB JPEG::JPEG Threads::Threads ${CMAKE_DL_LIBS})
-foreach(name BZ2 LZ4 ZSTD SQLITE3)
+foreach(name BZ2 LZ4 ZSTD SQLITE3 DEFLATE)
   if(DKB_${name}_INCLUDE AND DKB_${name}_LIBRARY)
     list(APPEND DKB_LINKED $<BUILD_INTERFACE:${DKB_${name}_LIBRARY}>)
   endif()

@@ -18,6 +18,7 @@ needed=(
   g++ cmake make ninja-build
   libeigen3-dev libpng-dev libjpeg-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libnanoflann-dev
   libbz2-dev liblz4-dev libzstd-dev libsqlite3-dev  # recordings
+  libdeflate-dev  # PNG files, faster than libpng alone
 )
 python=(python3-dev pybind11-dev python3-numpy python3-pytest)
 packages=(

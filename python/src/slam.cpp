@@ -48,10 +48,12 @@ Options options_of(const py::kwargs& a) {
 std::pair<std::string, std::vector<py::object>> split_detector(const py::object& detector) {
   const bool several = py::isinstance<py::list>(detector) || py::isinstance<py::tuple>(detector);
   const py::list items = several ? py::list(detector) : py::list(py::make_tuple(detector));
-  std::string kinds;
+  std::string kinds, command;
   std::vector<py::object> functions;
   for (const py::handle& item : items) {
-    if (py::isinstance<py::str>(item))
+    if (py::isinstance<py::str>(item) && command.empty() && item.cast<std::string>().starts_with("exec:"))
+      command = item.cast<std::string>();  // comes last, since it may hold a +
+    else if (py::isinstance<py::str>(item))
       kinds += (kinds.empty() ? "" : "+") + item.cast<std::string>();
     else if (PyCallable_Check(item.ptr()) != 0)
       functions.push_back(py::reinterpret_borrow<py::object>(item));
@@ -59,6 +61,7 @@ std::pair<std::string, std::vector<py::object>> split_detector(const py::object&
       throw py::type_error(std::string("detector: must be a str, a callable or a list of them, not ") +
                            Py_TYPE(item.ptr())->tp_name);
   }
+  if (!command.empty()) kinds += (kinds.empty() ? "" : "+") + command;
   return {kinds.empty() ? "none" : kinds, std::move(functions)};
 }
 

@@ -26,7 +26,7 @@ std::vector<ParameterDescription> own_parameters() {
       {"queue_size", int64_t{10}, "[frames] that may wait for tracking; then the oldest is dropped", 1, 1000},
       {"prior", "auto", "who helps where the images do not tell", -kInf, kInf, {"none", "odom", "imu", "auto"}},
       {"prior_drift", 0.02, "error of odom_prior per metre and radian where it gives no covariance", 1e-4, 1},
-      {"detector", "auto", "what may move is found by: auto, yolo, motion, none; several joined by +"},
+      {"detector", "auto", "what may move is found by: auto, yolo, motion, none, exec:COMMAND; several joined by +"},
       {"model", "", "ONNX file of the yolo detector"},
       {"labels", "", "class names of that model, one per line; empty = COCO's"},
       {"inference",

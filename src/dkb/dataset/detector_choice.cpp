@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <sstream>
+#include <string_view>
 
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/detection/boxes_file.h"
+#include "dkb/detection/exec_detector.h"
 #include "dkb/detection/mask_folder.h"
 #include "dkb/detection/onnx_detector.h"
 #include "dkb/util/errors.h"
@@ -14,18 +16,26 @@
 #include "dkb/util/stamps.h"
 
 namespace dkb {
+namespace {
+
+constexpr std::string_view kExec = "exec:";
+
+}  // namespace
 
 std::vector<std::string> detector_kinds(const std::string& detector, bool has_model) {
   if (detector == "auto") return {has_model ? "yolo" : "motion"};
   const std::vector<std::string> known = {"auto", "none", "yolo", "motion", "file"};
   std::vector<std::string> kinds;
-  std::istringstream parts(detector);
+  const size_t command =
+      ("+" + detector).find("+" + std::string(kExec));  // the last kind, since a command may hold a +
+  std::istringstream parts(detector.substr(0, command));
   for (std::string kind; std::getline(parts, kind, '+');) {
     if (std::find(known.begin() + 1, known.end(), kind) == known.end())
       throw InputError("--detector: there is no detector \"" + kind + "\"" + did_you_mean(kind, known) +
-                       "; detectors: auto, none, yolo, motion, file, or several joined by +");
+                       "; detectors: auto, none, yolo, motion, file, exec:COMMAND, or several joined by +");
     if (kind != "none") kinds.push_back(kind);
   }
+  if (command != std::string::npos) kinds.push_back(detector.substr(command));
   return kinds;
 }
 
@@ -56,6 +66,12 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
     made.schedule.latency = choice.latency > 0 ? choice.latency : frames;
     made.inference = to_string(detector->inference());
     made.slow = std::move(detector);
+  }
+  if (!kinds.empty() && kinds.back().starts_with(kExec)) {
+    if (made.slow != nullptr) throw InputError("--detector: yolo and exec cannot be joined; leave one of them out");
+    made.slow = std::make_shared<ExecDetector>(kinds.back().substr(kExec.size()));
+    if (choice.every > 0) made.schedule.every = choice.every;
+    if (choice.latency > 0) made.schedule.latency = choice.latency;
   }
   if (!choice.boxes.empty() && !has("file"))
     throw InputError("--boxes: --detector " + choice.kinds + " does not read boxes; add --detector file" +

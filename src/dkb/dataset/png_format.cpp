@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "dkb/dataset/image_formats.h"
+#include "dkb/dataset/plain_png.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -152,9 +153,10 @@ std::string encode(Samples samples, const Image<Pixel>& image, int compression) 
 template <class Pixel>
 Image<Pixel> decode(Samples samples, std::string_view bytes, const std::string& name, const ImageHeader& header) {
   Image<Pixel> image(header.width, header.height);
+  auto* out = reinterpret_cast<uint8_t*>(image.data());
+  if (formats::decode_plain_png(bytes, header.width, header.height, sizeof(Pixel), out)) return image;
   PngReader reader(bytes);
-  if (!reader.read(samples, reinterpret_cast<uint8_t*>(image.data()), static_cast<size_t>(header.width) * sizeof(Pixel),
-                   header.height))
+  if (!reader.read(samples, out, static_cast<size_t>(header.width) * sizeof(Pixel), header.height))
     throw InputError(name + ": is a broken PNG (" + reader.error() + ")");
   return image;
 }

@@ -2,6 +2,7 @@
 #include "dkb/dataset/rgbd_reader.h"
 
 #include "dkb/util/errors.h"
+#include "dkb/util/thrown.h"
 
 namespace dkb {
 
@@ -16,28 +17,49 @@ struct RgbdReader::Probed {
   std::optional<Decoded> decoded;
 };
 
+struct RgbdReader::Slot {
+  DatasetFrame frame;
+  double ms = 0;
+  bool ready = false;
+};
+
 void RgbdReaderOptions::check() const {
   require_option(queue >= 1 && queue <= 1000, "reader.queue", queue, "1 ... 1000 pairs");
+  require_option(workers >= 1 && workers <= 16, "reader.workers", workers, "1 ... 16 threads");
   require_option(probed >= 1, "reader.probed", probed, "at least 1 pair");
 }
 
 RgbdReader::RgbdReader(PairStream pairs, const RgbdReaderOptions& options)
-    : pairs_(std::move(pairs)), options_(options), queue_((options.check(), static_cast<size_t>(options.queue))) {
+    : pairs_(std::move(pairs)), options_((options.check(), options)) {
   probe();
-  if (options_.threaded) thread_ = std::thread([this] { run(); });
+  if (!options_.threaded) return;
+  try {
+    for (int i = 0; i < options_.workers; ++i) workers_.emplace_back([this] { run(); });
+  } catch (...) {
+    end();
+    throw;
+  }
 }
 
 RgbdReader::RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options)
     : RgbdReader((camera.check(), pairs_in_files(std::move(pairs), camera)), options) {}
 
 RgbdReader::~RgbdReader() {
+  end();
+}
+
+void RgbdReader::end() {
   stop();
-  if (thread_.joinable()) thread_.join();
+  for (std::thread& worker : workers_) worker.join();
 }
 
 void RgbdReader::stop() {
-  stopped_ = true;
-  queue_.close();
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  room_.notify_all();
+  decoded_.notify_all();
 }
 
 // Start-up pays for this, so it decodes as little as proves the point: pixels are decoded until one pair has proved
@@ -73,57 +95,95 @@ RgbdReader::Decoded RgbdReader::decode(const StoredPair& pair) {
   Decoded decoded;
   try {
     decoded.image = pair.decode();
-  } catch (const std::exception& e) {  // a frame that cannot be had is a gap, whatever the reason
-    decoded.skipped = e.what();
+  } catch (...) {  // a frame that cannot be had is a gap, whatever the reason
+    decoded.skipped = what_was_thrown();
   }
   decoded.ms = watch.ms();
   return decoded;
 }
 
-std::optional<DatasetFrame> RgbdReader::read() {
-  Probed next;
+std::optional<RgbdReader::Probed> RgbdReader::fetch() {
+  std::optional<Probed> next;
   if (!probed_.empty()) {
     next = std::move(probed_.front());
     probed_.pop_front();
   } else if (std::optional<StoredPair> pair = pairs_()) {
-    next.pair = std::move(*pair);
-  } else {
-    return std::nullopt;
+    next = Probed{std::move(*pair), std::nullopt};
   }
-  StoredPair& pair = next.pair;
-  Decoded decoded = next.decoded ? std::move(*next.decoded) : decode(pair);
-  {
-    const std::lock_guard lock(mutex_);
-    times_.add("decoding", decoded.ms);
-  }
-  return DatasetFrame{
-      next_index_++,         pair.timestamp,           pair.stamp_ns,         pair.depth_stamp_ns,
-      std::move(pair.stamp), std::move(decoded.image), std::move(pair.prior), std::move(decoded.skipped)};
+  return next;
 }
 
+RgbdReader::Slot RgbdReader::decoded(Probed next, size_t index) {
+  StoredPair& pair = next.pair;
+  Decoded decoded = next.decoded ? std::move(*next.decoded) : decode(pair);
+  return {DatasetFrame{index, pair.timestamp, pair.stamp_ns, pair.depth_stamp_ns, std::move(pair.stamp),
+                       std::move(decoded.image), std::move(pair.prior), std::move(decoded.skipped)},
+          decoded.ms, true};
+}
+
+// Pairs are taken from the recording by one worker at a time, which adds the pair's place in the order before it lets
+// the next one do so.
 void RgbdReader::run() {
-  try {
-    while (!stopped_) {
-      std::optional<DatasetFrame> frame = read();
-      if (!frame || !queue_.push(std::move(*frame))) break;
+  std::unique_lock lock(mutex_);
+  while (true) {
+    room_.wait(lock, [this] {
+      return stopped_ || ended_ || (!fetching_ && ahead_.size() < static_cast<size_t>(options_.queue));
+    });
+    if (stopped_ || ended_) return;
+    fetching_ = true;
+    lock.unlock();
+    std::optional<Probed> pair;
+    std::exception_ptr failure;
+    try {
+      pair = fetch();
+    } catch (...) {
+      failure = std::current_exception();
     }
-  } catch (...) {
-    const std::lock_guard lock(mutex_);
-    failure_ = std::current_exception();
+    lock.lock();
+    fetching_ = false;
+    if (!pair) {
+      ended_ = true, failure_ = failure;
+      room_.notify_all();
+      decoded_.notify_one();
+      return;
+    }
+    const size_t index = next_index_++;
+    Slot& slot = ahead_.emplace_back();
+    room_.notify_one();
+    lock.unlock();
+    Slot made = decoded(std::move(*pair), index);
+    lock.lock();
+    slot = std::move(made);
+    decoded_.notify_one();
   }
-  queue_.close();
+}
+
+DatasetFrame RgbdReader::hand_out(Slot slot) {
+  times_.add("decoding", slot.ms);
+  return std::move(slot.frame);
 }
 
 std::optional<DatasetFrame> RgbdReader::next() {
+  std::unique_lock lock(mutex_);
   if (stopped_) return std::nullopt;
-  if (!options_.threaded) return read();
-  std::optional<DatasetFrame> frame = queue_.pop();
-  if (stopped_) return std::nullopt;
-  if (!frame) {
-    const std::lock_guard lock(mutex_);
-    if (failure_) std::rethrow_exception(failure_);
+  if (!options_.threaded) {
+    lock.unlock();
+    std::optional<Probed> pair = fetch();
+    if (!pair) return std::nullopt;
+    Slot made = decoded(std::move(*pair), next_index_++);
+    lock.lock();
+    return hand_out(std::move(made));
   }
-  return frame;
+  decoded_.wait(lock, [this] { return stopped_ || (ahead_.empty() ? ended_ : ahead_.front().ready); });
+  if (stopped_) return std::nullopt;
+  if (ahead_.empty()) {
+    if (failure_) std::rethrow_exception(failure_);
+    return std::nullopt;
+  }
+  Slot oldest = std::move(ahead_.front());
+  ahead_.pop_front();
+  room_.notify_one();
+  return hand_out(std::move(oldest));
 }
 
 StageTimes RgbdReader::times() const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
+#include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <exception>
@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "dkb/dataset/stored_pair.h"
-#include "dkb/util/bounded_queue.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
 
 struct RgbdReaderOptions {
-  int queue = 4;         // [pairs] decoded ahead of the consumer, 1 ... 1000
+  int queue = 4;         // [pairs] ahead of the consumer, decoded or being decoded, 1 ... 1000
+  int workers = 2;       // [threads] that decode a pair each, 1 ... 16
   bool threaded = true;  // false: next() decodes on the caller's thread; the frames are the same
   int probed = 5;        // [pairs] looked at before the first is handed out, >= 1
   void check() const;    // throws InvalidOption
@@ -36,8 +36,8 @@ struct DatasetFrame {
   std::string skipped;                       // why, when skipped
 };
 
-// Decodes the pairs of a recording in order, ahead of the consumer on a thread of its own. Not copyable; one consumer.
-// The same recording gives the same frames, whatever the timing.
+// Decodes the pairs of a recording ahead of the consumer, several at once, and hands them out in order. Not copyable;
+// one consumer. The same recording gives the same frames, whatever the timing.
 class RgbdReader {
  public:
   // Probes the first pairs: throws InputError when none of them decodes, or when one that decodes has another size than
@@ -45,7 +45,7 @@ class RgbdReader {
   // Single bad pairs are handed out as skipped.
   RgbdReader(PairStream pairs, const RgbdReaderOptions& options);
   RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options);
-  ~RgbdReader();  // stops the thread; never waits for more than the pair being decoded
+  ~RgbdReader();  // stops the workers; never waits for more than the pairs being decoded
   RgbdReader(const RgbdReader&) = delete;
   RgbdReader& operator=(const RgbdReader&) = delete;
 
@@ -62,22 +62,30 @@ class RgbdReader {
  private:
   struct Decoded;
   struct Probed;
+  struct Slot;
   void probe();
-  static Decoded decode(const StoredPair& pair);
-  std::optional<DatasetFrame> read();
   void run();
+  void end();
+  // The next pair of the recording. One thread at a time.
+  std::optional<Probed> fetch();
+  static Decoded decode(const StoredPair& pair);
+  static Slot decoded(Probed pair, size_t index);
+  DatasetFrame hand_out(Slot slot);
 
   const PairStream pairs_;
   const RgbdReaderOptions options_;
   std::deque<Probed> probed_;
   std::vector<int64_t> first_stamps_;
-  BoundedQueue<DatasetFrame> queue_;
-  std::atomic<bool> stopped_{false};
+
+  mutable std::mutex mutex_;         // guards what follows
+  std::condition_variable room_;     // for a worker to begin the next pair
+  std::condition_variable decoded_;  // the oldest pair, or the recording has ended
+  std::deque<Slot> ahead_;           // in the recording's order; a worker fills the slot that it added
   size_t next_index_ = 0;
-  mutable std::mutex mutex_;
+  bool fetching_ = false, ended_ = false, stopped_ = false;
+  std::exception_ptr failure_;  // of the stream of pairs, after its last pair
   StageTimes times_;
-  std::exception_ptr failure_;  // of the thread
-  std::thread thread_;
+  std::vector<std::thread> workers_;
 };
 
 }  // namespace dkb

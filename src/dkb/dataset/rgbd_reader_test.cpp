@@ -6,6 +6,9 @@
 
 #include <chrono>
 #include <filesystem>
+#include <future>
+#include <memory>
+#include <optional>
 #include <thread>
 
 #include "dkb/dataset/camera_file.h"
@@ -57,9 +60,10 @@ class RgbdReaderTest : public testing::Test {
   std::vector<DatasetPair> pairs;
 };
 
-TEST_F(RgbdReaderTest, HandsOutEveryPairInOrderWithOrWithoutAThread) {
+TEST_F(RgbdReaderTest, HandsOutEveryPairInOrderWhateverTheThreads) {
   for (const RgbdReaderOptions& options :
-       {RgbdReaderOptions{}, RgbdReaderOptions{.queue = 1}, RgbdReaderOptions{.threaded = false}}) {
+       {RgbdReaderOptions{}, RgbdReaderOptions{.queue = 1}, RgbdReaderOptions{.workers = 1},
+        RgbdReaderOptions{.queue = 16, .workers = 7}, RgbdReaderOptions{.threaded = false}}) {
     const std::vector<DatasetFrame> frames = read_all(options);
     ASSERT_EQ(frames.size(), static_cast<size_t>(kPairs));
     for (size_t n = 0; n < frames.size(); ++n) {
@@ -136,6 +140,42 @@ TEST_F(RgbdReaderTest, GreyCamerasHaveNoColour) {
   EXPECT_EQ(frame->image->grey, GreyImage(32, 24, 7));
 }
 
+// Answers pair by pair, then fails.
+class Stream {
+ public:
+  std::optional<StoredPair> operator()() {
+    if (given_ == 6) throw InputError("the recording is torn");
+    StoredPair pair;
+    pair.stamp_ns = given_;
+    pair.mismatch = [] { return ""; };
+    pair.decode = [this, n = given_++] {
+      // The third pair is ready after the fourth alone.
+      if (n == 3) fourth_.set_value();
+      if (n == 2 && fourth_.get_future().wait_for(std::chrono::seconds(60)) != std::future_status::ready)
+        throw InputError("the fourth pair waits for the third");
+      return std::make_shared<RgbdImage>();
+    };
+    return pair;
+  }
+
+ private:
+  int given_ = 0;
+  std::promise<void> fourth_;
+};
+
+TEST_F(RgbdReaderTest, TwoPairsAreDecodedAtOnceAndHandedOutInOrderAndAnErrorAfterThem) {
+  const auto stream = std::make_shared<Stream>();
+  RgbdReader reader([stream] { return (*stream)(); }, {.probed = 1});
+  for (int n = 0; n < 6; ++n) {
+    const std::optional<DatasetFrame> frame = reader.next();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->stamp_ns, n);
+    EXPECT_EQ(frame->skipped, "");
+  }
+  for (int again = 0; again < 2; ++again)
+    EXPECT_EQ(test::input_error_of([&] { reader.next(); }), "the recording is torn");
+}
+
 TEST_F(RgbdReaderTest, StopsAtAnyTime) {
   { RgbdReader unread(pairs, camera, {.queue = 1}); }  // the thread waits on a full queue
   RgbdReader reader(pairs, camera, {.queue = 2});
@@ -150,6 +190,7 @@ TEST_F(RgbdReaderTest, StopsAtAnyTime) {
 TEST_F(RgbdReaderTest, OptionsOutOfRangeAreRefused) {
   EXPECT_THROW(RgbdReader(pairs, camera, {.queue = 0}), InvalidOption);
   EXPECT_THROW(RgbdReader(pairs, camera, {.probed = 0}), InvalidOption);
+  EXPECT_THROW(RgbdReader(pairs, camera, {.workers = 0}), InvalidOption);
 }
 
 TEST(RgbdReaderRealData, ReadsARecordedSequence) {

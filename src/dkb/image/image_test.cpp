@@ -27,5 +27,19 @@ TEST(GreyFromColour, UsesBt601Weights) {
   EXPECT_EQ(grey(3, 0), 29);   // 0.114 * 255 = 29.1
 }
 
+TEST(GreyFromColour, IsTheRoundedSumAtEverySize) {
+  uint32_t state = 1;
+  const auto any = [&state] { return static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24); };
+  for (int width = 1; width < 60; ++width) {
+    ColourImage colour(width, 1);
+    for (int x = 0; x < width; ++x) colour(x, 0) = {any(), any(), any()};
+    const GreyImage grey = grey_from_colour(colour);
+    for (int x = 0; x < width; ++x) {
+      const auto [r, g, b] = colour(x, 0);
+      EXPECT_EQ(grey(x, 0), (4899 * r + 9617 * g + 1868 * b + 8192) / 16384) << x << " of " << width;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dkb

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/detection/exec_detector.h"
+
+#include <utility>
+
+#include "dkb/detection/exec_answer.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/one_line.h"
+
+namespace dkb {
+namespace {
+
+// Rows of red, green and blue bytes, also of a grey camera.
+void append_pixels(std::string& to, const ImageView& view) {
+  for (int y = 0; y < view.height; ++y) {
+    const uint8_t* row = view.row(y);
+    if (view.format == PixelFormat::rgb8) {
+      to.append(reinterpret_cast<const char*>(row), view.row_bytes());
+      continue;
+    }
+    for (int x = 0; x < view.width; ++x) to.append(3, static_cast<char>(row[x]));
+  }
+}
+
+}  // namespace
+
+ExecDetector::ExecDetector(std::string command, ExecPatience patience)
+    : command_(std::move(command)), patience_(patience) {
+  if (command_.find_first_not_of(" \t") == std::string::npos)
+    throw InputError("--detector exec: no command; give --detector exec:COMMAND");
+  start();
+}
+
+void ExecDetector::start() {
+  process_ = std::make_unique<PipedCommand>(command_);
+  images_ = 0;
+}
+
+void ExecDetector::reset() {
+  if (process_ == nullptr) start();
+}
+
+Detections ExecDetector::ask(const DetectorInput& image) {
+  const int64_t number = images_++;
+  const ImageView& shown = image.colour.empty() ? image.grey : image.colour;
+  const int width = shown.width, height = shown.height;
+  request_ = "frame " + std::to_string(number) + " " + std::to_string(image.stamp_ns) + " " + std::to_string(width) +
+             " " + std::to_string(height) + "\n";
+  append_pixels(request_, shown);
+  // A mask of single pixels, and more boxes than anybody finds.
+  const size_t max_bytes = (1 << 20) + 2 * static_cast<size_t>(width) * static_cast<size_t>(height);
+  const std::string answer =
+      process_->ask(request_, exec_answer_size, max_bytes, number == 0 ? patience_.first : patience_.later);
+  return parse_exec_answer(answer, number, width, height);
+}
+
+Detections ExecDetector::detect(const DetectorInput& image) {
+  if (process_ == nullptr) throw InputError("\"" + excerpt(command_) + "\" has ended");
+  try {
+    return ask(image);
+  } catch (const InputError& e) {
+    process_.reset();
+    throw InputError("\"" + excerpt(command_) + "\": " + e.what());
+  }
+}
+
+}  // namespace dkb
