@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
 #if defined(M_ARENA_MAX)
   // Images are made in one thread and given back in another, some every frame. A heap for every thread would keep room
   // for them in each, and room that is given back to the system at once costs a page fault for every 4 kB when it is
-  // asked for again: together 8 MB and a tenth of all processor time.
+  // asked for again: together 8 MB and a twentieth of all processor time.
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_MMAP_THRESHOLD, 4 << 20);
   mallopt(M_TRIM_THRESHOLD, 16 << 20);
