@@ -130,8 +130,8 @@ Expectation Pipeline::expect(const Frame& frame) const {
   Expectation expected;
   const auto& last = tracker_.last_frame();
   if (!last) return expected;
-  expected.current_from_previous = tracker_.expected_motion(frame.image()->timestamp - last->timestamp);
-  expected.cam_from_world = expected.current_from_previous * last->cam_from_world;
+  expected.step = tracker_.expected_step(frame.image()->timestamp, frame.prior() ? &*frame.prior() : nullptr);
+  expected.cam_from_world = expected.current_from_previous() * last->cam_from_world;
   const Map& map = tracker_.map().view();
   const auto keyframes = map.live_keyframes();
   const size_t count = std::min(keyframes.size(), static_cast<size_t>(scenes_.keyframes_looked_at()));
@@ -175,7 +175,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .features = features,
                                          .appearance = &appearance,
                                          .prior = frame.prior() ? &*frame.prior() : nullptr,
-                                         .expected = scene.cam_from_world ? &*scene.cam_from_world : nullptr,
+                                         .step = scene.step ? &*scene.step : nullptr,
                                          .may_start_map = !localize_only_});
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
@@ -283,12 +283,16 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.state = tracked.state;
   result.detections = scene.boxes;
   result.mask = scene.mask;
+  FrameOutcome outcome;
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
+    outcome.cam_from_world = tracked.cam_from_world;
     // Where the images tell the pose again, the step is the prior's: what it was off by is the map's business.
     const bool seen_again = last_state_ == TrackingState::predicted && tracked.tracked();
-    if (seen_again && tracked.predicted_cam_from_world)
+    if (seen_again && tracked.predicted_cam_from_world) {
       odometry_.update(tracked.predicted_cam_from_world->inverse(), false);
+      outcome.found_world_from_guessed = world_from_cam * *tracked.predicted_cam_from_world;
+    }
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
@@ -317,8 +321,8 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   crowded_share_ =
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
-  outcome_ =
-      FrameOutcome{tracked.tracked() ? std::optional(tracked.cam_from_world) : std::nullopt, decision.insert, {}};
+  outcome.keyframe = decision.insert;
+  outcome_ = outcome;
   last_state_ = tracked.state;
   collect_times();
   ++next_frame_;

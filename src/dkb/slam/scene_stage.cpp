@@ -46,7 +46,10 @@ std::vector<DueDetections> SceneStage::exchange(FrameIndex index, const Frame& f
 }
 
 void SceneStage::learn(const FrameOutcome& before) {
-  if (motion_) motion_->commit(before.cam_from_world);
+  if (motion_) {
+    motion_->move_world(before.found_world_from_guessed);
+    motion_->commit(before.cam_from_world);
+  }
   if (before.keyframe && !past_.empty()) {
     past_.back().keyframe = true;
     if (motion_) past_.back().still_score = motion_->score();
@@ -77,15 +80,16 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
   return given;
 }
 
-MoverMask SceneStage::segment_motion(const RgbdImage& image, const Rigid3& cam_from_world,
+MoverMask SceneStage::segment_motion(const RgbdImage& image, const Expectation& expected,
                                      std::vector<Detection>& boxes) {
   if (!motion_) return {};
   const Stopwatch watch;
+  const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
   MoverMask moving;
   if (segments_motion_)
-    moving = motion_->segment(image, cam_from_world);
+    moving = motion_->segment(image, expected.cam_from_world, covariance);
   else
-    motion_->observe(image, cam_from_world);
+    motion_->observe(image, expected.cam_from_world, covariance);
   times_.add("motion", watch.ms());
   if (rival_ && !moving.empty())  // the rivals know boxes only
     for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
@@ -118,6 +122,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   Scene scene;
   scene.rejected.assign(frame.orb.corners.size(), FeatureReason::none);
   scene.extracted = std::move(frame);
+  if (scene.extracted.frame.prior()) scene.step = expected.step;
   if (options_.filter == FilterKind::none) return scene;
   const RgbdImage& image = scene.extracted.image();
 
@@ -138,8 +143,8 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   if (carried_.mask().empty()) unmasked = scene.boxes;
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
-  const MoverMask moving = segment_motion(image, expected.cam_from_world, scene.boxes);
-  if (motion_) scene.cam_from_world = motion_->aligned_pose();
+  const MoverMask moving = segment_motion(image, expected, scene.boxes);
+  if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
   times_.add("flow", watch.ms());
 
   watch = Stopwatch();
@@ -147,7 +152,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   if (rival_) {
     const auto dynamic =
         rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes, past_.empty() ? nullptr : &past_.back(),
-                         pyramid.get(), expected.current_from_previous, expected.keyframe_points_in_camera});
+                         pyramid.get(), expected.current_from_previous(), expected.keyframe_points_in_camera});
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {

@@ -24,13 +24,17 @@ struct DynamicsOptions {
 
 // What tracking knows before it looks at a frame.
 struct Expectation {
-  Rigid3 current_from_previous, cam_from_world;
+  Rigid3 cam_from_world;
+  std::optional<MotionPrior> step;                         // since the frame before; nothing without one
   std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes
+
+  Rigid3 current_from_previous() const { return step ? step->previous_from_current.inverse() : Rigid3(); }
 };
 
 // What became of the frame before: what the stage learns by it.
 struct FrameOutcome {
   std::optional<Rigid3> cam_from_world;  // in the world of that time; nothing when lost
+  Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
   Rigid3 new_world_from_old;  // how the map was corrected since
 };
@@ -64,7 +68,7 @@ class SceneStage {
  private:
   void learn(const FrameOutcome& before);
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
-  MoverMask segment_motion(const RgbdImage& image, const Rigid3& cam_from_world, std::vector<Detection>& boxes);
+  MoverMask segment_motion(const RgbdImage& image, const Expectation& expected, std::vector<Detection>& boxes);
   MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                     const MoverMask& moving) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);

@@ -53,8 +53,8 @@ struct TrackingInput {
   const FrameFeatures& features;
   PointAppearance* appearance =
       nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
-  const MotionPrior* prior = nullptr;  // may be null
-  const Rigid3* expected = nullptr;    // cam_from_world as depth shows it; may be null
+  const MotionPrior* prior = nullptr;  // by something beside the camera; may be null
+  const MotionPrior* step = nullptr;   // the same motion as the surfaces in view show it as well; may be null
   bool may_start_map = true;           // else a frame that finds no map stays without a pose
 };
 

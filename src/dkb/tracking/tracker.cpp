@@ -377,7 +377,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.odometry.assign(n, std::nullopt);
 
   const bool has_map = state_ != TrackingState::initialising;
-  const auto predicted = predict(frame.index, frame.timestamp, input.prior);
+  const auto predicted = predict(input);
   if (predicted) frame.predicted_cam_from_world = predicted->cam_from_world;
   const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
   bool followed = has_map && track_from_last(frame, input);

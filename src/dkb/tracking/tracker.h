@@ -57,6 +57,9 @@ class Tracker {
 
   // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
   Rigid3 expected_motion(double seconds) const;
+  // Motion from the last frame to one at `timestamp`: what `prior` tells, and for what it does not tell the velocity.
+  // Nothing without a last frame.
+  std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
   Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
@@ -104,7 +107,7 @@ class Tracker {
   std::vector<Rigid3> expected_poses(double dt, const TrackingInput& input) const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
-  std::optional<PosePrediction> predict(FrameIndex index, double timestamp, const MotionPrior* prior) const;
+  std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame);
   void go_on_by(const PosePrediction& prediction, TrackedFrame& frame);
   double search_radius(double radius) const;

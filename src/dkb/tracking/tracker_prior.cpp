@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/geometry/motion_model.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
 namespace {
 
-// Without a prior for the translation the velocity is taken to last. What a hand or a robot accelerates by makes the
-// place uncertain, and beyond this nobody knows it.
-constexpr double kAcceleration = 1.0;         // [m/s^2] standard deviation
-constexpr double kMaxGuessedPosition = 0.25;  // [m] standard deviation
+// Standard deviations of a place that nothing but the camera tells, beyond which nobody knows it.
+constexpr double kMaxGuessedPosition = 0.25;  // [m]
+constexpr double kMaxGuessedRotation = 0.25;  // [rad]
 
 constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
 // What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
@@ -22,30 +22,30 @@ constexpr size_t kKeyframesNearby = 3;    // that an expected pose is sought fro
 constexpr double kMaxViewDistance = 3.0;  // [m] between cameras that may show the same ...
 constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: about the field of view
 
-double guessed_position_sd(double seconds) {
-  return 0.5 * kAcceleration * seconds * seconds;
-}
-
 }  // namespace
 
-std::optional<PosePrediction> Tracker::predict(FrameIndex index, double timestamp, const MotionPrior* prior) const {
-  if (prior == nullptr || !last_ || last_->index + 1 != index || state_ == TrackingState::lost) return std::nullopt;
-  if (timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
-  MotionPrior step = *prior;
-  if (step.rotation_only) {
-    if (!velocity_) return std::nullopt;
-    const double sd = guessed_position_sd(timestamp - last_seen_);
-    if (sd > kMaxGuessedPosition) return std::nullopt;
-    const double before = guessed_position_sd(last_->timestamp - last_seen_);
-    step.previous_from_current.translation = expected_motion(timestamp - last_->timestamp).inverse().translation;
-    step.covariance.topRows<3>().setZero();
-    step.covariance.leftCols<3>().setZero();
-    step.covariance.topLeftCorner<3, 3>().diagonal().setConstant(sd * sd - before * before);
-    step.rotation_only = false;
-  }
-  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, step);
+std::optional<MotionPrior> Tracker::expected_step(double timestamp, const MotionPrior* prior) const {
+  if (!last_ || timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
+  if (prior != nullptr && !prior->rotation_only) return *prior;
+  MotionPrior step;
+  step.previous_from_current = expected_motion(timestamp - last_->timestamp).inverse();
+  step.covariance = even_motion_covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  if (prior == nullptr) return step;
+  step.previous_from_current.rotation = prior->previous_from_current.rotation;
+  step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
+  return step;
+}
+
+std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
+  if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
+    return std::nullopt;
+  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
+  const bool told = input.prior != nullptr && !input.prior->rotation_only;
+  const Vector6d variance = whole.covariance.diagonal();
+  const bool known = velocity_ && variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
+                     variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
   const Rigid3 cam_from_world = whole.previous_from_current.inverse();
-  if (!plausible_motion(cam_from_world, timestamp)) return std::nullopt;
+  if (!(told || known) || !plausible_motion(cam_from_world, input.timestamp)) return std::nullopt;
   return PosePrediction{cam_from_world, whole.covariance};
 }
 
