@@ -169,9 +169,12 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
       throw InputError(std::string(e.what()) + "; or leave input_size at 0");
     }
   }();
+  const bool whole = input_width_ % kStep == 0 && input_height_ % kStep == 0;
   if (!layout)
     throw InputError(name + ": has no known detection head (" + outputs + " at " + std::to_string(input_width_) +
-                     " x " + std::to_string(input_height_) + " px); export it without NMS as one of: " + known_heads() +
+                     " x " + std::to_string(input_height_) + " px" +
+                     (whole ? "" : ", where YOLO heads need multiples of 32") +
+                     "); export it without NMS as one of: " + known_heads() +
                      (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : "") +
                      (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
   layout_ = *layout;
@@ -190,8 +193,8 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 void OnnxDetector::check_labels(const std::string& error) const {
   if (layout_.classes == 0) return;  // its outputs do not say how many there are
   const auto classes = static_cast<size_t>(layout_.classes);
-  if (labels_.size() != classes && !(layout_.head->facts.numbered_as_in_coco && labels_.size() + 1 == classes))
-    throw InputError(error);
+  const bool may_lack_one = layout_.head->facts.numbered_as_in_coco && !options_.labels.empty();
+  if (labels_.size() != classes && !(may_lack_one && labels_.size() + 1 == classes)) throw InputError(error);
 }
 
 OnnxDetector::~OnnxDetector() = default;
