@@ -57,8 +57,9 @@ class MotionSegmenter {
   const Image<float>& score() const { return current_ ? current_->score : previous_ ? previous_->score : nothing_; }
 
  private:
-  // Of a camera seen 30 times a second.
-  inline static const Matrix6d kFrameStepCovariance = even_motion_covariance(0, 1.0 / 30);
+  // Of a camera whose velocity was known a thirtieth of a second ago.
+  inline static const Matrix6d kFrameStepCovariance =
+      axis_covariance(kAccelerationSd / (30 * 30), kAngularAccelerationSd / (30 * 30));
 
   struct Stamped {
     double time = 0;

@@ -289,9 +289,9 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     outcome.cam_from_world = tracked.cam_from_world;
     // Where the images tell the pose again, the step is the prior's: what it was off by is the map's business.
     const bool seen_again = last_state_ == TrackingState::predicted && tracked.tracked();
-    if (seen_again && tracked.predicted_cam_from_world) {
-      odometry_.update(tracked.predicted_cam_from_world->inverse(), false);
-      outcome.found_world_from_guessed = world_from_cam * *tracked.predicted_cam_from_world;
+    if (seen_again && tracked.predicted) {
+      odometry_.update(tracked.predicted->cam_from_world.inverse(), false);
+      outcome.found_world_from_guessed = world_from_cam * tracked.predicted->cam_from_world;
     }
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
@@ -322,6 +322,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
   outcome.keyframe = decision.insert;
+  if(getenv("DKBDBG")){ Vector6d d=Vector6d::Zero(); Vector6d sd=d; if(scene.step){d=tangent_from_rigid3(scene.step->previous_from_current); sd=scene.step->covariance.diagonal().cwiseSqrt();} fprintf(stderr,"%d %d %d %.9f  %g %g %g %g %g %g  %g %g %g %g %g %g kf%d n%zu\n",int(tracked.index),int(tracked.state),tracked.inliers,frame.stamp_ns()*1e-9,d[0],d[1],d[2],d[3],d[4],d[5],sd[0],sd[1],sd[2],sd[3],sd[4],sd[5],int(decision.insert),scene.extracted.orb.corners.size());}
   outcome_ = outcome;
   last_state_ = tracked.state;
   collect_times();
@@ -334,7 +335,7 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
   // Where a prior tells how the camera came there, the old map goes on.
-  if (tracked.starts_map && !tracked.predicted_cam_from_world) note(Event::Kind::new_map);
+  if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/geometry/motion_model.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -28,8 +27,9 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   if (!last_ || timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
   if (prior != nullptr && !prior->rotation_only) return *prior;
   MotionPrior step;
-  step.previous_from_current = expected_motion(timestamp - last_->timestamp).inverse();
-  step.covariance = even_motion_covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  const double seconds = timestamp - last_->timestamp;
+  step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
+  step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
   step.previous_from_current.rotation = prior->previous_from_current.rotation;
   step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
@@ -59,7 +59,7 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
 }
 
 // The frame has no pose by its images: the prior's stands in, and the next frame goes on from it.
-void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
+void Tracker::go_on_by(const PosePrediction& prediction, const Matrix6d& step_covariance, TrackedFrame& frame) {
   frame.state = state_ = TrackingState::predicted;
   frame.cam_from_world = prediction.cam_from_world;
   frame.covariance = prediction.covariance;
@@ -67,6 +67,8 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
   velocity_ = velocity_to(frame);
+  const double seconds = frame.timestamp - last_->timestamp;
+  filter_.set(*velocity_, step_covariance / (seconds * seconds));
   // What was seen last is still what the camera may see next.
   last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;
@@ -77,9 +79,10 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   last_->state = frame.state;
 }
 
-void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame) {
-  if (prediction) return go_on_by(*prediction, frame);
-  velocity_.reset();
+void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, const TrackingInput& input,
+                           TrackedFrame& frame) {
+  if (prediction) return go_on_by(*prediction, input.step->covariance, frame);
+  forget_velocity();
   if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
   frame.state = state_;
 }
@@ -88,10 +91,9 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, Trac
 // nearer than most.
 double Tracker::search_radius(double radius) const {
   if (!last_ || last_->state != TrackingState::predicted) return radius;
-  constexpr double kMaxRadius = 60;  // [px] beyond, nearly everything is a candidate of everything
   const auto sd = last_->covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const double pixels = camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
-  return std::min(kMaxRadius, radius + 3 * pixels);
+  return std::min(kMaxSearchRadius, radius + 3 * pixels);
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.
