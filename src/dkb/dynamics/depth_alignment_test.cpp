@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/geometry/motion_model.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -53,8 +54,14 @@ class DepthAlignmentTest : public testing::Test {
     std::fill(grid.score.data(), grid.score.data() + grid.score.size(), 0.0f);
     return grid;
   }
-  Rigid3 align(const MotionDepthGrid& here, const MotionDepthGrid& there, const Rigid3& expected = {}) {
-    return alignment_.align(here, there, rays_, expected, kPositionSd, kRotationSd);
+  std::optional<MotionPrior> step(const MotionDepthGrid& here, const MotionDepthGrid& there,
+                                  const Rigid3& expected = {}) {
+    return alignment_.align(here, there, rays_, {expected, false, axis_covariance(kPositionSd, kRotationSd)});
+  }
+  Rigid3 align(const MotionDepthGrid& here, const MotionDepthGrid& there) {
+    const auto found = step(here, there);
+    EXPECT_TRUE(found);
+    return found ? found->previous_from_current : Rigid3();
   }
   static double degrees(const Rigid3& error) { return vector_from_rotation(error.rotation).norm() * 57.29578; }
 
@@ -86,6 +93,40 @@ TEST_F(DepthAlignmentTest, WhatAWallLeavesOpenStaysAsExpected) {
   EXPECT_NEAR(found.translation.y(), 0, 0.005);
 }
 
+// The covariance is that of the step itself: the motion found lies within it of the true one, and what one wall leaves
+// open (its own plane) keeps what was expected.
+TEST_F(DepthAlignmentTest, TheCovarianceTellsWhatTheSurfacesDoNot) {
+  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  for (const auto& planes : {wall, kCorner}) {
+    double sum = 0;
+    const int runs = 10;
+    for (int n = 0; n < runs; ++n) {
+      const auto seed = static_cast<uint64_t>(2 * n);
+      Random random(seed + 100);
+      Vector6d off;
+      for (int i = 0; i < 6; ++i) off[i] = (i < 3 ? kPositionSd : kRotationSd) * random.normal();
+      const MotionDepthGrid there = grid_of(view_of(planes, {}, seed), rays_);
+      const MotionDepthGrid here = grid_of(view_of(planes, rigid3_from_tangent(off).inverse(), seed + 1), rays_);
+      const auto found = step(here, there);
+      ASSERT_TRUE(found);
+      const Vector6d error = tangent_from_rigid3(found->previous_from_current.inverse() * rigid3_from_tangent(off));
+      sum += error.dot(found->covariance.ldlt().solve(error));
+      const Vector6d sd = found->covariance.diagonal().cwiseSqrt();
+      if (planes.size() == 1) {
+        EXPECT_NEAR(sd[0], kPositionSd, 0.25 * kPositionSd);  // normals are noisy
+        EXPECT_NEAR(sd[5], kRotationSd, 0.25 * kRotationSd);
+        EXPECT_LT(sd[2], 0.2 * kPositionSd);
+        EXPECT_LT(sd[3], 0.2 * kRotationSd);
+      } else {
+        EXPECT_LT(sd.maxCoeff(), 0.8 * kPositionSd);
+      }
+    }
+    const double mean = sum / (6 * runs);  // of a chi-squared variable with 60 degrees of freedom, over their number
+    EXPECT_LT(mean, 1.5);
+    EXPECT_GT(mean, 0.05);
+  }
+}
+
 TEST_F(DepthAlignmentTest, SomebodyBeforeAThirdOfTheImageDoesNotPullThePoseAlong) {
   const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
   DepthImage depth = view_of(kCorner, moved_.inverse(), 2);
@@ -111,8 +152,7 @@ TEST_F(DepthAlignmentTest, SurfacesThatMovedBeforeAreLeftOut) {
 
 TEST_F(DepthAlignmentTest, WithoutDepthNothingIsFound) {
   const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
-  const Rigid3 found = align(grid_of(DepthImage(320, 240), rays_), there, moved_);
-  EXPECT_EQ(tangent_from_rigid3(found), tangent_from_rigid3(moved_));
+  EXPECT_FALSE(step(grid_of(DepthImage(320, 240), rays_), there, moved_));
 }
 
 }  // namespace

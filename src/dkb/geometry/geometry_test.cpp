@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "dkb/geometry/camera.h"
+#include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
@@ -21,6 +22,38 @@ TEST(Rigid3, InverseUndoesTheMotion) {
     EXPECT_NEAR((b_from_a.inverse() * (b_from_a * p) - p).norm(), 0, 1e-12);
     EXPECT_NEAR((b_from_a * centre_in_world(b_from_a)).norm(), 0, 1e-12);
   }
+}
+
+TEST(VelocityFilter, WeighsWhatIsMeasuredByItsNoise) {
+  VelocityFilter filter;
+  const Matrix6d exact = axis_covariance(1e-6, 1e-6), noisy = axis_covariance(0.5, 0.5);
+  const Vector6d speed = Vector6d::Constant(0.2);
+  filter.update(speed, exact, 0.1);
+  EXPECT_LT((filter.velocity() - speed).norm(), 1e-9);
+  // By hand: 0.1 s of 1 m/s^2 leave a variance of 0.01 beside 0.25, those of 3 rad/s^2 one of 0.09.
+  filter.update(Vector6d::Zero(), noisy, 0.1);
+  EXPECT_NEAR(filter.velocity()[0], 0.2 * (1 - 0.01 / 0.26), 1e-6);
+  EXPECT_NEAR(filter.velocity()[5], 0.2 * (1 - 0.09 / 0.34), 1e-6);
+  EXPECT_NEAR(filter.covariance(0, 0)(0, 0), 0.01 * 0.25 / 0.26, 1e-6);
+  EXPECT_NEAR(filter.covariance(0.1, 0.2)(0, 0) - filter.covariance(0, 0)(0, 0), 0.03, 1e-9);
+}
+
+TEST(VelocityFilter, FollowsNoisyStepsWithinItsCovariance) {
+  Random random(3);
+  VelocityFilter filter;
+  const double dt = 1.0 / 30, noise = 0.1;
+  double speed = 0, sum = 0;
+  const int frames = 600;
+  for (int i = 0; i < frames; ++i) {
+    speed += kAccelerationSd * dt * random.normal();
+    Vector6d measured = Vector6d::Zero();
+    measured[0] = speed + noise * random.normal();
+    filter.update(measured, axis_covariance(noise, noise), dt);
+    const double error = filter.velocity()[0] - speed;
+    sum += error * error / filter.covariance(0, 0)(0, 0);
+  }
+  EXPECT_GT(sum / frames, 0.7);
+  EXPECT_LT(sum / frames, 1.4);
 }
 
 TEST(Rigid3, ProductAppliesTheRightOperandFirst) {

@@ -61,7 +61,14 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   };
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
-    if (k.parent != kNoKeyframe) add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent));
+    if (k.parent != kNoKeyframe) {
+      add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent));
+      if (k.motion_covariance && shared_points(k, k.parent) == 0) {
+        PoseGraphEdge& edge = graph.edges.back();
+        const Matrix6d in_parent = adjoint(edge.b_from_a.inverse());
+        edge.information = (in_parent * *k.motion_covariance * in_parent.transpose()).inverse();
+      }
+    }
     for (const Covisible& c : k.covisible)
       if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
           map.keyframe(c.keyframe)->parent != id)

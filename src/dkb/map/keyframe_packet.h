@@ -36,7 +36,10 @@ struct KeyframePacket {
   std::shared_ptr<const RgbdFeatures> features;
   KeyframeId reference = kNoKeyframe;  // none for the first keyframe of a map
   Rigid3 cam_from_reference;           // cam_from_world for the first keyframe of a map
-  std::vector<PointId> points;         // per feature
+  // Of cam_from_reference where it rests on the motion alone and no point ties the two: right perturbation of
+  // reference_from_cam, [m, rad]; null otherwise.
+  std::shared_ptr<const Matrix6d> motion_covariance;
+  std::vector<PointId> points;  // per feature
   std::vector<ProvisionalPoint> new_points;
   std::vector<PointVisibility> visibility;  // by increasing point id
   std::vector<PointId> retracted;           // points that turned out to move

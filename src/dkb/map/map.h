@@ -50,6 +50,8 @@ struct Keyframe {
   KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
   Rigid3 cam_from_parent;            // frozen when culled: the pose then follows the parent
   bool culled = false;
+  // Of cam_from_parent as it was when nothing but the motion told it; null otherwise. Map files leave it out.
+  std::shared_ptr<const Matrix6d> motion_covariance;
 };
 
 // A point that is no more.

@@ -105,6 +105,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   k.cam_from_world = packet.reference == kNoKeyframe
                          ? packet.cam_from_reference
                          : packet.cam_from_reference * map_.cam_from_world(packet.reference);
+  k.motion_covariance = packet.motion_covariance;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();
   map_.add_keyframe(std::move(k));

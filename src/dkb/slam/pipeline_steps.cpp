@@ -322,7 +322,6 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
   outcome.keyframe = decision.insert;
-  if(getenv("DKBDBG")){ Vector6d d=Vector6d::Zero(); Vector6d sd=d; if(scene.step){d=tangent_from_rigid3(scene.step->previous_from_current); sd=scene.step->covariance.diagonal().cwiseSqrt();} fprintf(stderr,"%d %d %d %.9f  %g %g %g %g %g %g  %g %g %g %g %g %g kf%d n%zu\n",int(tracked.index),int(tracked.state),tracked.inliers,frame.stamp_ns()*1e-9,d[0],d[1],d[2],d[3],d[4],d[5],sd[0],sd[1],sd[2],sd[3],sd[4],sd[5],int(decision.insert),scene.extracted.orb.corners.size());}
   outcome_ = outcome;
   last_state_ = tracked.state;
   collect_times();

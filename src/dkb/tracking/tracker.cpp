@@ -355,9 +355,8 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   if (with_depth < options_.initial_points) return false;
   if (state_ != TrackingState::initialising) {
     if (!lost_since_) lost_since_ = frame.timestamp;
-    // Where the camera is known so well that the map's points would have been found, there are none.
-    const bool known = expected != nullptr && search_radius(0) < kMaxSearchRadius;
-    const double wait = known ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
+    // Where the way here is known and the map's points are not found, there are none.
+    const double wait = expected != nullptr ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
     if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
   }
   frame.inliers = with_depth;

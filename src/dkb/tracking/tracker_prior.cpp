@@ -9,8 +9,8 @@ namespace dkb {
 namespace {
 
 // Standard deviations of a place that nothing but the camera tells, beyond which nobody knows it.
-constexpr double kMaxGuessedPosition = 0.25;  // [m]
-constexpr double kMaxGuessedRotation = 0.25;  // [rad]
+constexpr double kMaxGuessedPosition = 1.0;  // [m]
+constexpr double kMaxGuessedRotation = 0.5;  // [rad]
 
 constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
 // What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
@@ -29,7 +29,9 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   MotionPrior step;
   const double seconds = timestamp - last_->timestamp;
   step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
-  step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  // A camera whose velocity is not known yet is taken to stand: what moves before it is not to take it along.
+  const VelocityFilter filter = velocity_ ? filter_ : VelocityFilter::at_rest();
+  step.covariance = seconds * seconds * filter.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
   step.previous_from_current.rotation = prior->previous_from_current.rotation;
   step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
@@ -39,8 +41,8 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
 std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
   if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
     return std::nullopt;
-  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
   const bool told = input.prior != nullptr && !input.prior->rotation_only;
+  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
   const Vector6d variance = whole.covariance.diagonal();
   const bool known = velocity_ && variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;

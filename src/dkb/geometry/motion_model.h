@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "dkb/geometry/rigid3.h"
+
+namespace dkb {
+
+// What a camera in a hand or on a robot may do while nothing tells of it: standard deviations of its accelerations, and
+// of its velocity before the first is known.
+inline constexpr double kAccelerationSd = 2.0;         // [m/s^2]
+inline constexpr double kAngularAccelerationSd = 6.0;  // [rad/s^2]
+inline constexpr double kSpeedSd = 1.0;                // [m/s]
+inline constexpr double kAngularSpeedSd = 1.0;         // [rad/s]
+
+// [translation, rotation] of the same variance in each axis.
+inline Matrix6d axis_covariance(double position_sd, double rotation_sd) {
+  Vector6d sd;
+  sd << Eigen::Vector3d::Constant(position_sd), Eigen::Vector3d::Constant(rotation_sd);
+  return sd.cwiseAbs2().asDiagonal();
+}
+
+// The camera's velocity and its covariance: a Kalman filter of steps between poses, whose process noise is an
+// acceleration that lasts (Bar-Shalom, Li and Kirubarajan, 2001, section 6.2.2).
+class VelocityFilter {
+ public:
+  static VelocityFilter at_rest() {
+    VelocityFilter filter;
+    filter.set(Vector6d::Zero(), Matrix6d::Zero());
+    return filter;
+  }
+  // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second.
+  const Vector6d& velocity() const { return velocity_; }
+  // The same `after` seconds without a pose, of which it was told `since` already.
+  Matrix6d covariance(double since, double after) const {
+    return covariance_ + (after * after - since * since) * axis_covariance(kAccelerationSd, kAngularAccelerationSd);
+  }
+  // A velocity was measured over `seconds`.
+  void update(const Vector6d& measured, const Matrix6d& measured_covariance, double seconds) {
+    const Matrix6d predicted = covariance(0, seconds);
+    const Matrix6d gain = predicted * (predicted + measured_covariance).inverse();
+    velocity_ += gain * (measured - velocity_);
+    covariance_ = predicted - gain * predicted;
+    covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+  }
+  void set(const Vector6d& velocity, const Matrix6d& covariance) { velocity_ = velocity, covariance_ = covariance; }
+
+ private:
+  Vector6d velocity_ = Vector6d::Zero();
+  Matrix6d covariance_ = axis_covariance(kSpeedSd, kAngularSpeedSd);
+};
+
+}  // namespace dkb
