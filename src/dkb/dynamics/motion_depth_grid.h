@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
@@ -34,7 +35,8 @@ class MotionRays {
   bool find_cell(const Eigen::Vector3f& point, int* x, int* y) const;
   // Projects what each cell sees at `depth` [m], `missing` standing in for depth that is not above 0, into the camera
   // that `there_from_here` leads to.
-  void project(const Image<float>& depth, float missing, const Rigid3& there_from_here, MotionProjection& result) const;
+  void project(const Image<float>& depth, float missing, const Rigid3& there_from_here, MotionProjection& result,
+               Simd simd = best_simd()) const;
 
  private:
   int cell_, width_, height_;
@@ -52,10 +54,11 @@ struct MotionDepthGrid {
   Image<float> score;              // evidence for motion of what is seen in each cell
 
   // Sets the three depth maps. Buffers are kept.
-  void set_depth(const DepthImage& image, const MotionRays& rays);
+  void set_depth(const DepthImage& image, const MotionRays& rays, Simd simd = best_simd());
 
  private:
   Image<float> low_, high_;
+  std::vector<float> buffer_;  // some rows
 };
 
 }  // namespace dkb

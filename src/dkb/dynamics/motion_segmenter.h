@@ -33,7 +33,8 @@ struct MotionOptions {
 // Calls alternate: segment() or observe() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
-  MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {});
+  MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {},
+                  Simd simd = best_simd());
 
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
@@ -62,6 +63,7 @@ class MotionSegmenter {
 
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_pose();
+  void find_tolerances();
   void carry_scores();
   void compare(MotionDepthGrid& view);
   void find_openings();
@@ -76,6 +78,7 @@ class MotionSegmenter {
   CameraModel camera_;
   SensorNoise noise_;
   MotionOptions options_;
+  Simd simd_;
   MotionRays rays_;
   MotionSmoothing smoothing_;
   DepthAlignment alignment_;
@@ -95,6 +98,8 @@ class MotionSegmenter {
   Image<float> missing_;                          // share of the frames without depth there
   Image<float> weighted_, weights_;
   Image<uint8_t> known_, open_;
+  Image<uint8_t> outline_;  // 1 where a surface behind begins beside
+  Image<uint8_t> verdict_;  // of the loop at work
 };
 
 }  // namespace dkb
