@@ -91,7 +91,7 @@ bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
   return true;
 }
 
-void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here,
+void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
                          MotionProjection& result, Simd simd) const {
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
@@ -100,12 +100,12 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
   const float fx = fx_, fy = fy_, cx = cx_ + 1.0f, cy = cy_ + 1.0f, k1 = k1_, k2 = k2_, k3 = k3_, p1 = p1_, p2 = p2_;
   const float r2_max = r2_max_, right = static_cast<float>(width_) + 1.0f, bottom = static_cast<float>(height_) + 1.0f;
   const int32_t width = width_, height = height_;
-  const size_t count = x_.size();
+  const size_t count = range.count;
   result.cell.resize(count);
   result.depth.resize(count);
-  const float* const xs = x_.data();
-  const float* const ys = y_.data();
-  const float* const zs = depth.data();
+  const float* const xs = x_.data() + range.first;
+  const float* const ys = y_.data() + range.first;
+  const float* const zs = depth.data() + range.first;
   int32_t* const cells = result.cell.data();
   float* const depths = result.depth.data();
   // Coordinates are counted from 1 and cut to one cell around the grid: 0 and size + 1 are outside.
@@ -150,6 +150,14 @@ void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays,
     spread(low_, buffer_.data(), nearest, [](float a, float b) { return std::min(a, b); });
     spread(high_, buffer_.data(), farthest, [](float a, float b) { return std::max(a, b); });
   });
+}
+
+void MotionView::set(const MotionDepthGrid& grid) {
+  time = grid.time;
+  cam_from_world = grid.cam_from_world;
+  cells.resize(grid.depth.size());
+  for (size_t i = 0; i < cells.size(); ++i)
+    cells[i] = {{grid.nearest.data()[i], grid.farthest.data()[i]}, grid.depth.data()[i], grid.score.data()[i]};
 }
 
 }  // namespace dkb

@@ -94,25 +94,37 @@ void sweep_rows(Image<float>& weighted, Image<float>& weights, const Image<float
     }
 }
 
+// Down and up again, in strips so narrow that they stay in the nearest cache.
+constexpr int kStrip = 16;  // [cells]
+
+DKB_KERNEL_BODY inline void take_row(float* to, const float* from, const float* link, int count) {
+  DKB_INDEPENDENT_STEPS
+  for (int x = 0; x < count; ++x) to[x] += link[x] * (from[x] - to[x]);
+}
+
+DKB_KERNEL_BODY inline void sweep_columns(Image<float>& weighted, Image<float>& weights, const Image<float>& links,
+                                          int first, int count) {
+  for (int y = 1; y < weighted.height(); ++y) {
+    take_row(weighted.row(y) + first, weighted.row(y - 1) + first, links.row(y) + first, count);
+    take_row(weights.row(y) + first, weights.row(y - 1) + first, links.row(y) + first, count);
+  }
+  for (int y = weighted.height() - 2; y >= 0; --y) {
+    take_row(weighted.row(y) + first, weighted.row(y + 1) + first, links.row(y + 1) + first, count);
+    take_row(weights.row(y) + first, weights.row(y + 1) + first, links.row(y + 1) + first, count);
+  }
+}
+
 }  // namespace
 
 void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
   const int width = weighted.width(), height = weighted.height();
-  const auto take_row = [width](float* to, const float* from, const float* link) {
-    for (int x = 0; x < width; ++x) to[x] += link[x] * (from[x] - to[x]);
-  };
   for (int pass = 0; pass < 2; ++pass) {
     int y = 0;
     for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
     for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
-    for (y = 1; y < height; ++y) {
-      take_row(weighted.row(y), weighted.row(y - 1), up_.row(y));
-      take_row(weights.row(y), weights.row(y - 1), up_.row(y));
-    }
-    for (y = height - 2; y >= 0; --y) {
-      take_row(weighted.row(y), weighted.row(y + 1), up_.row(y + 1));
-      take_row(weights.row(y), weights.row(y + 1), up_.row(y + 1));
-    }
+    run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
+      for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
+    });
   }
 }
 
