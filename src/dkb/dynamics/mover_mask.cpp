@@ -2,6 +2,7 @@
 #include "dkb/dynamics/mover_mask.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,12 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height) {
   if (other.empty()) return;
   if (into.empty())
     into.cells = Image<uint8_t>((width + into.cell - 1) / into.cell, (height + into.cell - 1) / into.cell);
+  if (into.cell == other.cell && into.cells.width() == other.cells.width() &&
+      into.cells.height() == other.cells.height()) {
+    for (size_t i = 0; i < into.cells.size(); ++i)
+      into.cells.data()[i] = other.cells.data()[i] != 0 ? 255 : into.cells.data()[i];
+    return;
+  }
   for (int y = 0; y < into.cells.height(); ++y)
     for (int x = 0; x < into.cells.width(); ++x) {
       const float centre_x = (static_cast<float>(x) + 0.5f) * static_cast<float>(into.cell);
@@ -32,17 +39,26 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
   };
   std::vector<Step> front;
   const auto per_metre = static_cast<float>(focal / cell);
+  constexpr std::array<std::pair<int, int>, 4> kBeside{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+  const auto open = [&](int u, int v) {
+    return spread.cells.contains(u, v) && spread.cells(u, v) == 0 && !(depth_of(u, v) > 0);
+  };
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (const float z = depth_of(x, y); mask.cells(x, y) != 0 && z > 0)
+    for (int x = 0; x < width; ++x) {
+      if (mask.cells(x, y) == 0) continue;
+      const bool at_rim = std::any_of(kBeside.begin(), kBeside.end(),
+                                      [&](const auto& step) { return open(x + step.first, y + step.second); });
+      if (!at_rim) continue;
+      if (const float z = depth_of(x, y); z > 0)
         front.push_back({x, y, static_cast<float>(max_distance) * per_metre / z});
+    }
   for (size_t k = 0; k < front.size(); ++k) {
     const auto [x, y, left] = front[k];
     if (left < 1) continue;
-    for (const auto& [u, v] : {std::pair(x - 1, y), std::pair(x + 1, y), std::pair(x, y - 1), std::pair(x, y + 1)}) {
-      if (!spread.cells.contains(u, v) || spread.cells(u, v) != 0 || depth_of(u, v) > 0) continue;
-      spread.cells(u, v) = 255;
-      front.push_back({u, v, left - 1});
+    for (const auto& [dx, dy] : kBeside) {
+      if (!open(x + dx, y + dy)) continue;
+      spread.cells(x + dx, y + dy) = 255;
+      front.push_back({x + dx, y + dy, left - 1});
     }
   }
   return spread;
