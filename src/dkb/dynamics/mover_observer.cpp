@@ -74,15 +74,25 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
 // Between the twentieths at either end, which may be of other surfaces.
 Eigen::Vector3d MoverObserver::size_of(std::span<const size_t> cells) const {
   std::array<std::vector<float>, 3> values;
-  for (size_t cell : cells) {
-    const Eigen::Vector2f& ray = rays_[cell];
-    values[0].push_back(depth_[cell] * ray.x());
-    values[1].push_back(depth_[cell] * ray.y());
-    values[2].push_back(depth_[cell]);
+  for (auto& v : values) v.resize(cells.size());
+  for (size_t k = 0; k < cells.size(); ++k) {
+    const Eigen::Vector2f& ray = rays_[cells[k]];
+    const float depth = depth_[cells[k]];
+    values[0][k] = depth * ray.x();
+    values[1][k] = depth * ray.y();
+    values[2][k] = depth;
   }
   Eigen::Vector3d size;
-  for (size_t i = 0; i < 3; ++i)
-    size[static_cast<Eigen::Index>(i)] = quantile(values[i], 0.95) - quantile(values[i], 0.05);
+  for (size_t i = 0; i < 3; ++i) {
+    const auto place = [n = values[i].size()](double share) {
+      return static_cast<std::ptrdiff_t>(std::min(n - 1, static_cast<size_t>(share * static_cast<double>(n))));
+    };
+    const auto begin = values[i].begin(), low = begin + place(0.05), high = begin + place(0.95);
+    std::nth_element(begin, high, values[i].end());
+    const float most = *high;
+    std::nth_element(begin, low, high + 1);  // the others are larger
+    size[static_cast<Eigen::Index>(i)] = most - *low;
+  }
   return size;
 }
 

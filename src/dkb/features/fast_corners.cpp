@@ -67,8 +67,9 @@ void emit_scalar(const uint8_t* above, const uint8_t* here, const uint8_t* below
 #if defined(__x86_64__)
 // Scores of 32 pixels; pixels at or below the threshold score 0. With kEarlyOut blocks without any corner cost less.
 template <bool kEarlyOut>
-DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::array<ptrdiff_t, 16>& circle,
-                                             __m256i threshold) {
+DKB_TARGET_AVX2 __attribute__((always_inline)) inline __m256i contrast_avx2(const uint8_t* centre,
+                                                                            const std::array<ptrdiff_t, 16>& circle,
+                                                                            __m256i threshold) {
   const __m256i zero = _mm256_setzero_si256();
   const __m256i c = load_avx2(centre);
   // An arc of 9 holds two neighbours of any four pixels at right angles: the larger of one diameter and the larger of

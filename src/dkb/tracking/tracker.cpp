@@ -214,9 +214,11 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
   if (inliers < min_inliers) return false;
 
+  std::vector<PointId> in_view, found;
   for (size_t i = 0; i < candidates.size(); ++i)
-    if (visible[i]) ++visibility_[candidates[i].id].visible;
-  for (PointId id : matched) ++visibility_[id].visible;
+    if (visible[i]) in_view.push_back(candidates[i].id);
+  visibility_.add_visible(std::move(in_view));
+  visibility_.add_visible(std::move(matched));
   // A guessed depth is let pass more; not where a mover may be.
   const auto strays = [&](const Pair& pair) {
     const auto f = static_cast<size_t>(pair.feature);
@@ -235,13 +237,14 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
-      ++visibility_[points[f]].found;
+      found.push_back(points[f]);
     } else if (strays(pairs[i])) {
       frame.outlier[f] = 1;
     } else {
       frame.odometry[f] = OdometryMatch{pairs[i].point_in_world, !pairs[i].use_depth};
     }
   }
+  visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
   frame.inliers = static_cast<int>(inliers);

@@ -14,11 +14,7 @@ constexpr int kMinNewPoints = 100;  // nearest depths that make points at a keyf
 }  // namespace
 
 void Tracker::take_reports(KeyframePacket& packet) {
-  for (auto& [point, visibility] : visibility_) {
-    visibility.point = point;
-    packet.visibility.push_back(visibility);
-  }
-  visibility_.clear();
+  packet.visibility = visibility_.take();
   packet.retracted = std::exchange(unreported_, {});
 }
 
