@@ -43,15 +43,22 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
   const auto open = [&](int u, int v) {
     return spread.cells.contains(u, v) && spread.cells(u, v) == 0 && !(depth_of(u, v) > 0);
   };
-  for (int y = 0; y < height; ++y)
+  for (int y = 0; y < height; ++y) {
+    const uint8_t* const here = mask.cells.row(y);
+    const uint8_t* const above = mask.cells.row(std::max(0, y - 1));
+    const uint8_t* const below = mask.cells.row(std::min(height - 1, y + 1));
     for (int x = 0; x < width; ++x) {
-      if (mask.cells(x, y) == 0) continue;
+      if (here[x] == 0) continue;
+      const bool inside =
+          (here[std::max(0, x - 1)] != 0) & (here[std::min(width - 1, x + 1)] != 0) & (above[x] != 0) & (below[x] != 0);
+      if (inside) continue;
       const bool at_rim = std::any_of(kBeside.begin(), kBeside.end(),
                                       [&](const auto& step) { return open(x + step.first, y + step.second); });
       if (!at_rim) continue;
       if (const float z = depth_of(x, y); z > 0)
         front.push_back({x, y, static_cast<float>(max_distance) * per_metre / z});
     }
+  }
   for (size_t k = 0; k < front.size(); ++k) {
     const auto [x, y, left] = front[k];
     if (left < 1) continue;
