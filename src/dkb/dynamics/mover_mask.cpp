@@ -30,7 +30,7 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
   MoverMask spread = mask;
   if (mask.empty()) return spread;
   const int cell = mask.cell, width = mask.cells.width(), height = mask.cells.height();
-  const auto depth_of = [&](int x, int y) {
+  const auto at = [&](int x, int y) -> const float& {
     return depth(std::min(depth.width() - 1, x * cell + cell / 2), std::min(depth.height() - 1, y * cell + cell / 2));
   };
   struct Step {
@@ -38,10 +38,11 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
     float left;  // [cells]
   };
   std::vector<Step> front;
+  std::vector<std::pair<int, int>> rim;
   const auto per_metre = static_cast<float>(focal / cell);
   constexpr std::array<std::pair<int, int>, 4> kBeside{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
   const auto open = [&](int u, int v) {
-    return spread.cells.contains(u, v) && spread.cells(u, v) == 0 && !(depth_of(u, v) > 0);
+    return spread.cells.contains(u, v) && spread.cells(u, v) == 0 && !(at(u, v) > 0);
   };
   for (int y = 0; y < height; ++y) {
     const uint8_t* const here = mask.cells.row(y);
@@ -52,12 +53,16 @@ MoverMask spread_into_holes(const MoverMask& mask, const DepthImage& depth, doub
       const bool inside =
           (here[std::max(0, x - 1)] != 0) & (here[std::min(width - 1, x + 1)] != 0) & (above[x] != 0) & (below[x] != 0);
       if (inside) continue;
-      const bool at_rim = std::any_of(kBeside.begin(), kBeside.end(),
-                                      [&](const auto& step) { return open(x + step.first, y + step.second); });
-      if (!at_rim) continue;
-      if (const float z = depth_of(x, y); z > 0)
-        front.push_back({x, y, static_cast<float>(max_distance) * per_metre / z});
+      rim.push_back({x, y});
+      for (int v = std::max(0, y - 1); v <= std::min(height - 1, y + 1); ++v) __builtin_prefetch(&at(x, v));
     }
+  }
+  for (const auto& [x, y] : rim) {
+    const bool at_hole = std::any_of(kBeside.begin(), kBeside.end(), [&, u = x, v = y](const auto& step) {
+      return open(u + step.first, v + step.second);
+    });
+    if (const float z = at(x, y); at_hole && z > 0)
+      front.push_back({x, y, static_cast<float>(max_distance) * per_metre / z});
   }
   for (size_t k = 0; k < front.size(); ++k) {
     const auto [x, y, left] = front[k];
