@@ -2,6 +2,7 @@
 #include "dkb/dynamics/motion_segmenter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -69,7 +70,7 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
     *i = Image<float>(width, height);
-  known_ = open_ = outline_ = Image<uint8_t>(width, height);
+  known_ = open_ = intruding_ = outline_ = Image<uint8_t>(width, height);
   verdict_.resize(kBlock);
   bounds_.resize(kBlock);
 }
@@ -292,16 +293,18 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
 void MotionSegmenter::find_openings(CellRange block) {
   constexpr float kAlways = 0.9f;
   const float gain = 1.0f / static_cast<float>(frames_);
-  run_vectorised(simd_, [gain, count = block.count, depth = current_->depth.data() + block.first,
-                         share = missing_.data() + block.first, intrusions = intrusions_.data() + block.first,
-                         open = open_.data() + block.first]() DKB_KERNEL_BODY {
-    for (size_t i = 0; i < count; ++i) {
-      const bool hole = !(depth[i] > 0);
-      const float now = share[i] + gain * ((hole ? 1.0f : 0.0f) - share[i]);
-      share[i] = now;
-      open[i] = hole & (intrusions[i] > 0) & (now < kAlways) ? 255 : 0;
-    }
-  });
+  run_vectorised(simd_,
+                 [gain, count = block.count, depth = current_->depth.data() + block.first,
+                  share = missing_.data() + block.first, intrusions = intrusions_.data() + block.first,
+                  open = open_.data() + block.first, intruding = intruding_.data() + block.first]() DKB_KERNEL_BODY {
+                   for (size_t i = 0; i < count; ++i) {
+                     const bool hole = !(depth[i] > 0);
+                     const float now = share[i] + gain * ((hole ? 1.0f : 0.0f) - share[i]);
+                     share[i] = now;
+                     open[i] = hole & (intrusions[i] > 0) & (now < kAlways) ? 255 : 0;
+                     intruding[i] = !hole & (intrusions[i] > 0) ? 1 : 0;
+                   }
+                 });
 }
 
 void MotionSegmenter::weigh() {
@@ -320,17 +323,18 @@ void MotionSegmenter::weigh() {
               weighted = weighted_.data(), weights = weights_.data()]() DKB_KERNEL_BODY {
         for (size_t i = 0; i < count; ++i) weigh_cell(0.0f, still[i], score[i], z[i], weighted[i], weights[i]);
       });
-  const auto supported = [&](int x, int y) {
-    int support = 0;
-    for (int v = y - 1; v <= y + 1; ++v)
-      for (int u = x - 1; u <= x + 1; ++u) support += intrusions_(u, v) > 0 && depth(u, v) > 0;
-    return support >= kSupport;
-  };
-  for (int y = 1; y + 1 < height; ++y)
-    for (int x = 1; x + 1 < width; ++x)
-      if (const float votes = intrusions_(x, y); votes > 0 && depth(x, y) > 0 && supported(x, y))
+  for (int y = 1; y + 1 < height; ++y) {
+    const std::array<const uint8_t*, 3> rows{intruding_.row(y - 1), intruding_.row(y), intruding_.row(y + 1)};
+    for (int x = 1; x + 1 < width; ++x) {
+      if (rows[1][x] == 0) continue;
+      int support = 0;
+      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
+      const float votes = intrusions_(x, y);
+      if (support >= kSupport)
         weigh_cell(votes / (votes + agreements_(x, y)), still_(x, y), current_->score(x, y), depth(x, y),
                    weighted_(x, y), weights_(x, y));
+    }
+  }
 }
 
 void MotionSegmenter::update_scores() {

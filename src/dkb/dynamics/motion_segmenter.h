@@ -105,7 +105,8 @@ class MotionSegmenter {
   Image<float> missing_;                          // share of the frames without depth there
   Image<float> weighted_, weights_;
   Image<uint8_t> known_, open_;
-  Image<uint8_t> outline_;  // 1 where a surface behind begins beside
+  Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty
+  Image<uint8_t> outline_;    // 1 where a surface behind begins beside
   std::vector<ChosenView> chosen_;
   std::vector<uint8_t> verdict_;  // of the block at work
   std::vector<MotionView::Bounds> bounds_;

@@ -166,7 +166,7 @@ void fast_contrasts_5x5(const GreyImage& image, int x, int y, uint8_t (&contrast
 #if defined(__x86_64__)
   // The vector kernel loads 32 pixels from three columns left of the window on, in rows up to five below (x, y).
   const size_t last = static_cast<size_t>(y + 5) * static_cast<size_t>(image.width()) + static_cast<size_t>(x + 1 + 31);
-  if (simd == Simd::avx2 && last < image.size()) return contrasts_5x5_avx2(image.row(y) + x, image.width(), contrasts);
+  if (simd >= Simd::avx2 && last < image.size()) return contrasts_5x5_avx2(image.row(y) + x, image.width(), contrasts);
 #endif
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
   for (int row = 0; row < 5; ++row)
@@ -184,7 +184,7 @@ void FastCornerFinder::find(const GreyImage& image, int threshold, int border, s
   // One pixel more on each side, since suppression compares with the neighbours.
   const int score_begin = std::max(begin - 1, 3), score_end = std::min(end + 1, image.width() - 3);
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
-  const bool vectorised = simd_ == Simd::avx2 && score_end - score_begin >= 32;
+  const bool vectorised = simd_ >= Simd::avx2 && score_end - score_begin >= 32;
 
   const size_t stride = static_cast<size_t>(image.width() + 2 * kRowPadding);
   scores_.assign(3 * stride, 0);

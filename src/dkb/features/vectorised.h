@@ -20,6 +20,10 @@ template <class Kernel>
 DKB_TARGET_AVX2 void run_avx2(Kernel kernel) {
   kernel();
 }
+template <class Kernel>
+DKB_TARGET_AVX512 void run_avx512(Kernel kernel) {
+  kernel();
+}
 #endif
 
 // Runs `kernel`, loops without branches over plain arrays that it has copies of the addresses of. The compiler makes
@@ -28,6 +32,7 @@ DKB_TARGET_AVX2 void run_avx2(Kernel kernel) {
 template <class Kernel>
 void run_vectorised([[maybe_unused]] Simd simd, Kernel kernel) {
 #if defined(__x86_64__)
+  if (simd == Simd::avx512) return run_avx512(kernel);
   if (simd == Simd::avx2) return run_avx2(kernel);
 #endif
   kernel();
