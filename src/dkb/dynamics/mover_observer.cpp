@@ -212,11 +212,12 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
   const auto width = static_cast<uint32_t>(columns_), size = static_cast<uint32_t>(rays_.size());
   std::vector<float> depths;
   std::vector<uint32_t> part_of(size, 0);  // seed + 1
+  std::vector<uint32_t> cells;
   for (uint32_t seed = 0; seed < size; ++seed) {
     if (!free[seed]) continue;
     free[seed] = 0;
     part_of[seed] = seed + 1;
-    std::vector<uint32_t> cells{seed};
+    cells.assign(1, seed);
     CellRange bounds{columns_, rows_, 0, 0};
     depths.clear();
     for (size_t k = 0; k < cells.size(); ++k) {
@@ -245,7 +246,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
                (i + width >= size || mine(i + width));
     }
     if (static_cast<double>(inner) < kInnerShare * static_cast<double>(cells.size())) continue;
-    parts.push_back({{bounds, std::move(cells)}, upper_median(depths), parts.size()});
+    parts.push_back({{bounds, cells}, upper_median(depths), parts.size()});
   }
   // Holes of the depth image and arms held out cut bodies into parts.
   const auto root = [&](size_t p) {

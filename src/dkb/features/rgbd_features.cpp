@@ -169,6 +169,10 @@ RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indice
   result.width = features.width;
   result.height = features.height;
   std::vector<float> xs, ys;
+  result.keypoints.reserve(indices.size());
+  result.descriptors.reserve(indices.size());
+  xs.reserve(indices.size());
+  ys.reserve(indices.size());
   for (int i : indices) {
     const auto f = static_cast<size_t>(i);
     result.keypoints.push_back(features.keypoints[f]);

@@ -139,6 +139,7 @@ bool Tracker::established(PointId id, double now) const {
 // Features on movers that showed no well-known point end here: mapping never sees them.
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.source.clear();
+  frame.source.reserve(frame.points.size());
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (!frame.matchable().on_mover(f) || frame.points[f] != kNoPoint) frame.source.push_back(static_cast<int>(f));
   const size_t left = frame.source.size();
@@ -163,6 +164,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const RgbdFeatures& features = *frame.features;
   std::vector<uint8_t> taken(features.size(), 0);
   std::vector<PointId> matched;
+  matched.reserve(features.size());
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) {
       taken[f] = 1;
@@ -197,6 +199,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
   std::vector<Pair> pairs;
+  pairs.reserve(features.size());
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
   const size_t in_map = pairs.size();
@@ -215,6 +218,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   if (inliers < min_inliers) return false;
 
   std::vector<PointId> in_view, found;
+  in_view.reserve(candidates.size());
+  found.reserve(features.size());
   for (size_t i = 0; i < candidates.size(); ++i)
     if (visible[i]) in_view.push_back(candidates[i].id);
   visibility_.add_visible(std::move(in_view));
@@ -280,6 +285,7 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
 void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& made, TrackedFrame& frame) const {
   auto features = made.at(velocity);
   std::vector<Pair> pairs;
+  pairs.reserve(frame.points.size());
   int in_map = 0;
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (frame.points[f] != kNoPoint) {

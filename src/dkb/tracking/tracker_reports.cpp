@@ -44,6 +44,7 @@ void Tracker::retract(const std::vector<PointId>& points) {
 std::vector<PointInView> Tracker::points_in_view() const {
   std::vector<PointInView> in_view;
   if (!last_) return in_view;
+  in_view.reserve(candidates_.size() + provisional_.size());
   const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
     const Eigen::Vector3d p = last_->cam_from_world * world;
     if (p.z() < 0.1) return;
