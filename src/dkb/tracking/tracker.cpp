@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "dkb/matching/pose_observation.h"
@@ -56,11 +55,17 @@ Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
   const Rigid3 moved = frame.cam_from_reference * map_.cam_from_world(frame.reference);
   const Rigid3 new_world_from_old = moved.inverse() * frame.cam_from_world;
   frame.cam_from_world = moved;
-  std::set<PointId> seen;  // two features may show points that have been fused since: the first keeps it
-  for (PointId& p : frame.points) {
+  std::vector<std::pair<PointId, size_t>> shown;
+  shown.reserve(frame.points.size());
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    PointId& p = frame.points[f];
     if (p != kNoPoint && !provisional_.contains(p)) p = map_.view().resolve(p);
-    if (p != kNoPoint && !seen.insert(p).second) p = kNoPoint;
+    if (p != kNoPoint) shown.emplace_back(p, f);
   }
+  std::sort(shown.begin(), shown.end());
+  // Two features may show points that have been fused since: the first keeps it.
+  for (size_t i = 1; i < shown.size(); ++i)
+    if (shown[i].first == shown[i - 1].first) frame.points[shown[i].second] = kNoPoint;
   return new_world_from_old;
 }
 
