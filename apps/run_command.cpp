@@ -22,7 +22,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   });
   DetectorChoice& detection = args->detection;
   command->add_option("--detector", detection.kinds,
-                      "auto, yolo, motion, file, none, exec:COMMAND; several joined by +");
+                      "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--inference", detection.inference,

@@ -74,7 +74,7 @@ struct DKB_SLAM_API Detectors {
 
 /// What the command line's detector options say; a file that is not named is not used.
 struct DetectorChoice {
-  std::string kinds = "auto";      ///< auto, yolo, motion, file, none, exec:COMMAND (last); several joined by +
+  std::string kinds = "auto";      ///< auto, yolo (or network), motion, file, none, exec:COMMAND (last); joined by +
   std::filesystem::path model;     ///< ONNX file of the yolo kind
   std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line

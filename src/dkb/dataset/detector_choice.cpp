@@ -24,7 +24,7 @@ constexpr std::string_view kExec = "exec:";
 
 std::vector<std::string> detector_kinds(const std::string& detector, bool has_model) {
   if (detector == "auto") return {has_model ? "yolo" : "motion"};
-  const std::vector<std::string> known = {"auto", "none", "yolo", "motion", "file"};
+  const std::vector<std::string> known = {"auto", "none", "yolo", "network", "motion", "file"};
   std::vector<std::string> kinds;
   const size_t command =
       ("+" + detector).find("+" + std::string(kExec));  // the last kind, since a command may hold a +
@@ -32,8 +32,8 @@ std::vector<std::string> detector_kinds(const std::string& detector, bool has_mo
   for (std::string kind; std::getline(parts, kind, '+');) {
     if (std::find(known.begin() + 1, known.end(), kind) == known.end())
       throw InputError("--detector: there is no detector \"" + kind + "\"" + did_you_mean(kind, known) +
-                       "; detectors: auto, none, yolo, motion, file, exec:COMMAND, or several joined by +");
-    if (kind != "none") kinds.push_back(kind);
+                       "; detectors: auto, none, yolo (network), motion, file, exec:COMMAND, or several joined by +");
+    if (kind != "none") kinds.push_back(kind == "network" ? "yolo" : kind);
   }
   if (command != std::string::npos) kinds.push_back(detector.substr(command));
   return kinds;

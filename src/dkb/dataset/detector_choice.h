@@ -10,7 +10,7 @@
 namespace dkb {
 
 // The kinds that DetectorChoice::kinds names, `none` left out, exec:COMMAND last; `auto` is `yolo` where there is a
-// model, else `motion`. Throws InputError for one that does not exist.
+// model, else `motion`, and `network` is another name of `yolo`. Throws InputError for one that does not exist.
 std::vector<std::string> detector_kinds(const std::string& kinds, bool has_model);
 
 // What of the choice holds beside the options: the model is that of $DKB_SLAM_MODEL where none is named, and without a

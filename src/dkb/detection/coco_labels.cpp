@@ -19,4 +19,14 @@ std::vector<std::string> coco_labels() {
       "teddy bear",     "hair drier", "toothbrush"};
 }
 
+std::vector<std::string> numbered_coco_labels() {
+  std::vector<std::string> numbered(1);  // COCO counts from 1
+  for (const std::string& label : coco_labels()) {
+    for (const size_t unused : {12, 26, 29, 30, 45, 66, 68, 69, 71, 83})
+      if (numbered.size() == unused) numbered.emplace_back();
+    numbered.push_back(label);
+  }
+  return numbered;
+}
+
 }  // namespace dkb

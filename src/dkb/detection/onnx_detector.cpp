@@ -11,16 +11,18 @@
 #include "dkb/detection/onnx_file.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
 namespace {
 
-constexpr int kStep = 32;            // [px] the largest stride: inputs are multiples of it
+constexpr int kStep = 32;            // [px] sizes are chosen in steps of the largest stride
 constexpr int kMaxInputSize = 4096;  // [px]
-constexpr int kProbe = 96;           // [px] smallest input whose cell count is no usual number of channels
-constexpr int kYoloxInput = 416, kOtherInput = 640;  // [px] usual sizes of open graphs
-constexpr int kFloat = 1;                            // TensorProto.DataType
+// [px] Inputs that open graphs are tried at: the smallest whose cell count is no usual number of channels, and one that
+// transformers run at, which often keep to what they were trained for.
+constexpr int kProbes[] = {96, 640};
+constexpr int kFloat = 1;  // TensorProto.DataType
 
 std::string_view trim(std::string_view text) {
   constexpr std::string_view kSpace = " \t\r\n";
@@ -41,7 +43,6 @@ std::vector<std::string> split(std::string_view text, char separator) {
 }
 
 std::vector<std::string> read_labels(const std::filesystem::path& path) {
-  if (path.empty()) return coco_labels();
   const std::string text = read_file(path);
   std::vector<std::string> labels =
       split(text.starts_with("\xEF\xBB\xBF") ? std::string_view(text).substr(3) : text, '\n');
@@ -69,13 +70,20 @@ std::vector<bool> movable_classes(const OnnxOptions& options, const std::vector<
   return movable;
 }
 
-std::string describe(const std::vector<OnnxNetwork::Output>& outputs) {
+std::string describe(NetworkOutputs outputs) {
   std::string text;
   for (const OnnxNetwork::Output& output : outputs) {
-    text += text.empty() ? "" : ", ";
+    text += (text.empty() ? "" : ", ") + excerpt(output.name) + (output.name.empty() ? "" : " ");
     for (size_t i = 0; i < output.dims.size(); ++i) text += (i == 0 ? "" : " x ") + std::to_string(output.dims[i]);
   }
-  return text.empty() ? "no float output" : "output " + text;
+  return text.empty() ? "no output of numbers" : "output " + text;
+}
+
+std::string known_heads() {
+  std::string text;
+  for (const DetectorHead* head : detector_heads())
+    text += (text.empty() ? "" : "; ") + std::string(head->facts.name) + " (" + head->facts.outputs + ")";
+  return text;
 }
 
 int round_up(int value) {
@@ -94,20 +102,21 @@ std::optional<HeadLayout> head_at(OnnxNetwork& network, int width, int height, s
   const std::vector<float> blob(3 * static_cast<size_t>(width) * static_cast<size_t>(height), 0.5f);
   const std::vector<OnnxNetwork::Output> found = network.forward(blob, width, height);
   *outputs = describe(found);
-  for (const OnnxNetwork::Output& output : found)
-    if (const auto head = recognise_head(output.dims, width, height)) return head;
-  return std::nullopt;
+  return recognise_head(found, width, height);
 }
 
-// The usual size of a graph with open input. Graphs that cannot run small tell nothing.
-int usual_size(OnnxNetwork& network) {
-  try {
-    std::string outputs;
-    const auto head = head_at(network, kProbe, kProbe, &outputs);
-    return head && head->kind == YoloHead::yolox ? kYoloxInput : kOtherInput;
-  } catch (const InputError&) {
-    return kOtherInput;
-  }
+// The input of a graph that leaves its size open, for images of this shape.
+std::pair<int, int> usual_input(OnnxNetwork& network, int width, int height) {
+  for (const int size : kProbes) try {
+      std::string outputs;
+      if (const auto layout = head_at(network, size, size, &outputs)) {
+        const DetectorHead::Facts& facts = layout->head->facts;
+        return facts.square ? std::pair(facts.usual_input, facts.usual_input)
+                            : input_for(facts.usual_input, width, height);
+      }
+    } catch (const InputError&) {  // it does not run at this size
+    }
+  return input_for(kProbes[1], width, height);
 }
 
 // Width and height of the graph's input; 0 x 0 when it leaves them open.
@@ -119,10 +128,9 @@ std::pair<int, int> declared_input(const OnnxInput& input, const std::string& na
     throw InputError(
         name + ": the graph's input is not one colour image (1 x 3 x height x width); export a detector for one image");
   if (input.dims[2] < 0 || input.dims[3] < 0) return {0, 0};
-  if (input.dims[2] > kMaxInputSize || input.dims[3] > kMaxInputSize || input.dims[2] % kStep != 0 ||
-      input.dims[3] % kStep != 0)
+  if (input.dims[2] > kMaxInputSize || input.dims[3] > kMaxInputSize)
     throw InputError(name + ": the graph's input of " + std::to_string(input.dims[3]) + " x " +
-                     std::to_string(input.dims[2]) + " px is no multiple of 32 up to 4096; export it for such a size");
+                     std::to_string(input.dims[2]) + " px is beyond 4096; export it for a smaller size");
   return {static_cast<int>(input.dims[3]), static_cast<int>(input.dims[2])};
 }
 
@@ -143,17 +151,17 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
   const std::string bytes = read_file(options_.model);
   const OnnxInput input = read_onnx_input(bytes, name);
   const auto declared = declared_input(input, name);
-  labels_ = read_labels(options_.labels);
-  network_ = open_network(options_.inference, bytes, input.name, name);
+  if (!options_.labels.empty()) labels_ = read_labels(options_.labels);
+  network_ = open_network(options_.inference, bytes, input, name);
   model_bytes_ = bytes.size();
   if (options_.input_size != 0)
     std::tie(input_width_, input_height_) = input_for(options_.input_size, width, height);
   else if (declared.first != 0)
     std::tie(input_width_, input_height_) = declared;
   else
-    std::tie(input_width_, input_height_) = input_for(usual_size(*network_), width, height);
+    std::tie(input_width_, input_height_) = usual_input(*network_, width, height);
   std::string outputs;
-  const auto head = [&] {
+  const auto layout = [&] {
     try {
       return head_at(*network_, input_width_, input_height_, &outputs);
     } catch (const InputError& e) {
@@ -161,21 +169,32 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
       throw InputError(std::string(e.what()) + "; or leave input_size at 0");
     }
   }();
-  if (!head)
+  const bool whole = input_width_ % kStep == 0 && input_height_ % kStep == 0;
+  if (!layout)
     throw InputError(name + ": has no known detection head (" + outputs + " at " + std::to_string(input_width_) +
-                     " x " + std::to_string(input_height_) +
-                     " px); use a raw YOLOv5, YOLOv8 or YOLOX export without NMS" +
+                     " x " + std::to_string(input_height_) + " px" +
+                     (whole ? "" : ", where YOLO heads need multiples of 32") +
+                     "); export it without NMS as one of: " + known_heads() +
+                     (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : "") +
                      (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
-  head_ = *head;
-  if (static_cast<size_t>(head_.classes) != labels_.size()) {
-    const std::string count = std::to_string(labels_.size());
-    throw InputError((options_.labels.empty() ? name : options_.labels.string()) + ": " +
-                     (options_.labels.empty() ? "the graph scores " + std::to_string(head_.classes) +
-                                                    " classes, COCO has " + count + "; give a file with its labels"
-                                              : count + " labels for the " + std::to_string(head_.classes) +
-                                                    " classes of " + name + "; write one per class and line"));
+  layout_ = *layout;
+  const DetectorHead::Facts& facts = layout_.head->facts;
+  if (options_.labels.empty()) {
+    labels_ = facts.numbered_as_in_coco ? numbered_coco_labels() : coco_labels();
+    check_labels(name + ": the graph scores " + std::to_string(layout_.classes) + " classes, COCO has " +
+                 std::to_string(labels_.size()) + "; give a file with its labels");
+  } else {
+    check_labels(options_.labels.string() + ": " + std::to_string(labels_.size()) + " labels for the " +
+                 std::to_string(layout_.classes) + " classes of " + name + "; write one per class and line");
   }
-  movable_ = movable_classes(options_, labels_);
+  wanted_ = {movable_classes(options_, labels_), options_.min_score};
+}
+
+void OnnxDetector::check_labels(const std::string& error) const {
+  if (layout_.classes == 0) return;  // its outputs do not say how many there are
+  const auto classes = static_cast<size_t>(layout_.classes);
+  const bool may_lack_one = layout_.head->facts.numbered_as_in_coco && !options_.labels.empty();
+  if (labels_.size() != classes && !(may_lack_one && labels_.size() + 1 == classes)) throw InputError(error);
 }
 
 OnnxDetector::~OnnxDetector() = default;
@@ -193,19 +212,24 @@ int OnnxDetector::frames_per_detection(double frames_per_second) const {
 
 Detections OnnxDetector::detect(const DetectorInput& image) {
   if (image.grey.empty()) throw InputError("the detector was given an empty image");
+  const DetectorHead& head = *layout_.head;
   const Letterbox letterbox =
-      Letterbox::fit(head_.kind, image.grey.width, image.grey.height, input_width_, input_height_);
-  fill_blob(image, letterbox, head_.kind, &blob_);
+      Letterbox::place(head.facts.preprocessing.fit, image.grey.width, image.grey.height, input_width_, input_height_);
+  fill_blob(image, letterbox, head.facts.preprocessing, &blob_);
+  const std::vector<OnnxNetwork::Output> outputs = network_->forward(blob_, input_width_, input_height_);
+  if (recognise_head(outputs, input_width_, input_height_) != layout_)
+    throw InputError(options_.model.string() + ": puts out other sizes than it did at first (" + describe(outputs) +
+                     "); export it with outputs of fixed size");
+  std::vector<Prediction> predictions = head.decode(layout_, outputs, input_width_, input_height_, wanted_);
   Detections found;
-  for (const OnnxNetwork::Output& output : network_->forward(blob_, input_width_, input_height_)) {
-    if (recognise_head(output.dims, input_width_, input_height_) != head_) continue;
-    for (const Prediction& p :
-         suppress_overlaps(decode(head_, output.values, input_width_, input_height_, movable_, options_.min_score),
-                           options_.max_overlap)) {
-      const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
-      if (box.w > 0 && box.h > 0) found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});
-    }
-    break;
+  for (const Prediction& p :
+       suppress_overlaps(std::move(predictions), head.facts.one_box_an_object ? 1 : options_.max_overlap)) {
+    const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
+    if (!(box.w > 0 && box.h > 0)) continue;
+    found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});
+    if (!head.facts.masks) continue;
+    if (found.mask.empty()) found.mask = GreyImage(image.grey.width, image.grey.height, 0);
+    paint_mask(head.mask(layout_, outputs, p), letterbox, box, &found.mask);
   }
   return found;
 }

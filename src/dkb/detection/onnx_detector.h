@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dkb/detection/detection.h"
+#include "dkb/detection/detector_heads.h"
 #include "dkb/detection/onnx_network.h"
-#include "dkb/detection/yolo_heads.h"
 
 namespace dkb {
 
@@ -19,12 +19,12 @@ inline constexpr const char* kMovableClasses =
 
 struct OnnxOptions {
   std::filesystem::path model;            // ONNX file
-  std::filesystem::path labels;           // class names, one per line, in the graph's order; empty = the 80 of COCO
+  std::filesystem::path labels;           // class names, one per line, in the graph's order; empty = COCO's
   std::string classes = kMovableClasses;  // classes that may move, by comma
   // [px] longer side of the network's input, multiple of 32, <= 4096; the other side follows the images' shape. 0 = as
-  // the graph says, or where it leaves the size open 416 for YOLOX and 640 for others. Many graphs run at other sizes
-  // than they say; one that does not is an error.
-  // ONNX Runtime holds a graph to the size that it says.
+  // the graph says, or where it leaves the size open what is usual for its head: 640 for most, 416 for YOLOX. Many
+  // graphs run at other sizes than they say; one that does not is an error. ONNX Runtime holds a graph to the size that
+  // it says.
   int input_size = 0;
   float min_score = 0.25f;  // objectness x class score that a detection must reach, in (0, 1)
   float max_overlap =
@@ -33,10 +33,10 @@ struct OnnxOptions {
   void check() const;
 };
 
-// Detector `yolo`: an ONNX graph with a YOLOv5 (v7), YOLOX or YOLOv8 (v11) head, told apart by the shape of the output,
-// run on one core by ONNX Runtime or by OpenCV's DNN module: whichever it is, it is loaded with the first such detector
-// and costs nothing before. Note: with OpenCV it sets that library's process-wide thread count to 1 and silences its
-// log, so that runs are repeatable.
+// Detector `yolo`, alias `network`: an ONNX graph with one of detector_heads(), told by its outputs, whose masks go
+// along with its boxes. It is run on one core by ONNX Runtime or by OpenCV's DNN module: whichever it is, it is loaded
+// with the first such detector and costs nothing before. Note: with OpenCV it sets that library's process-wide thread
+// count to 1 and silences its log, so that runs are repeatable.
 class OnnxDetector final : public Detector {
  public:
   // `width` x `height` [px]: size of the images to come; a graph with open input size gets their shape. Throws
@@ -59,21 +59,25 @@ class OnnxDetector final : public Detector {
 
   int input_width() const { return input_width_; }    // [px] of the network
   int input_height() const { return input_height_; }  // [px]
-  YoloHead head() const { return head_.kind; }
+  const DetectorHead& head() const { return *layout_.head; }
   Inference inference() const { return network_->inference(); }  // never `automatic`
 
  private:
+  void check_labels(const std::string& error) const;
+
   OnnxOptions options_;
   size_t model_bytes_ = 0;
   int input_width_ = 0, input_height_ = 0;
-  HeadLayout head_;
+  HeadLayout layout_;
   std::vector<std::string> labels_;
-  std::vector<bool> movable_;  // per class
+  Wanted wanted_;
   std::unique_ptr<OnnxNetwork> network_;
   std::vector<float> blob_;
 };
 
-// The names of the 80 COCO classes in the order all YOLO families use.
+// The names of the 80 COCO classes in the order nearly all networks use; by COCO's own numbers, 0 ... 90, of which some
+// name nothing.
 std::vector<std::string> coco_labels();
+std::vector<std::string> numbered_coco_labels();
 
 }  // namespace dkb

@@ -10,6 +10,9 @@
 namespace dkb {
 namespace {
 
+constexpr int kInt64 = 7;  // TensorProto.DataType
+constexpr const char* kSizeInput = "orig_target_sizes";
+
 // One field of a protobuf message (protobuf encoding guide; groups, which ONNX never uses, are refused).
 struct Field {
   uint64_t number = 0;
@@ -132,9 +135,19 @@ OnnxInput read_onnx_input(std::string_view bytes, const std::string& name) {
   });
   if (!versioned || nodes == 0) wire.fail("it holds no graph");
   std::erase_if(inputs, [&](const OnnxInput& input) { return initialisers.count(input.name) != 0; });
+  const auto size = std::find_if(inputs.begin(), inputs.end(), [](const OnnxInput& input) {
+    return input.name == kSizeInput && input.element_type == kInt64;
+  });
+  std::string size_name;
+  if (size != inputs.end()) {
+    size_name = size->name;
+    inputs.erase(size);
+  }
   if (inputs.size() != 1)
     throw InputError(name + ": the graph has " + std::to_string(inputs.size()) +
-                     " inputs; a detector has one, the image; export the model as YOLOv5, YOLOv8 or YOLOX do");
+                     " inputs; a detector has one, the image, and perhaps " + kSizeInput +
+                     "; export the model as docs/models.md says");
+  inputs.front().size_name = std::move(size_name);
   return std::move(inputs.front());
 }
 

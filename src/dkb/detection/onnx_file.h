@@ -8,16 +8,19 @@
 
 namespace dkb {
 
-// What the detector must know of an ONNX graph before it runs: its one true input (initialisers are not inputs).
+// What the detector must know of an ONNX graph before it runs: the image that goes in (initialisers are no inputs).
 struct OnnxInput {
   std::string name;
-  int element_type = 0;       // ONNX TensorProto.DataType; 1 = float
-  std::vector<int64_t> dims;  // -1 = left open by the graph
+  int element_type = 0;         // ONNX TensorProto.DataType; 1 = float
+  std::vector<int64_t> dims{};  // -1 = left open by the graph
+  // A second input, by which RT-DETR and D-FINE are told the width and height that boxes shall refer to (1 x 2 integers
+  // of 64 bits); empty = none.
+  std::string size_name{};
 };
 
 // Reads an ONNX file's protobuf wire format, as far as the graph's inputs need it, and checks that every message on the
-// way is whole. Throws InputError naming the file when the bytes are truncated, are no ONNX model, or have no or
-// several inputs. Any bytes are safe.
+// way is whole. Throws InputError naming the file when the bytes are truncated, are no ONNX model, or have no or other
+// inputs. Any bytes are safe.
 OnnxInput read_onnx_input(std::string_view bytes, const std::string& name);
 
 }  // namespace dkb

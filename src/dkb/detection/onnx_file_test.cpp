@@ -33,6 +33,17 @@ TEST(OnnxFile, InitialisersAreNoInputs) {
   EXPECT_EQ(read_onnx_input(identity(graph), "m").name, "images");
 }
 
+TEST(OnnxFile, TheSizeThatBoxesReferToIsASecondInput) {
+  const std::string image = value_info(11, "images", {1, 3, 64, 64});
+  for (const std::string& graph : {image + value_info(11, "orig_target_sizes", {-1, 2}, 7),
+                                   value_info(11, "orig_target_sizes", {-1, 2}, 7) + image}) {
+    EXPECT_EQ(read_onnx_input(identity(graph), "m").name, "images");
+    EXPECT_EQ(read_onnx_input(identity(graph), "m").size_name, "orig_target_sizes");
+  }
+  EXPECT_EQ(read_onnx_input(identity(image), "m").size_name, "");
+  EXPECT_THROW(read_onnx_input(identity(image + value_info(11, "orig_target_sizes", {1, 2}, 1)), "m"), InputError);
+}
+
 TEST(OnnxFile, NoOrSeveralInputsAreRefused) {
   EXPECT_THROW(read_onnx_input(identity(""), "m"), InputError);
   EXPECT_THROW(read_onnx_input(identity(value_info(11, "a", {1}) + value_info(11, "b", {1})), "m"), InputError);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -63,19 +64,59 @@ inline std::string model(const std::string& graph) {
   return number(1, 7) + message(2, "test") + message(7, graph + message(2, "graph")) + message(8, number(2, 12));
 }
 
-// output[i] = bias[i] + sum over channels c of slope[c][i] * (mean of channel c), shaped 1 x rows x columns.
+// A tensor that a graph puts out: value[i] = bias[i] + sum over channels c of slope[c][i] * (mean of channel c).
+struct Put {
+  std::string name;
+  std::vector<int> dims;
+  std::vector<float> bias;
+  std::array<std::vector<float>, 3> slope{};  // empty = zeros
+  bool integers = false;
+
+  Put(const std::string& its_name, const std::vector<int>& its_dims) : name(its_name), dims(its_dims) {
+    size_t size = 1;
+    for (const int d : dims) size *= static_cast<size_t>(d);
+    bias.assign(size, 0.0f);
+    slope.fill(bias);
+  }
+  // The place of a value, and the value there.
+  size_t at(std::initializer_list<int> place) const {
+    size_t index = 0, axis = 0;
+    for (const int p : place) index = index * static_cast<size_t>(dims[axis++]) + static_cast<size_t>(p);
+    return index;
+  }
+  float& operator()(std::initializer_list<int> place) { return bias[at(place)]; }
+};
+
+// `more`: further nodes and inputs.
+inline std::string put_graph(int width, int height, const std::vector<Put>& outputs, const std::string& more = "") {
+  std::string nodes = node("GlobalAveragePool", {"images"}, "means") +
+                      node("Flatten", {"means"}, "flat", attribute("axis", int64_t{1}));
+  std::string tensors, infos;
+  for (const Put& put : outputs) {
+    const std::string& name = put.name;
+    std::vector<float> matrix;
+    for (size_t i = 0; i < put.bias.size(); ++i)
+      for (const std::vector<float>& of_channel : put.slope) matrix.push_back(of_channel[i]);
+    const auto size = static_cast<int64_t>(put.bias.size());
+    const std::vector<int64_t> dims(put.dims.begin(), put.dims.end());
+    nodes +=
+        node("Gemm", {"flat", name + "_slope", name + "_bias"}, name + "_values", attribute("transB", int64_t{1})) +
+        node("Reshape", {name + "_values", name + "_shape"}, put.integers ? name + "_floats" : name);
+    if (put.integers) nodes += node("Cast", {name + "_floats"}, name, attribute("to", int64_t{7}));
+    tensors += tensor(name + "_slope", {size, 3}, matrix) + tensor(name + "_bias", {size}, put.bias) +
+               tensor(name + "_shape", dims);
+    infos += value_info(12, name, dims, put.integers ? 7 : 1);
+  }
+  return model(nodes + tensors + value_info(11, "images", {1, 3, height, width}) + infos + more);
+}
+
+// One output of 1 x rows x columns.
 inline std::string mean_graph(int width, int height, int rows, int columns, const std::vector<float>& bias,
                               const std::array<std::vector<float>, 3>& slope) {
-  std::vector<float> matrix;
-  for (size_t i = 0; i < bias.size(); ++i)
-    for (const std::vector<float>& of_channel : slope) matrix.push_back(of_channel[i]);
-  const int64_t size = static_cast<int64_t>(rows) * columns;
-  return model(node("GlobalAveragePool", {"images"}, "means") +
-               node("Flatten", {"means"}, "flat", attribute("axis", int64_t{1})) +
-               node("Gemm", {"flat", "slope", "bias"}, "values", attribute("transB", int64_t{1})) +
-               node("Reshape", {"values", "shape"}, "output") + tensor("slope", {size, 3}, matrix) +
-               tensor("bias", {size}, bias) + tensor("shape", {1, rows, columns}) +
-               value_info(11, "images", {1, 3, height, width}) + value_info(12, "output", {1, rows, columns}));
+  Put put("output", {1, rows, columns});
+  put.bias = bias;
+  put.slope = slope;
+  return put_graph(width, height, {put});
 }
 
 // A YOLOX head of any input size whose cells of each stride all say the same: `cell` (5 + classes values) at stride 32,

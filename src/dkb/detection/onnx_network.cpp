@@ -25,7 +25,7 @@ Inference inference_named(const std::string& name) {
                    "; what computes a network: auto, onnxruntime, opencv");
 }
 
-std::unique_ptr<OnnxNetwork> open_network(Inference inference, std::string_view bytes, const std::string& input,
+std::unique_ptr<OnnxNetwork> open_network(Inference inference, std::string_view bytes, const OnnxInput& input,
                                           const std::string& name) {
   std::string reason;
   if (inference != Inference::opencv) {
@@ -36,7 +36,12 @@ std::unique_ptr<OnnxNetwork> open_network(Inference inference, std::string_view 
           name + ": ONNX Runtime cannot be used (" + reason +
           "); `make onnxruntime` fetches it, $DKB_ONNXRUNTIME names another, --inference opencv needs none");
   }
-  if (const DkbOnnxApi* api = load_opencv_module(&reason)) return open_opencv_network(*api, bytes, name);
+  if (const DkbOnnxApi* api = load_opencv_module(&reason)) {
+    if (!input.size_name.empty())
+      throw InputError(name + ": OpenCV cannot give the input " + input.size_name +
+                       "; get ONNX Runtime (`make onnxruntime`)");
+    return open_opencv_network(*api, bytes, name);
+  }
   throw InputError(
       name + ": this build cannot run ONNX models by OpenCV (" + reason +
       "); get ONNX Runtime (`make onnxruntime`), build with OpenCV's dnn module, or use --detector motion");

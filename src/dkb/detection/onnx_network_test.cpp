@@ -20,7 +20,7 @@ using namespace onnx_test;
 namespace fs = std::filesystem;
 
 std::unique_ptr<OnnxNetwork> open(Inference inference, const std::string& bytes) {
-  return open_network(inference, bytes, read_onnx_input(bytes, "m.onnx").name, "m.onnx");
+  return open_network(inference, bytes, read_onnx_input(bytes, "m.onnx"), "m.onnx");
 }
 
 // Values of 0 ... `largest`, the same in every run.
@@ -81,7 +81,7 @@ TEST_P(OnnxNetworkTest, WhatCannotBeReadIsNamedInOneLine) {
   for (const std::string& graph :
        {model(node("Frobnicate", {"images"}, "output") + tensors), std::string("no graph")}) {
     try {
-      open_network(GetParam(), graph, "images", "m.onnx");
+      open_network(GetParam(), graph, {"images"}, "m.onnx");
       ADD_FAILURE();
     } catch (const InputError& e) {
       EXPECT_EQ(std::string(e.what()).find("m.onnx: "), 0u) << e.what();

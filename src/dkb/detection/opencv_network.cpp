@@ -60,7 +60,7 @@ class OpenCvNetwork final : public OnnxNetwork {
       const DkbOnnxTensor& tensor = tensors[static_cast<size_t>(i)];
       size_t size = 1;
       for (int d = 0; d < tensor.rank; ++d) size *= static_cast<size_t>(tensor.dims[d]);
-      outputs.push_back({{tensor.dims, tensor.dims + tensor.rank}, {tensor.data, size}});
+      outputs.push_back({"", {tensor.dims, tensor.dims + tensor.rank}, {tensor.data, size}});
     }
     return outputs;
   }

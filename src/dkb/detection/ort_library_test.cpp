@@ -68,7 +68,7 @@ TEST(OrtLibrary, ThatIsNamedIsNeverPassedOver) {
   const std::string graph = onnx_test::mean_graph(32, 32, 1, 1, {0}, {std::vector{0.0f}, {0.0f}, {0.0f}});
   for (const Inference inference : {Inference::automatic, Inference::onnxruntime}) {
     try {
-      open_network(inference, graph, "images", "m.onnx");
+      open_network(inference, graph, {"images"}, "m.onnx");
       ADD_FAILURE() << to_string(inference);
     } catch (const InputError& e) {
       const std::string text = e.what();

@@ -14,7 +14,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kFatal = 4, kAllOptimisations = 99, kFloatType = 1;  // ONNX Runtime's and ONNX' numbers
+constexpr int kFatal = 4, kAllOptimisations = 99, kFloatType = 1, kInt64Type = 7;  // ONNX Runtime's and ONNX' numbers
 
 // An object of ONNX Runtime, with what gives it back.
 template <class T>
@@ -22,8 +22,8 @@ using Held = std::unique_ptr<T, void (*)(T*)>;
 
 class OrtNetwork final : public OnnxNetwork {
  public:
-  OrtNetwork(const OrtLibrary& library, std::string_view bytes, const std::string& input, const std::string& name)
-      : ort_(library), name_(name), input_(input) {
+  OrtNetwork(const OrtLibrary& library, std::string_view bytes, const OnnxInput& input, const std::string& name)
+      : ort_(library), name_(name), input_(input.name), size_input_(input.size_name) {
     const std::string what = "read the graph";
     const auto options = make(ort_.release_options, what, ort_.create_options);
     check(ort_.set_threads_within(options.get(), 1), what);
@@ -51,23 +51,26 @@ class OrtNetwork final : public OnnxNetwork {
 
   std::vector<Output> forward(const std::vector<float>& blob, int width, int height) override {
     const std::string what = "run the graph at " + std::to_string(width) + " x " + std::to_string(height) + " px";
-    const int64_t dims[] = {1, 3, height, width};
+    const int64_t dims[] = {1, 3, height, width}, size_dims[] = {1, 2};
     const auto image = make(ort_.release_value, what, ort_.create_tensor, memory_.get(),
                             static_cast<void*>(const_cast<float*>(blob.data())), blob.size() * sizeof(float), dims,
                             std::size(dims), kFloatType);
-    const char* input = input_.c_str();
-    const OrtValue* image_value = image.get();
+    int64_t size[] = {width, height};
+    const auto size_value = make(ort_.release_value, what, ort_.create_tensor, memory_.get(), static_cast<void*>(size),
+                                 sizeof size, size_dims, std::size(size_dims), kInt64Type);
+    const char* const inputs[] = {input_.c_str(), size_input_.c_str()};
+    const OrtValue* const input_values[] = {image.get(), size_value.get()};
     std::vector<const char*> names;
     for (const std::string& output : outputs_) names.push_back(output.c_str());
     std::vector<OrtValue*> values(names.size(), nullptr);
     values_.clear();
-    OrtStatus* status =
-        ort_.run(session_.get(), nullptr, &input, &image_value, 1, names.data(), names.size(), values.data());
-    for (OrtValue* value : values)
-      if (value != nullptr) values_.emplace_back(value, ort_.release_value);
+    OrtStatus* status = ort_.run(session_.get(), nullptr, inputs, input_values, size_input_.empty() ? 1 : 2,
+                                 names.data(), names.size(), values.data());
+    for (OrtValue* value : values) values_.emplace_back(value, ort_.release_value);
     check(status, what);
     std::vector<Output> outputs;
-    for (const Held<OrtValue>& value : values_) append_floats(value.get(), what, &outputs);
+    integers_.clear();
+    for (size_t i = 0; i < values_.size(); ++i) append_numbers(values_[i].get(), outputs_[i], what, &outputs);
     return outputs;
   }
 
@@ -92,13 +95,16 @@ class OrtNetwork final : public OnnxNetwork {
     return {made, release};
   }
 
-  void append_floats(OrtValue* value, const std::string& what, std::vector<Output>* outputs) const {
+  // Of a tensor of floats, or of integers as floats.
+  void append_numbers(OrtValue* value, const std::string& output, const std::string& what,
+                      std::vector<Output>* outputs) {
     int is_tensor = 0, type = 0;
+    if (value == nullptr) return;
     check(ort_.is_tensor(value, &is_tensor), what);
     if (is_tensor == 0) return;
     const auto shape = make(ort_.release_shape, what, ort_.shape_of, static_cast<const OrtValue*>(value));
     check(ort_.element_type(shape.get(), &type), what);
-    if (type != kFloatType) return;
+    if (type != kFloatType && type != kInt64Type) return;
     size_t rank = 0, size = 1;
     check(ort_.rank(shape.get(), &rank), what);
     std::vector<int64_t> dims(rank);
@@ -106,18 +112,25 @@ class OrtNetwork final : public OnnxNetwork {
     for (const int64_t d : dims) size *= static_cast<size_t>(d);
     void* data = nullptr;
     check(ort_.tensor_data(value, &data), what);
-    outputs->push_back({{dims.begin(), dims.end()}, {static_cast<const float*>(data), size}});
+    const float* floats = static_cast<const float*>(data);
+    if (type == kInt64Type) {
+      const auto* integers = static_cast<const int64_t*>(data);
+      integers_.emplace_back(integers, integers + size);
+      floats = integers_.back().data();
+    }
+    outputs->push_back({output, {dims.begin(), dims.end()}, {floats, size}});
   }
 
   const OrtLibrary ort_;
-  const std::string name_, input_;
+  const std::string name_, input_, size_input_;
   std::vector<std::string> outputs_;
   // In this order: what comes later uses what comes before.
   const Held<OrtEnvironment> environment_ =
       make(ort_.release_environment, "start", ort_.create_environment, kFatal, "dkb");
   const Held<OrtMemory> memory_ = make(ort_.release_memory, "start", ort_.create_cpu_memory, 0, 0);
   Held<OrtSession> session_{nullptr, ort_.release_session};
-  std::vector<Held<OrtValue>> values_;  // of the last image
+  std::vector<Held<OrtValue>> values_;        // of the last image
+  std::vector<std::vector<float>> integers_;  // those among them, as floats
 };
 
 // A part of a protobuf message that is shorter than 128 bytes.
@@ -146,7 +159,7 @@ std::string doubling_graph() {
 // What the library answers to the known graph proves the places of the functions. One that throws is told as `reason`.
 bool computes_rightly(const OrtLibrary& library, std::string* reason) {
   try {
-    OrtNetwork network(library, doubling_graph(), "x", library.name);
+    OrtNetwork network(library, doubling_graph(), {"x"}, library.name);
     const std::vector<OnnxNetwork::Output> outputs = network.forward({1, -2, 3, 0.5f, 0, 1e6f}, 1, 2);
     const std::vector<float> expected = {2, -4, 6, 1, 0, 2e6f};
     if (outputs.size() == 1 && outputs[0].dims == std::vector{1, 3, 2, 1} &&
@@ -167,8 +180,8 @@ std::optional<OrtLibrary> find_onnxruntime(std::string* reason) {
   return library;
 }
 
-std::unique_ptr<OnnxNetwork> open_ort_network(const OrtLibrary& library, std::string_view bytes,
-                                              const std::string& input, const std::string& name) {
+std::unique_ptr<OnnxNetwork> open_ort_network(const OrtLibrary& library, std::string_view bytes, const OnnxInput& input,
+                                              const std::string& name) {
   return std::make_unique<OrtNetwork>(library, bytes, input, name);
 }
 

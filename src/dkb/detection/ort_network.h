@@ -16,7 +16,7 @@ std::optional<OrtLibrary> find_onnxruntime(std::string* reason);
 
 // A network computed by ONNX Runtime, on the calling thread alone.
 // Throws InputError naming the file (`name`) when the graph cannot be read.
-std::unique_ptr<OnnxNetwork> open_ort_network(const OrtLibrary& library, std::string_view bytes,
-                                              const std::string& input, const std::string& name);
+std::unique_ptr<OnnxNetwork> open_ort_network(const OrtLibrary& library, std::string_view bytes, const OnnxInput& input,
+                                              const std::string& name);
 
 }  // namespace dkb

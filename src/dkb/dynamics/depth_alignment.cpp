@@ -18,6 +18,7 @@ constexpr double kTogether = 25;
 constexpr size_t kEnoughCells = 100;
 constexpr float kMoves = 0.3f;                            // score from which a cell is left out
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
+constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
 
 }  // namespace
@@ -41,20 +42,24 @@ Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const M
   return (place(x + k, y) - place(x - k, y)).cross(place(x, y + k) - place(x, y - k)).normalized();
 }
 
-Rigid3 DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
-                             const Rigid3& expected, double position_sd, double rotation_sd) {
+std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid& there,
+                                                 const MotionRays& rays, const MotionPrior& expected) {
   std::fill(asked_.data(), asked_.data() + asked_.size(), uint8_t{0});
-  const auto position_variance = static_cast<float>(position_sd * position_sd);
-  const auto rotation_variance = static_cast<float>(rotation_sd * rotation_sd);
-  Vector6d prior;
-  prior << Eigen::Vector3d::Constant(1 / (position_sd * position_sd)),
-      Eigen::Vector3d::Constant(1 / (rotation_sd * rotation_sd));
-  Rigid3 pose = expected;
+  const auto position_variance = static_cast<float>(expected.covariance.topLeftCorner<3, 3>().trace() / 3);
+  const auto rotation_variance = static_cast<float>(expected.covariance.bottomRightCorner<3, 3>().trace() / 3);
+  // Steps are taken in the axes of `there`, on the left of the pose.
+  const Matrix6d to_there = adjoint(expected.previous_from_current);
+  Matrix6d covariance = to_there * expected.covariance * to_there.transpose();
+  covariance.diagonal().array() += kExact * kExact;
+  const Matrix6d prior = covariance.inverse();
+  const Rigid3 here_from_there_expected = expected.previous_from_current.inverse();
+  Rigid3 pose = expected.previous_from_current;
+  Matrix6d information;
   double doubt = 1;  // share of the expectation's variance that the robust cost still allows for
   for (int iteration = 0; iteration < kIterations; ++iteration, doubt *= kDoubtLeft) {
     const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
     const Eigen::Vector3f translation = pose.translation.cast<float>();
-    Matrix6d information = Matrix6d::Zero();
+    information.setZero();
     Vector6d gradient = Vector6d::Zero();
     size_t cells = 0;
     for (int y = kStride / 2; y < rays.height(); y += kStride)
@@ -86,14 +91,15 @@ Rigid3 DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid&
         gradient += static_cast<double>(weight * distance) * row;
         ++cells;
       }
-    if (cells < kEnoughCells) return expected;
-    information.diagonal() += prior;
-    gradient += prior.cwiseProduct(tangent_from_rigid3(pose * expected.inverse()));
+    if (cells < kEnoughCells) return std::nullopt;
+    information += prior;
+    gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
     const Vector6d step = -information.ldlt().solve(gradient);
     pose = rigid3_from_tangent(step) * pose;
     if (step.head<3>().norm() < kSmallStep && step.tail<3>().norm() < kSmallTurn) break;
   }
-  return pose;
+  const Matrix6d to_here = adjoint(pose.inverse());
+  return MotionPrior{pose, false, to_here * information.inverse() * to_here.transpose()};
 }
 
 }  // namespace dkb

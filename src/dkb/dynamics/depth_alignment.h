@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb_slam/frame.h"
 
 namespace dkb {
 
@@ -13,10 +16,11 @@ class DepthAlignment {
  public:
   DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays);
 
-  // there_from_here of the two grids' cameras. `expected` may be off by `position_sd` [m] and `rotation_sd` [rad].
-  // Cells of `there` whose score says that they move are left out.
-  Rigid3 align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
-               const Rigid3& expected, double position_sd, double rotation_sd);
+  // The motion between the two grids' cameras, from `there` to `here`, with its covariance: what was expected and what
+  // the surfaces say, each weighed by its own. Cells of `there` whose score says that they move are left out. Nothing
+  // when too few surfaces are in both.
+  std::optional<MotionPrior> align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
+                                   const MotionPrior& expected);
 
  private:
   Eigen::Vector3f find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const;

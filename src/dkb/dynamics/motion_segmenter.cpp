@@ -101,7 +101,8 @@ Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
   return rigid3_from_tangent(offset / interval * tangent_from_rigid3(step));
 }
 
-void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
+void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
+                              const Matrix6d& step_covariance) {
   if (image.depth.width() != camera_.width || image.depth.height() != camera_.height)
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
                      std::to_string(image.depth.height()) + ", the camera " + std::to_string(camera_.width) + " x " +
@@ -112,7 +113,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->time = image.depth_timestamp;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
-  find_pose();
+  find_pose(step_covariance);
   choose_views();
   frames_ = std::min(frames_ + 1, kLongRun);
   // Some cells through all steps before the next: what they read and write stays in the nearest cache.
@@ -130,26 +131,24 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   update_scores();
 }
 
-MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected) {
-  observe(image, cam_from_world_expected);
+MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected,
+                                   const Matrix6d& step_covariance) {
+  observe(image, cam_from_world_expected, step_covariance);
   return mask();
 }
 
 // The velocity does not last: what a hand changes it by between slow frames is more than the comparison forgives. The
 // surfaces of the frame before tell where the camera is.
-void MotionSegmenter::find_pose() {
-  constexpr double kAcceleration = 1.0;         // [m/s^2] standard deviation
-  constexpr double kAngularAcceleration = 3.0;  // [rad/s^2]
-  aligned_ = false;
-  if (!previous_) return;
-  const double interval = current_->time - previous_->time;
-  if (!(interval > 0)) return;
-  const double half_square = 0.5 * interval * interval;
-  const Rigid3 expected = previous_->cam_from_world * current_->cam_from_world.inverse();
-  const Rigid3 found = alignment_.align(*current_, *previous_, rays_, expected, kAcceleration * half_square,
-                                        kAngularAcceleration * half_square);
-  current_->cam_from_world = found.inverse() * previous_->cam_from_world;
-  aligned_ = true;
+void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
+  aligned_step_.reset();
+  if (!previous_ || !(current_->time > previous_->time)) return;
+  aligned_step_ =
+      alignment_.align(*current_, *previous_, rays_,
+                       {previous_->cam_from_world * current_->cam_from_world.inverse(), false, step_covariance});
+  if (!aligned_step_) return;
+  current_->cam_from_world = aligned_step_->previous_from_current.inverse() * previous_->cam_from_world;
+  const Rigid3 cam_from_world = depth_from_colour_.inverse() * current_->cam_from_world;
+  aligned_step_->previous_from_current = last_->cam_from_world * cam_from_world.inverse();
 }
 
 // Not all views speak in each frame: they take turns.

@@ -11,6 +11,7 @@
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/geometry/camera.h"
+#include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/rgbd_image.h"
@@ -38,14 +39,15 @@ class MotionSegmenter {
 
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
-  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected);
+  // `step_covariance`: how far the motion since the frame before may be from what is expected (as MotionPrior's).
+  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected,
+                    const Matrix6d& step_covariance = kFrameStepCovariance);
   // The same for those who want score() alone.
-  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected);
-  // Pose of the image last given, not committed yet, as its depth shows it beside what was expected; nothing when there
-  // was no view to hold it against.
-  std::optional<Rigid3> aligned_pose() const {
-    return aligned_ ? std::optional(depth_from_colour_.inverse() * current_->cam_from_world) : std::nullopt;
-  }
+  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
+               const Matrix6d& step_covariance = kFrameStepCovariance);
+  // The colour camera's motion since the frame committed last as depth shows it beside what was expected, of the image
+  // last given; nothing when there was no view to hold it against.
+  const std::optional<MotionPrior>& aligned_step() const { return aligned_step_; }
   // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
   void commit(const std::optional<Rigid3>& cam_from_world);
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
@@ -56,6 +58,10 @@ class MotionSegmenter {
   const Image<float>& score() const { return current_ ? current_->score : previous_ ? previous_->score : nothing_; }
 
  private:
+  // Of a camera whose velocity was known a thirtieth of a second ago.
+  inline static const Matrix6d kFrameStepCovariance =
+      axis_covariance(kAccelerationSd / (30 * 30), kAngularAccelerationSd / (30 * 30));
+
   struct Stamped {
     double time = 0;
     Rigid3 cam_from_world;
@@ -68,7 +74,7 @@ class MotionSegmenter {
   };
 
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
-  void find_pose();
+  void find_pose(const Matrix6d& step_covariance);
   void choose_views();
   void find_tolerances(CellRange block);
   void carry_scores(CellRange block);
@@ -95,7 +101,7 @@ class MotionSegmenter {
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
-  bool aligned_ = false;
+  std::optional<MotionPrior> aligned_step_;
   size_t turn_ = 0;
   int frames_ = 0;
   MotionProjection projection_;

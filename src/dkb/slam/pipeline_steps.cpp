@@ -130,8 +130,8 @@ Expectation Pipeline::expect(const Frame& frame) const {
   Expectation expected;
   const auto& last = tracker_.last_frame();
   if (!last) return expected;
-  expected.current_from_previous = tracker_.expected_motion(frame.image()->timestamp - last->timestamp);
-  expected.cam_from_world = expected.current_from_previous * last->cam_from_world;
+  expected.step = tracker_.expected_step(frame.image()->timestamp, frame.prior() ? &*frame.prior() : nullptr);
+  expected.cam_from_world = expected.current_from_previous() * last->cam_from_world;
   const Map& map = tracker_.map().view();
   const auto keyframes = map.live_keyframes();
   const size_t count = std::min(keyframes.size(), static_cast<size_t>(scenes_.keyframes_looked_at()));
@@ -175,7 +175,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .features = features,
                                          .appearance = &appearance,
                                          .prior = frame.prior() ? &*frame.prior() : nullptr,
-                                         .expected = scene.cam_from_world ? &*scene.cam_from_world : nullptr,
+                                         .step = scene.step ? &*scene.step : nullptr,
                                          .may_start_map = !localize_only_});
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
@@ -284,12 +284,16 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.state = tracked.state;
   result.detections = scene.boxes;
   result.mask = scene.mask;
+  FrameOutcome outcome;
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
+    outcome.cam_from_world = tracked.cam_from_world;
     // Where the images tell the pose again, the step is the prior's: what it was off by is the map's business.
     const bool seen_again = last_state_ == TrackingState::predicted && tracked.tracked();
-    if (seen_again && tracked.predicted_cam_from_world)
-      odometry_.update(tracked.predicted_cam_from_world->inverse(), false);
+    if (seen_again && tracked.predicted) {
+      odometry_.update(tracked.predicted->cam_from_world.inverse(), false);
+      outcome.found_world_from_guessed = world_from_cam * tracked.predicted->cam_from_world;
+    }
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
@@ -318,8 +322,9 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   crowded_share_ =
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
-  outcome_ =
-      FrameOutcome{tracked.tracked() ? std::optional(tracked.cam_from_world) : std::nullopt, decision.insert, {}};
+  outcome.keyframe = decision.insert;
+  if(getenv("DKBDBG")){ Vector6d d=Vector6d::Zero(); Vector6d sd=d; if(scene.step){d=tangent_from_rigid3(scene.step->previous_from_current); sd=scene.step->covariance.diagonal().cwiseSqrt();} fprintf(stderr,"%d %d %d %.9f  %g %g %g %g %g %g  %g %g %g %g %g %g kf%d n%zu\n",int(tracked.index),int(tracked.state),tracked.inliers,frame.stamp_ns()*1e-9,d[0],d[1],d[2],d[3],d[4],d[5],sd[0],sd[1],sd[2],sd[3],sd[4],sd[5],int(decision.insert),scene.extracted.orb.corners.size());}
+  outcome_ = outcome;
   last_state_ = tracked.state;
   collect_times();
   ++next_frame_;
@@ -331,7 +336,7 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
   // Where a prior tells how the camera came there, the old map goes on.
-  if (tracked.starts_map && !tracked.predicted_cam_from_world) note(Event::Kind::new_map);
+  if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));

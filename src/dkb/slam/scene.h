@@ -26,10 +26,10 @@ struct Scene {
   ExtractedFrame extracted;
   // Per corner: why it must not make map points, if so. Here and nowhere else a feature is rejected because of movers.
   std::vector<FeatureReason> rejected;
-  std::vector<Detection> boxes;          // in this image
-  std::optional<Rigid3> cam_from_world;  // as depth shows it beside what was expected; nothing without a view before
-  MoverMask mask;                        // where movers are (default filter only)
-  std::vector<LateMask> late_masks;      // where they were in earlier keyframes, as detections have shown since
+  std::vector<Detection> boxes;      // in this image
+  std::optional<MotionPrior> step;   // since the frame before: by depth beside what was expected, else a prior's
+  MoverMask mask;                    // where movers are (default filter only)
+  std::vector<LateMask> late_masks;  // where they were in earlier keyframes, as detections have shown since
 };
 
 // The corners that tracking may see. Those that a rival filter rejected are gone for good. Those on movers stay,

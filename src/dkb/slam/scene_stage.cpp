@@ -50,7 +50,10 @@ std::vector<DueDetections> SceneStage::exchange(FrameIndex index, const Frame& f
 }
 
 void SceneStage::learn(const FrameOutcome& before) {
-  if (motion_) motion_->commit(before.cam_from_world);
+  if (motion_) {
+    motion_->move_world(before.found_world_from_guessed);
+    motion_->commit(before.cam_from_world);
+  }
   if (before.keyframe && !past_.empty()) {
     past_.back().keyframe = true;
     if (motion_) past_.back().still_score = motion_->score();
@@ -85,9 +88,9 @@ Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   const Stopwatch watch;
   Segmentation made;
   if (segments_motion_)
-    made.mask = motion_->segment(*task.frame.image(), task.cam_from_world_expected);
+    made.mask = motion_->segment(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
   else
-    motion_->observe(*task.frame.image(), task.cam_from_world_expected);
+    motion_->observe(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
   made.ms = watch.ms();
   return made;
 }
@@ -97,7 +100,8 @@ void SceneStage::begin(FrameIndex index, const Frame& frame, const Expectation& 
   // What is left of a frame that failed in between belongs to nobody.
   while (segmenting_ && segmenting_->outstanding() > 0) segmenting_->take_due(index, true);
   if (before) learn(*before);
-  if (segmenting_) segmenting_->push({frame, expected.cam_from_world}, index);
+  const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
+  if (segmenting_) segmenting_->push({frame, expected.cam_from_world, covariance}, index);
 }
 
 MoverMask SceneStage::take_motion(FrameIndex index, std::vector<Detection>& boxes) {
@@ -137,6 +141,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   Scene scene;
   scene.rejected.assign(frame.orb.corners.size(), FeatureReason::none);
   scene.extracted = std::move(frame);
+  if (scene.extracted.frame.prior()) scene.step = expected.step;
   if (options_.filter == FilterKind::none) return scene;
   const RgbdImage& image = scene.extracted.image();
 
@@ -159,14 +164,14 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
   const MoverMask moving = take_motion(scene.extracted.index, scene.boxes);
-  if (motion_) scene.cam_from_world = motion_->aligned_pose();
+  if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
 
   watch = Stopwatch();
   const auto& corners = scene.extracted.orb.corners;
   if (rival_) {
     const auto dynamic =
         rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes, past_.empty() ? nullptr : &past_.back(),
-                         pyramid.get(), expected.current_from_previous, expected.keyframe_points_in_camera});
+                         pyramid.get(), expected.current_from_previous(), expected.keyframe_points_in_camera});
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {

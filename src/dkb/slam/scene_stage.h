@@ -25,8 +25,11 @@ struct DynamicsOptions {
 
 // What tracking knows before it looks at a frame.
 struct Expectation {
-  Rigid3 current_from_previous, cam_from_world;
+  Rigid3 cam_from_world;
+  std::optional<MotionPrior> step;                         // since the frame before; nothing without one
   std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes
+
+  Rigid3 current_from_previous() const { return step ? step->previous_from_current.inverse() : Rigid3(); }
 };
 
 // Of one frame.
@@ -37,11 +40,13 @@ struct Segmentation {
 struct SegmentationTask {
   Frame frame;
   Rigid3 cam_from_world_expected;
+  Matrix6d step_covariance;
 };
 
 // What became of the frame before: what the stage learns by it.
 struct FrameOutcome {
   std::optional<Rigid3> cam_from_world;  // in the world of that time; nothing when lost
+  Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
   Rigid3 new_world_from_old;  // how the map was corrected since
 };

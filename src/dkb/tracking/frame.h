@@ -19,14 +19,23 @@ struct OdometryMatch {
   bool guessed = false;            // at the depth of its surroundings
 };
 
+// Where the camera is by what is not in the images.
+struct PosePrediction {
+  Rigid3 cam_from_world;
+  Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
+
+  // Whether a pose by the images may be the same one.
+  bool agrees(const Rigid3& found_cam_from_world) const;
+};
+
 // A frame with its pose, as tracking leaves it. The pose hangs on a keyframe, since the world may move under the
 // tracker.
 struct TrackedFrame {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
   TrackingState state = TrackingState::initialising;
-  bool starts_map = false;                         // it wants to be a map's first keyframe
-  std::optional<Rigid3> predicted_cam_from_world;  // by a motion prior
+  bool starts_map = false;                  // it wants to be a map's first keyframe
+  std::optional<PosePrediction> predicted;  // by the step from the frame before
   // What follows holds when tracking or relocalised; of a predicted frame the reference and the pose.
   std::shared_ptr<const RgbdFeatures> features;
   std::vector<FeatureMotion> motion;  // per feature
@@ -53,8 +62,8 @@ struct TrackingInput {
   const FrameFeatures& features;
   PointAppearance* appearance =
       nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
-  const MotionPrior* prior = nullptr;  // may be null
-  const Rigid3* expected = nullptr;    // cam_from_world as depth shows it; may be null
+  const MotionPrior* prior = nullptr;  // by something beside the camera; may be null
+  const MotionPrior* step = nullptr;   // the same motion as the surfaces in view show it as well; may be null
   bool may_start_map = true;           // else a frame that finds no map stays without a pose
 };
 

@@ -16,6 +16,7 @@ constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0
 constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
 constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth
 constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, which is exact by definition
+constexpr double kGoOnAfter = 0.1;           // [s] without a pose by the images: more than a blurred one or two
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
 // A place farther from where the camera was lost than this is one that it cannot have come to ...
@@ -100,8 +101,13 @@ int Tracker::reference_point_count(KeyframeId reference, int observers) const {
   return count;
 }
 
-void Tracker::reset_motion() {
+void Tracker::forget_velocity() {
   velocity_.reset();
+  filter_ = {};
+}
+
+void Tracker::reset_motion() {
+  forget_velocity();
   last_.reset();
   odometry_.clear();
   state_ = map_.view().keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
@@ -111,8 +117,8 @@ Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match) co
   return {feature, match.point_in_world, kOdometryFactor * (match.guessed ? kGuessFactor : 1.0), !match.guessed};
 }
 
-PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs,
-                             const RgbdFeatures& features) const {
+PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
+                             const std::optional<PosePrediction>& expected) const {
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
@@ -123,7 +129,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
-  return optimise_pose(camera_, initial, observations);
+  if (!expected) return optimise_pose(camera_, initial, observations);
+  const PosePrior prior{expected->cam_from_world, expected->covariance.inverse()};
+  return optimise_pose(camera_, initial, observations, {}, &prior);
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {
@@ -217,7 +225,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       pairs.push_back(odometry_pair(m.feature, {others[c].position, odometry_.guessed(c)}));
     }
   }
-  const PoseEstimate pose = refine(initial, pairs, features);
+  const PoseEstimate pose = refine(initial, pairs, features, frame.predicted);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
   if (inliers < min_inliers) return false;
@@ -299,7 +307,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
     }
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (frame.odometry[f]) pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
-  const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features);
+  const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
   if (!pose.ok) return;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
   if (inliers < options_.min_inliers) return;
@@ -361,7 +369,10 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   if (with_depth < options_.initial_points) return false;
   if (state_ != TrackingState::initialising) {
     if (!lost_since_) lost_since_ = frame.timestamp;
-    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < options_.new_map_after) return false;
+    // Where the camera is known so well that the map's points would have been found, there are none.
+    const bool known = expected != nullptr && search_radius(0) < kMaxSearchRadius;
+    const double wait = known ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
+    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
   }
   frame.inliers = with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : start_;
@@ -374,7 +385,7 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   }
   drop_unmatched_suspects(frame);
   candidates_made_.reset();
-  velocity_.reset();
+  if (expected == nullptr) forget_velocity();
   return true;
 }
 
@@ -391,8 +402,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.odometry.assign(n, std::nullopt);
 
   const bool has_map = state_ != TrackingState::initialising;
-  const auto predicted = predict(frame.index, frame.timestamp, input.prior);
-  if (predicted) frame.predicted_cam_from_world = predicted->cam_from_world;
+  const auto predicted = frame.predicted = predict(input);
   const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
   bool followed = has_map && track_from_last(frame, input);
   bool found_again = has_map && !followed && confirm_relocalisation(frame, input);
@@ -408,7 +418,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
       frame.outlier.assign(frame.outlier.size(), 0);
       frame.odometry.assign(frame.odometry.size(), std::nullopt);
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
-      go_on_unseen(predicted, frame);
+      go_on_unseen(predicted, input, frame);
       return frame;
     }
   }
@@ -416,7 +426,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     odometry_.clear();
     frame.starts_map = input.may_start_map && start_map(frame, predicted ? &*predicted : nullptr);
     if (!frame.starts_map) {
-      go_on_unseen(predicted, frame);
+      go_on_unseen(predicted, input, frame);
       return frame;
     }
     frame.state = state_ = TrackingState::tracking;
@@ -430,7 +440,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   lost_since_.reset();
   unconfirmed_.reset();
   if (!last_ || frame.timestamp <= last_->timestamp) {
-    velocity_.reset();
+    forget_velocity();
   } else {
     // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
     // now. The full half would carry the noise of both steps into every feature.
@@ -440,6 +450,9 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     const Vector6d before = velocity_.value_or(step);
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
     velocity_ = seen_before ? velocity_to(frame) : step;
+    const double seconds = frame.timestamp - last_->timestamp;
+    if (seen_before)
+      filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);
   }
   drop_unmatched_suspects(frame);
   finish(frame);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dkb/geometry/camera.h"
+#include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
@@ -35,15 +36,6 @@ struct PointInView {
   double depth = 0;       // [m]
 };
 
-// Where the camera is by what is not in the images.
-struct PosePrediction {
-  Rigid3 cam_from_world;
-  Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
-
-  // Whether a pose by the images may be the same one.
-  bool agrees(const Rigid3& found_cam_from_world) const;
-};
-
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.
 // Deterministic: the same frames and views in the same order give the same poses.
 class Tracker {
@@ -58,6 +50,9 @@ class Tracker {
 
   // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
   Rigid3 expected_motion(double seconds) const;
+  // Motion from the last frame to one at `timestamp`: what `prior` tells, and for what it does not tell the velocity.
+  // Nothing without a last frame.
+  std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
   Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
 
@@ -89,6 +84,7 @@ class Tracker {
 
  private:
   static constexpr int kMatchDistance = 90;       // [bits] largest Hamming distance of a match with a map point
+  static constexpr double kMaxSearchRadius = 60;  // [px] beyond, nearly everything is a candidate of everything
   static constexpr double kRadiusLocalMap = 4.0;  // [px] search for local map points under the first pose
 
   struct Pair {
@@ -98,16 +94,18 @@ class Tracker {
     bool use_depth = true;
   };
   Pair odometry_pair(int feature, const OdometryMatch& match) const;
-  PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features) const;
+  PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
+                      const std::optional<PosePrediction>& expected = {}) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                          std::vector<PointId>& points) const;
   std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;
   std::vector<Rigid3> expected_poses(double dt, const TrackingInput& input) const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
-  std::optional<PosePrediction> predict(FrameIndex index, double timestamp, const MotionPrior* prior) const;
-  void go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame);
-  void go_on_by(const PosePrediction& prediction, TrackedFrame& frame);
+  std::optional<PosePrediction> predict(const TrackingInput& input) const;
+  void go_on_unseen(const std::optional<PosePrediction>& prediction, const TrackingInput& input, TrackedFrame& frame);
+  void go_on_by(const PosePrediction& prediction, const Matrix6d& step_covariance, TrackedFrame& frame);
+  void forget_velocity();
   double search_radius(double radius) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features,
                                         PointAppearance* appearance) const;
@@ -148,6 +146,7 @@ class Tracker {
   OdometryPoints odometry_;                  // from the last frame
   std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
   std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
+  VelocityFilter filter_;                    // of the same, with its covariance
   double last_seen_ = 0;                     // [s] when the images told the pose last
   std::optional<PosePrediction> suggested_;  // by the user
   std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map

@@ -8,10 +8,9 @@
 namespace dkb {
 namespace {
 
-// Without a prior for the translation the velocity is taken to last. What a hand or a robot accelerates by makes the
-// place uncertain, and beyond this nobody knows it.
-constexpr double kAcceleration = 1.0;         // [m/s^2] standard deviation
-constexpr double kMaxGuessedPosition = 0.25;  // [m] standard deviation
+// Standard deviations of a place that nothing but the camera tells, beyond which nobody knows it.
+constexpr double kMaxGuessedPosition = 0.25;  // [m]
+constexpr double kMaxGuessedRotation = 0.25;  // [rad]
 
 constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
 // What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
@@ -22,30 +21,31 @@ constexpr size_t kKeyframesNearby = 3;    // that an expected pose is sought fro
 constexpr double kMaxViewDistance = 3.0;  // [m] between cameras that may show the same ...
 constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: about the field of view
 
-double guessed_position_sd(double seconds) {
-  return 0.5 * kAcceleration * seconds * seconds;
-}
-
 }  // namespace
 
-std::optional<PosePrediction> Tracker::predict(FrameIndex index, double timestamp, const MotionPrior* prior) const {
-  if (prior == nullptr || !last_ || last_->index + 1 != index || state_ == TrackingState::lost) return std::nullopt;
-  if (timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
-  MotionPrior step = *prior;
-  if (step.rotation_only) {
-    if (!velocity_) return std::nullopt;
-    const double sd = guessed_position_sd(timestamp - last_seen_);
-    if (sd > kMaxGuessedPosition) return std::nullopt;
-    const double before = guessed_position_sd(last_->timestamp - last_seen_);
-    step.previous_from_current.translation = expected_motion(timestamp - last_->timestamp).inverse().translation;
-    step.covariance.topRows<3>().setZero();
-    step.covariance.leftCols<3>().setZero();
-    step.covariance.topLeftCorner<3, 3>().diagonal().setConstant(sd * sd - before * before);
-    step.rotation_only = false;
-  }
-  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, step);
+std::optional<MotionPrior> Tracker::expected_step(double timestamp, const MotionPrior* prior) const {
+  if (!last_ || timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
+  if (prior != nullptr && !prior->rotation_only) return *prior;
+  MotionPrior step;
+  const double seconds = timestamp - last_->timestamp;
+  step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
+  step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  if (prior == nullptr) return step;
+  step.previous_from_current.rotation = prior->previous_from_current.rotation;
+  step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
+  return step;
+}
+
+std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
+  if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
+    return std::nullopt;
+  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
+  const bool told = input.prior != nullptr && !input.prior->rotation_only;
+  const Vector6d variance = whole.covariance.diagonal();
+  const bool known = velocity_ && variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
+                     variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
   const Rigid3 cam_from_world = whole.previous_from_current.inverse();
-  if (!plausible_motion(cam_from_world, timestamp)) return std::nullopt;
+  if (!(told || known) || !plausible_motion(cam_from_world, input.timestamp)) return std::nullopt;
   return PosePrediction{cam_from_world, whole.covariance};
 }
 
@@ -59,7 +59,7 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
 }
 
 // The frame has no pose by its images: the prior's stands in, and the next frame goes on from it.
-void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
+void Tracker::go_on_by(const PosePrediction& prediction, const Matrix6d& step_covariance, TrackedFrame& frame) {
   frame.state = state_ = TrackingState::predicted;
   frame.cam_from_world = prediction.cam_from_world;
   frame.covariance = prediction.covariance;
@@ -67,6 +67,8 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
   velocity_ = velocity_to(frame);
+  const double seconds = frame.timestamp - last_->timestamp;
+  filter_.set(*velocity_, step_covariance / (seconds * seconds));
   // What was seen last is still what the camera may see next.
   last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;
@@ -77,9 +79,10 @@ void Tracker::go_on_by(const PosePrediction& prediction, TrackedFrame& frame) {
   last_->state = frame.state;
 }
 
-void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, TrackedFrame& frame) {
-  if (prediction) return go_on_by(*prediction, frame);
-  velocity_.reset();
+void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, const TrackingInput& input,
+                           TrackedFrame& frame) {
+  if (prediction) return go_on_by(*prediction, input.step->covariance, frame);
+  forget_velocity();
   if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
   frame.state = state_;
 }
@@ -88,10 +91,9 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, Trac
 // nearer than most.
 double Tracker::search_radius(double radius) const {
   if (!last_ || last_->state != TrackingState::predicted) return radius;
-  constexpr double kMaxRadius = 60;  // [px] beyond, nearly everything is a candidate of everything
   const auto sd = last_->covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const double pixels = camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
-  return std::min(kMaxRadius, radius + 3 * pixels);
+  return std::min(kMaxSearchRadius, radius + 3 * pixels);
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.

@@ -74,16 +74,10 @@ std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::
   return found->cam_from_world;
 }
 
-// Where the camera is expected: by the prior where there is one, else by the motion so far.
+// Where the camera is expected: by what is known of the step where there is anything, else by the motion so far.
 std::vector<Rigid3> Tracker::expected_poses(double dt, const TrackingInput& input) const {
-  const MotionPrior* prior = input.prior;
   std::vector<Rigid3> steps;
-  if (prior != nullptr) {
-    Rigid3 step = prior->previous_from_current.inverse();
-    if (prior->rotation_only) step.translation = expected_motion(dt).translation;
-    steps.push_back(step);
-  }
-  if (input.expected != nullptr) steps.push_back(*input.expected * last_->cam_from_world.inverse());
+  if (input.step != nullptr) steps.push_back(input.step->previous_from_current.inverse());
   if (velocity_) steps.push_back(expected_motion(dt));
   for (Rigid3& step : steps) step = step * last_->cam_from_world;
   return steps;
