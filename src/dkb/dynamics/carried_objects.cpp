@@ -24,6 +24,11 @@ void box_regions(Detections& detections) {
 
 void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
   constexpr float kStill = -0.3f;  // the score runs from -1 to 3
+  if (mask.cell == score_cell && mask.cells.width() == score.width() && mask.cells.height() == score.height()) {
+    for (size_t i = 0; i < mask.cells.size(); ++i)
+      mask.cells.data()[i] = score.data()[i] < kStill ? 0 : mask.cells.data()[i];
+    return;
+  }
   for (int y = 0; y < mask.cells.height(); ++y)
     for (int x = 0; x < mask.cells.width(); ++x) {
       const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;

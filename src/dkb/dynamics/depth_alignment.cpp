@@ -24,28 +24,27 @@ constexpr double kDoubtLeft = 0.25;                       // of the variance, by
 }  // namespace
 
 DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays)
-    : noise_(noise), focal_(focal), normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()) {}
+    : noise_(noise),
+      focal_(focal),
+      normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()),
+      asked_(rays.width(), rays.height()) {}
 
-void DepthAlignment::find_normals(const MotionDepthGrid& grid, const MotionRays& rays) {
-  const Image<float>& depth = grid.depth;
-  const auto place = [&](int x, int y) -> Eigen::Vector3f { return depth(x, y) * rays.ray(x, y); };
+Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const {
   constexpr int k = kReach;
-  for (int y = k; y + k < rays.height(); ++y)
-    for (int x = k; x + k < rays.width(); ++x) {
-      Eigen::Vector3f& normal = normals_(x, y);
-      normal.setZero();
-      const float z = depth(x, y);
-      if (!(z > 0) || grid.score(x, y) >= kMoves) continue;
-      const auto& [least, most] = std::minmax({depth(x - k, y), depth(x + k, y), depth(x, y - k), depth(x, y + k)});
-      const auto jump = static_cast<float>(noise_.max_depth_jump(z, k * rays.cell(), focal_));
-      if (!(least > 0) || z - least > jump || most - z > jump) continue;
-      normal = (place(x + k, y) - place(x - k, y)).cross(place(x, y + k) - place(x, y - k)).normalized();
-    }
+  const Image<float>& depth = grid.depth;
+  if (x < k || y < k || x + k >= rays.width() || y + k >= rays.height()) return Eigen::Vector3f::Zero();
+  const float z = depth(x, y);
+  if (!(z > 0) || grid.score(x, y) >= kMoves) return Eigen::Vector3f::Zero();
+  const auto& [least, most] = std::minmax({depth(x - k, y), depth(x + k, y), depth(x, y - k), depth(x, y + k)});
+  const auto jump = static_cast<float>(noise_.max_depth_jump(z, k * rays.cell(), focal_));
+  if (!(least > 0) || z - least > jump || most - z > jump) return Eigen::Vector3f::Zero();
+  const auto place = [&](int u, int v) -> Eigen::Vector3f { return depth(u, v) * rays.ray(u, v); };
+  return (place(x + k, y) - place(x - k, y)).cross(place(x, y + k) - place(x, y - k)).normalized();
 }
 
 std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid& there,
                                                  const MotionRays& rays, const MotionPrior& expected) {
-  find_normals(there, rays);
+  std::fill(asked_.data(), asked_.data() + asked_.size(), uint8_t{0});
   const auto position_variance = static_cast<float>(expected.covariance.topLeftCorner<3, 3>().trace() / 3);
   const auto rotation_variance = static_cast<float>(expected.covariance.bottomRightCorner<3, 3>().trace() / 3);
   // Steps are taken in the axes of `there`, on the left of the pose.
@@ -70,7 +69,11 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
         const Eigen::Vector3f point = rotation * (depth * rays.ray(x, y)) + translation;
         int u = 0, v = 0;
         if (!rays.find_cell(point, &u, &v)) continue;
-        const Eigen::Vector3f& normal = normals_(u, v);
+        Eigen::Vector3f& normal = normals_(u, v);
+        if (asked_(u, v) == 0) {
+          normal = find_normal(there, rays, u, v);
+          asked_(u, v) = 1;
+        }
         if (normal.isZero()) continue;
         const float z = there.depth(u, v);
         const float distance = normal.dot(point - z * rays.ray(u, v));

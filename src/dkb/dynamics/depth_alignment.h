@@ -23,11 +23,12 @@ class DepthAlignment {
                                    const MotionPrior& expected);
 
  private:
-  void find_normals(const MotionDepthGrid& grid, const MotionRays& rays);
+  Eigen::Vector3f find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const;
 
   SensorNoise noise_;
   double focal_;                    // [px]
-  Image<Eigen::Vector3f> normals_;  // of the cells of `there`; zero where there is none
+  Image<Eigen::Vector3f> normals_;  // of the cells of `there` that were asked for; zero where there is none
+  Image<uint8_t> asked_;            // 1 where it was
 };
 
 }  // namespace dkb

@@ -5,6 +5,8 @@
 #include <array>
 #include <limits>
 
+#include "dkb/features/vectorised.h"
+
 namespace dkb {
 namespace {
 
@@ -15,23 +17,42 @@ void resize(Image<float>& image, int width, int height) {
   if (image.width() != width || image.height() != height) image = Image<float>(width, height);
 }
 
-// Minimum (or maximum) over each value and its two neighbours in the row, then over the three rows.
+// Minimum (or maximum) over each value and its two neighbours in the column, then over three columns. `column` has room
+// for a row and one more value at both ends.
 template <class Pick>
-void spread(const Image<float>& source, Image<float>& target, Pick pick) {
+DKB_KERNEL_BODY inline void spread(const Image<float>& source, float* column, Image<float>& target, Pick pick) {
   const int width = source.width(), height = source.height();
   for (int y = 0; y < height; ++y) {
     const float* a = source.row(std::max(0, y - 1));
     const float* b = source.row(y);
     const float* c = source.row(std::min(height - 1, y + 1));
     float* out = target.row(y);
-    for (int x = 0; x < width; ++x) out[x] = pick(pick(a[x], b[x]), c[x]);
-    float left = out[0];
-    for (int x = 0; x + 1 < width; ++x) {
-      const float here = out[x];
-      out[x] = pick(pick(left, here), out[x + 1]);
-      left = here;
-    }
-    out[width - 1] = pick(left, out[width - 1]);
+    for (int x = 0; x < width; ++x) column[x + 1] = pick(pick(a[x], b[x]), c[x]);
+    column[0] = column[1];
+    column[width + 1] = column[width];
+    for (int x = 0; x < width; ++x) out[x] = pick(pick(column[x], column[x + 1]), column[x + 2]);
+  }
+}
+
+// Of four samples each in rows of `width` [m]; missing ones are 0: least and greatest, and the lower median; infinity,
+// 0 and 0 where there is none.
+DKB_KERNEL_BODY inline void depths_of_cells(const float* samples, int width, float* __restrict low,
+                                            float* __restrict middle, float* __restrict high) {
+  for (int x = 0; x < width; ++x) {
+    // Sorted by a network of five exchanges; missing depth comes first.
+    const float a = samples[x], b = samples[x + width], c = samples[x + 2 * width], d = samples[x + 3 * width];
+    const float ab = std::min(a, b), ba = std::max(a, b), cd = std::min(c, d), dc = std::max(c, d);
+    const float least = std::min(ab, cd), lower = std::max(ab, cd), upper = std::min(ba, dc), most = std::max(ba, dc);
+    const float second = std::min(lower, upper), third = std::max(lower, upper);
+    float first = most > 0 ? most : kFar, median = most;
+    first = third > 0 ? third : first;
+    median = third > 0 ? third : median;
+    first = second > 0 ? second : first;
+    first = least > 0 ? least : first;
+    median = least > 0 ? second : median;
+    low[x] = first;
+    middle[x] = median;
+    high[x] = most;
   }
 }
 
@@ -70,8 +91,8 @@ bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
   return true;
 }
 
-void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here,
-                         MotionProjection& result) const {
+void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
+                         MotionProjection& result, Simd simd) const {
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
@@ -79,66 +100,64 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
   const float fx = fx_, fy = fy_, cx = cx_ + 1.0f, cy = cy_ + 1.0f, k1 = k1_, k2 = k2_, k3 = k3_, p1 = p1_, p2 = p2_;
   const float r2_max = r2_max_, right = static_cast<float>(width_) + 1.0f, bottom = static_cast<float>(height_) + 1.0f;
   const int32_t width = width_, height = height_;
-  const size_t count = x_.size();
+  const size_t count = range.count;
   result.cell.resize(count);
   result.depth.resize(count);
-  const float* const xs = x_.data();
-  const float* const ys = y_.data();
-  const float* const zs = depth.data();
+  const float* const xs = x_.data() + range.first;
+  const float* const ys = y_.data() + range.first;
+  const float* const zs = depth.data() + range.first;
   int32_t* const cells = result.cell.data();
   float* const depths = result.depth.data();
-  // No branches, so that the compiler can take four cells at a time. Coordinates are counted from 1 and cut to one cell
-  // around the grid: 0 and size + 1 are outside.
-  for (size_t i = 0; i < count; ++i) {
-    const float z = zs[i] > 0.0f ? zs[i] : missing;
-    const float px = z * (r00 * xs[i] + r01 * ys[i] + r02) + tx;
-    const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
-    const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
-    const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
-    const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
-    const float u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
-    const float v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
-    const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
-    const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
-    const bool seen = (pz > kMinDepth) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);
-    cells[i] = seen ? iy * width + ix : -1;
-    depths[i] = pz;
-  }
+  // Coordinates are counted from 1 and cut to one cell around the grid: 0 and size + 1 are outside.
+  run_vectorised(simd, [=]() DKB_KERNEL_BODY {
+    for (size_t i = 0; i < count; ++i) {
+      const float z = zs[i] > 0.0f ? zs[i] : missing;
+      const float px = z * (r00 * xs[i] + r01 * ys[i] + r02) + tx;
+      const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
+      const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
+      const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
+      const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
+      const float u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
+      const float v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
+      const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
+      const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
+      const bool seen = (pz > kMinDepth) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);
+      cells[i] = seen ? iy * width + ix : -1;
+      depths[i] = pz;
+    }
+  });
 }
 
-void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays) {
+void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays, Simd simd) {
   const int width = rays.width(), height = rays.height(), cell = rays.cell();
   for (Image<float>* i : {&depth, &nearest, &farthest, &score, &low_, &high_}) resize(*i, width, height);
+  const auto columns = static_cast<size_t>(width);
+  buffer_.resize(4 * columns + 2);
   // Four pixels of each cell, in a rotated square so that every row and column of it counts once.
   const std::array<int, 4> dx{cell / 4, cell * 3 / 4, 0, cell / 2}, dy{0, cell / 4, cell / 2, cell * 3 / 4};
+  const int inner = image.width() / cell;
   for (int y = 0; y < height; ++y) {
-    std::array<const float*, 4> rows;
-    for (size_t k = 0; k < 4; ++k) rows[k] = image.row(std::min(image.height() - 1, y * cell + dy[k]));
-    const int inner = image.width() / cell;
-    float* out = depth.row(y);
-    float* low = low_.row(y);
-    float* high = high_.row(y);
-    for (int x = 0; x < width; ++x) {
-      std::array<float, 4> z;
-      for (size_t k = 0; k < 4; ++k) {
-        const int at = x < inner ? x * cell + dx[k] : std::min(image.width() - 1, x * cell + dx[k]);
-        z[k] = rows[k][at];
-      }
-      // Sorted by a network of five exchanges; missing depth (0) comes first.
-      const auto order = [&](size_t a, size_t b) {
-        const float lower = std::min(z[a], z[b]);
-        z[b] = std::max(z[a], z[b]);
-        z[a] = lower;
-      };
-      order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
-      high[x] = z[3];
-      const size_t first = z[0] > 0 ? 0 : z[1] > 0 ? 1 : z[2] > 0 ? 2 : 3;
-      low[x] = z[3] > 0 ? z[first] : kFar;
-      out[x] = z[first + (3 - first) / 2];
+    for (size_t k = 0; k < 4; ++k) {
+      const float* const row = image.row(std::min(image.height() - 1, y * cell + dy[k]));
+      float* const out = buffer_.data() + k * columns;
+      for (int x = 0; x < inner; ++x) out[x] = row[x * cell + dx[k]];
+      for (int x = inner; x < width; ++x) out[x] = row[std::min(image.width() - 1, x * cell + dx[k])];
     }
+    run_vectorised(simd, [width, in = buffer_.data(), low = low_.row(y), out = depth.row(y), high = high_.row(y)]()
+                             DKB_KERNEL_BODY { depths_of_cells(in, width, low, out, high); });
   }
-  spread(low_, nearest, [](float a, float b) { return std::min(a, b); });
-  spread(high_, farthest, [](float a, float b) { return std::max(a, b); });
+  run_vectorised(simd, [this]() DKB_KERNEL_BODY {
+    spread(low_, buffer_.data(), nearest, [](float a, float b) { return std::min(a, b); });
+    spread(high_, buffer_.data(), farthest, [](float a, float b) { return std::max(a, b); });
+  });
+}
+
+void MotionView::set(const MotionDepthGrid& grid) {
+  time = grid.time;
+  cam_from_world = grid.cam_from_world;
+  cells.resize(grid.depth.size());
+  for (size_t i = 0; i < cells.size(); ++i)
+    cells[i] = {{grid.nearest.data()[i], grid.farthest.data()[i]}, grid.depth.data()[i], grid.score.data()[i]};
 }
 
 }  // namespace dkb

@@ -4,13 +4,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
 
 namespace dkb {
 
-// Where cells of one grid appear in another.
+// Cells of a grid, counted by rows.
+struct CellRange {
+  size_t first = 0, count = 0;
+};
+
+// Where cells of one grid appear in another, from the first of a range on.
 struct MotionProjection {
   std::vector<int32_t> cell;  // index of the cell that sees the surface; -1 when none does
   std::vector<float> depth;   // [m] of the surface in that camera; of no meaning where cell is -1
@@ -32,9 +38,11 @@ class MotionRays {
   }
   // The cell that sees a point of the camera's; false when none does.
   bool find_cell(const Eigen::Vector3f& point, int* x, int* y) const;
-  // Projects what each cell sees at `depth` [m], `missing` standing in for depth that is not above 0, into the camera
-  // that `there_from_here` leads to.
-  void project(const Image<float>& depth, float missing, const Rigid3& there_from_here, MotionProjection& result) const;
+  // Projects what each cell in `range` sees at `depth` [m], `missing` standing in for depth that is not above 0, into
+  // the camera that `there_from_here` leads to.
+  void project(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
+               MotionProjection& result, Simd simd = best_simd()) const;
+  CellRange all_cells() const { return {0, x_.size()}; }
 
  private:
   int cell_, width_, height_;
@@ -52,10 +60,28 @@ struct MotionDepthGrid {
   Image<float> score;              // evidence for motion of what is seen in each cell
 
   // Sets the three depth maps. Buffers are kept.
-  void set_depth(const DepthImage& image, const MotionRays& rays);
+  void set_depth(const DepthImage& image, const MotionRays& rays, Simd simd = best_simd());
 
  private:
   Image<float> low_, high_;
+  std::vector<float> buffer_;  // some rows
+};
+
+// A grid that later ones are compared with, cell by cell: what is known of a cell lies together.
+struct MotionView {
+  struct Bounds {
+    float nearest, farthest;
+  };
+  struct Cell {
+    Bounds bounds;
+    float depth, score;
+  };
+
+  double time = 0;
+  Rigid3 cam_from_world;
+  std::vector<Cell> cells;
+
+  void set(const MotionDepthGrid& grid);
 };
 
 }  // namespace dkb

@@ -13,7 +13,7 @@ TEST(MotionRays, ProjectEveryCellOntoItselfUnderNoMotion) {
     const CameraModel camera = *builtin_camera(name);
     const MotionRays rays(camera, 4);
     MotionProjection projection;
-    rays.project(Image<float>(rays.width(), rays.height(), 2.0f), 1.0f, Rigid3(), projection);
+    rays.project(Image<float>(rays.width(), rays.height(), 2.0f), 1.0f, Rigid3(), rays.all_cells(), projection);
     for (size_t i = 0; i < projection.cell.size(); ++i) {
       ASSERT_EQ(projection.cell[i], static_cast<int32_t>(i)) << name;
       ASSERT_EQ(projection.depth[i], 2.0f);
@@ -27,7 +27,7 @@ TEST(MotionRays, AgreeWithTheCameraModel) {
   const Rigid3 motion(rotation_from_vector({0.05, -0.1, 0.2}), {0.1, -0.05, -0.3});
   const Image<float> depth(rays.width(), rays.height(), 1.5f);
   MotionProjection projection;
-  rays.project(depth, 1.0f, motion, projection);
+  rays.project(depth, 1.0f, motion, rays.all_cells(), projection);
   int seen = 0, different = 0;
   for (int y = 0; y < rays.height(); ++y)
     for (int x = 0; x < rays.width(); ++x) {
@@ -47,7 +47,8 @@ TEST(MotionRays, AgreeWithTheCameraModel) {
 TEST(MotionRays, SeeNothingBehindTheCamera) {
   const MotionRays rays(*builtin_camera("fr3"), 4);
   MotionProjection projection;
-  rays.project(Image<float>(160, 120, 1.0f), 1.0f, Rigid3(Eigen::Quaterniond::Identity(), {0, 0, -1.5}), projection);
+  rays.project(Image<float>(160, 120, 1.0f), 1.0f, Rigid3(Eigen::Quaterniond::Identity(), {0, 0, -1.5}),
+               rays.all_cells(), projection);
   for (int32_t cell : projection.cell) ASSERT_EQ(cell, -1);
 }
 

@@ -2,9 +2,11 @@
 #include "dkb/dynamics/motion_segmenter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "dkb/features/vectorised.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -35,32 +37,46 @@ constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or 
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
 constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
+constexpr int kAcross = 2;         // [cells] `farthest` is that of the cells beside
 constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
 constexpr int kHoleRadius = 2;     // [cells] half the width up to which missing depth is a strip
+constexpr size_t kBlock = 640;     // [cells] worked at together
 constexpr int kLongRun = 300;      // [frames] over which missing depth is averaged
 
-void clear(Image<float>& image) {
-  std::fill(image.data(), image.data() + image.size(), 0.0f);
+template <class T>
+std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
+  if (spare.empty()) return std::make_unique<T>();
+  auto taken = std::move(spare.back());
+  spare.pop_back();
+  return taken;
+}
+
+void clear(Image<float>& image, CellRange range) {
+  std::fill_n(image.data() + range.first, range.count, 0.0f);
 }
 
 }  // namespace
 
-MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options)
+MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options,
+                                 Simd simd)
     : camera_(camera),
       noise_(noise),
       options_(options),
+      simd_(simd),
       rays_(camera, options.cell),
-      smoothing_(camera, noise, options.cell, options.smoothing),
+      smoothing_(camera, noise, options.cell, options.smoothing, simd),
       alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
     *i = Image<float>(width, height);
-  known_ = open_ = Image<uint8_t>(width, height);
+  known_ = open_ = intruding_ = outline_ = Image<uint8_t>(width, height);
+  verdict_.resize(kBlock);
+  bounds_.resize(kBlock);
 }
 
 void MotionSegmenter::reset() {
-  for (auto& view : views_) spare_.push_back(std::move(view));
+  for (auto& view : views_) spare_views_.push_back(std::move(view));
   views_.clear();
   if (previous_) spare_.push_back(std::move(previous_));
   if (current_) spare_.push_back(std::move(current_));
@@ -73,13 +89,6 @@ void MotionSegmenter::move_world(const Rigid3& new_from_old) {
   for (MotionDepthGrid* grid : {previous_.get(), current_.get()})
     if (grid != nullptr) grid->cam_from_world = grid->cam_from_world * old_from_new;
   if (last_) last_->cam_from_world = last_->cam_from_world * old_from_new;
-}
-
-std::unique_ptr<MotionDepthGrid> MotionSegmenter::take_spare() {
-  if (spare_.empty()) return std::make_unique<MotionDepthGrid>();
-  auto grid = std::move(spare_.back());
-  spare_.pop_back();
-  return grid;
 }
 
 // Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time.
@@ -98,21 +107,24 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
                      std::to_string(image.depth.height()) + ", the camera " + std::to_string(camera_.width) + " x " +
                      std::to_string(camera_.height) + "; give images of the camera's size");
-  if (!current_) current_ = take_spare();
+  if (!current_) current_ = take_spare(spare_);
   image_time_ = image.timestamp;
-  current_->set_depth(image.depth, rays_);
+  current_->set_depth(image.depth, rays_, simd_);
   current_->time = image.depth_timestamp;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   find_pose(step_covariance);
-  for (size_t i = 0; i < tolerance_.size(); ++i)
-    tolerance_.data()[i] = static_cast<float>(noise_.surface_tolerance(current_->depth.data()[i]));
-  carry_scores();
-  for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes);
-  const size_t count = views_.size(), chosen = std::min(count, kViewsPerFrame);
-  for (size_t i = 0; i < chosen; ++i) compare(*views_[(turn_ + i * count / chosen) % count]);
-  ++turn_;
-  find_openings();
+  choose_views();
+  frames_ = std::min(frames_ + 1, kLongRun);
+  // Some cells through all steps before the next: what they read and write stays in the nearest cache.
+  for (size_t first = 0; first < score().size(); first += kBlock) {
+    const CellRange block{first, std::min(kBlock, score().size() - first)};
+    find_tolerances(block);
+    carry_scores(block);
+    for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes, block);
+    for (const ChosenView& view : chosen_) compare(view, block);
+    find_openings(block);
+  }
   smoothing_.set_surface(current_->depth, open_);
   weigh();
   smoothing_.smooth(weighted_, weights_);
@@ -139,35 +151,69 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
   aligned_step_->previous_from_current = last_->cam_from_world * cam_from_world.inverse();
 }
 
+// Not all views speak in each frame: they take turns.
+void MotionSegmenter::choose_views() {
+  const Rigid3 world_from_cam = current_->cam_from_world.inverse();
+  const size_t count = views_.size(), chosen = std::min(count, kViewsPerFrame);
+  chosen_.clear();
+  for (size_t i = 0; i < chosen; ++i) {
+    MotionView& view = *views_[(turn_ + i * count / chosen) % count];
+    const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / kSettle, 0.0, 1.0));
+    chosen_.push_back({&view, view.cam_from_world * world_from_cam, trust});
+  }
+  ++turn_;
+}
+
+void MotionSegmenter::find_tolerances(CellRange block) {
+  run_vectorised(simd_, [count = block.count, depth = current_->depth.data() + block.first,
+                         farthest = current_->farthest.data() + block.first,
+                         tolerance = tolerance_.data() + block.first, outline = outline_.data() + block.first,
+                         noise = noise_, across = kAcross * options_.cell, focal = camera_.fx]() DKB_KERNEL_BODY {
+    for (size_t i = 0; i < count; ++i) {
+      const double z = depth[i];
+      tolerance[i] = static_cast<float>(noise.surface_tolerance(z));
+      outline[i] = farthest[i] > depth[i] + static_cast<float>(noise.max_depth_jump(z, across, focal)) ? 1 : 0;
+    }
+  });
+}
+
 // Each cell takes over the score of the same surface in the frame before.
-void MotionSegmenter::carry_scores() {
-  clear(current_->score);
-  std::fill(known_.data(), known_.data() + known_.size(), uint8_t{0});
-  if (!previous_) return;
-  rays_.project(current_->depth, kTooNear, previous_->cam_from_world * current_->cam_from_world.inverse(), projection_);
+void MotionSegmenter::carry_scores(CellRange block) {
+  if (!previous_) {
+    std::fill_n(known_.data() + block.first, block.count, uint8_t{0});
+    return clear(current_->score, block);
+  }
+  const Rigid3 before_from_now = previous_->cam_from_world * current_->cam_from_world.inverse();
+  rays_.project(current_->depth, kTooNear, before_from_now, block, projection_, simd_);
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
   const auto keep_hole = static_cast<float>(std::exp(-interval / kHoleMemory));
-  const auto near = static_cast<float>(kNearRange);
   const Image<float>& before = previous_->depth;
-  for (size_t i = 0; i < current_->score.size(); ++i) {
-    const float z = current_->depth.data()[i];
-    const bool hole = !(z > 0);
+  const float* const tolerances = tolerance_.data() + block.first;
+  float* const scores = current_->score.data() + block.first;
+  uint8_t* const knowns = known_.data() + block.first;
+  run_vectorised(simd_, [=, count = block.count, cells = projection_.cell.data(), there = projection_.depth.data(),
+                         depth = current_->depth.data() + block.first, depth_before = before.data(),
+                         score_before = previous_->score.data(), verdict = verdict_.data(),
+                         near = static_cast<float>(kNearRange)]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (size_t i = 0; i < count; ++i) {
+      const int32_t cell = cells[i], at = cell < 0 ? 0 : cell;
+      const float then = depth_before[at], carried = score_before[at];
+      const bool seen = cell >= 0, hole = !(depth[i] > 0);
+      const bool too_near = seen & hole & (then < near);
+      const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + kMotionPerFrame);
+      const float score_if_near = too_near ? keep_hole * std::max(0.0f, carried) : 0.0f;
+      scores[i] = same ? keep * carried : score_if_near;
+      knowns[i] = too_near | same ? 1 : 0;
+      verdict[i] = seen & !hole & !same ? 1 : 0;
+    }
+  });
+  for (size_t i = 0; i < block.count; ++i) {
+    if (verdict_[i] == 0) continue;
     const int at = projection_.cell[i];
-    if (at < 0) continue;
     const float depth_there = projection_.depth[i];
-    if (hole) {
-      if (before.data()[at] >= near) continue;
-      current_->score.data()[i] = keep_hole * std::max(0.0f, previous_->score.data()[at]);
-      known_.data()[i] = 1;
-      continue;
-    }
-    float bound = tolerance_.data()[i] + kMotionPerFrame;
-    if (before.data()[at] > 0 && std::abs(before.data()[at] - depth_there) < bound) {
-      current_->score.data()[i] = keep * previous_->score.data()[at];
-      known_.data()[i] = 1;
-      continue;
-    }
+    float bound = tolerances[i] + kMotionPerFrame;
     // It has moved: the cell around that fits best in depth.
     const int x = at % before.width(), y = at / before.width();
     for (int v = std::max(0, y - kCarryRadius); v <= std::min(before.height() - 1, y + kCarryRadius); ++v)
@@ -175,103 +221,132 @@ void MotionSegmenter::carry_scores() {
         const float difference = std::abs(before(u, v) - depth_there);
         if (!(before(u, v) > 0) || difference >= bound) continue;
         bound = difference;
-        current_->score.data()[i] = keep * previous_->score(u, v);
-        known_.data()[i] = 1;
+        scores[i] = keep * previous_->score(u, v);
+        knowns[i] = 1;
       }
   }
 }
 
 // What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
-void MotionSegmenter::compare(MotionDepthGrid& view) {
-  rays_.project(current_->depth, kTooNear, view.cam_from_world * current_->cam_from_world.inverse(), projection_);
-  const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / kSettle, 0.0, 1.0));
-  const float contour_weight = trust * kContour;
-  const float interior_weight = trust * kInterior;
-  const auto slope = kSlope, revision = kRevision;
+void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
+  enum Verdict : uint8_t { nothing, missing, before, same };
+  rays_.project(current_->depth, kTooNear, chosen.there_from_here, block, projection_, simd_);
+  const std::vector<int32_t>& cells = projection_.cell;
+  MotionView::Cell* const view = chosen.view->cells.data();
+  // Views come from far down the memory: some way ahead, they are asked for early.
+  const size_t last = chosen.view->cells.size() - 1;
+  for (size_t i = 0; i < block.count; ++i) {
+    const auto at = static_cast<size_t>(std::max(cells[i], 0));
+    bounds_[i] = view[at].bounds;
+    if (i % 4 == 0) __builtin_prefetch(view + std::min(at + kBlock, last));
+  }
+  const float* const tolerances = tolerance_.data() + block.first;
+  run_vectorised(simd_, [=, count = block.count, cell = cells.data(), there = projection_.depth.data(),
+                         depth = current_->depth.data() + block.first, bounds = bounds_.data(),
+                         verdict = verdict_.data()]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (size_t i = 0; i < count; ++i) {
+      const float near = bounds[i].nearest, far = bounds[i].farthest;
+      const bool seen = cell[i] >= 0, hole = !(depth[i] > 0), known = far > 0;
+      const bool stands_before = there[i] + tolerances[i] < near, not_behind = there[i] < far + tolerances[i];
+      const int32_t of_surface = stands_before ? before : not_behind ? same : nothing;
+      const int32_t of_known = known ? of_surface : nothing, of_seen = hole ? missing : of_known;
+      verdict[i] = static_cast<uint8_t>(seen ? of_seen : nothing);
+    }
+  });
+  const float trust = chosen.trust, contour_weight = trust * kContour, interior_weight = trust * kInterior;
   // From this much farther on, the surface behind does not hang together with the one in front.
   const auto beyond = [this](float z) {
-    constexpr int kAcross = 2;  // [cells] `farthest` is that of the cells beside
     return z + static_cast<float>(noise_.max_depth_jump(z, kAcross * options_.cell, camera_.fx));
   };
-  for (size_t i = 0; i < current_->depth.size(); ++i) {
-    const float z = current_->depth.data()[i];
-    const bool hole = !(z > 0);
-    const int at = projection_.cell[i];
-    if (at < 0) continue;
+  const float* const scores = current_->score.data() + block.first;
+  const uint8_t* const outlines = outline_.data() + block.first;
+  float* const intrusions = intrusions_.data() + block.first;
+  float* const agreements = agreements_.data() + block.first;
+  float* const still = still_.data() + block.first;
+  for (size_t i = 0; i < block.count; ++i) {
+    const uint8_t verdict = verdict_[i];
+    if (verdict == nothing) continue;
+    MotionView::Cell& seen = view[cells[i]];
+    const auto [nearest, farthest] = bounds_[i];
     const float depth_there = projection_.depth[i];
-    if (hole) {
-      intrusions_.data()[i] += view.depth.data()[at] > depth_there ? 1.0f : 0.0f;
-      continue;
-    }
-    const float nearest = view.nearest.data()[at], farthest = view.farthest.data()[at],
-                tolerance = tolerance_.data()[i];
-    if (!(farthest > 0)) continue;
-    if (depth_there + tolerance < nearest) {
-      const float margin =
-          std::max(tolerance, static_cast<float>(noise_.surface_tolerance(nearest))) + slope * (farthest - nearest);
-      if (view.depth.data()[at] > 0 && depth_there + margin < nearest) intrusions_.data()[i] += 1.0f;
-    } else if (depth_there < farthest + tolerance) {
-      float& score_then = view.score.data()[at];
-      score_then += revision * (current_->score.data()[i] - score_then);
-      if (score_then >= kUnmarked) continue;
-      agreements_.data()[i] += trust;
-      const bool outline = current_->farthest.data()[i] > beyond(z);
-      if (!outline)
-        still_.data()[i] += interior_weight;
+    if (verdict == same) {
+      seen.score += kRevision * (scores[i] - seen.score);
+      if (seen.score >= kUnmarked) continue;
+      agreements[i] += trust;
+      if (outlines[i] == 0)
+        still[i] += interior_weight;
       else if (farthest > beyond(depth_there))
-        still_.data()[i] += contour_weight;
+        still[i] += contour_weight;
+    } else if (verdict == before) {
+      const float tolerance = std::max(tolerances[i], static_cast<float>(noise_.surface_tolerance(nearest)));
+      const float margin = tolerance + kSlope * (farthest - nearest);
+      if (seen.depth > 0 && depth_there + margin < nearest) intrusions[i] += 1.0f;
+    } else {
+      intrusions[i] += seen.depth > depth_there ? 1.0f : 0.0f;
     }
   }
 }
 
 // Depth that is missing where a view had some, but not always missing (as at the image's border).
-void MotionSegmenter::find_openings() {
+void MotionSegmenter::find_openings(CellRange block) {
   constexpr float kAlways = 0.9f;
-  frames_ = std::min(frames_ + 1, kLongRun);
   const float gain = 1.0f / static_cast<float>(frames_);
-  for (size_t i = 0; i < missing_.size(); ++i) {
-    float& share = missing_.data()[i];
-    const bool hole = !(current_->depth.data()[i] > 0);
-    share += gain * ((hole ? 1.0f : 0.0f) - share);
-    open_.data()[i] = hole && intrusions_.data()[i] > 0 && share < kAlways ? 255 : 0;
-  }
+  run_vectorised(simd_,
+                 [gain, count = block.count, depth = current_->depth.data() + block.first,
+                  share = missing_.data() + block.first, intrusions = intrusions_.data() + block.first,
+                  open = open_.data() + block.first, intruding = intruding_.data() + block.first]() DKB_KERNEL_BODY {
+                   for (size_t i = 0; i < count; ++i) {
+                     const bool hole = !(depth[i] > 0);
+                     const float now = share[i] + gain * ((hole ? 1.0f : 0.0f) - share[i]);
+                     share[i] = now;
+                     open[i] = hole & (intrusions[i] > 0) & (now < kAlways) ? 255 : 0;
+                     intruding[i] = !hole & (intrusions[i] > 0) ? 1 : 0;
+                   }
+                 });
 }
 
 void MotionSegmenter::weigh() {
   const int width = rays_.width(), height = rays_.height();
-  const auto state_weight = kState, prior = kPrior;
-  const auto hole_prior = kHolePrior;
   const Image<float>& depth = current_->depth;
-  const auto supported = [&](int x, int y) {
-    if (x == 0 || y == 0 || x + 1 == width || y + 1 == height) return false;
-    int support = 0;
-    for (int v = y - 1; v <= y + 1; ++v)
-      for (int u = x - 1; u <= x + 1; ++u) support += intrusions_(u, v) > 0 && depth(u, v) > 0;
-    return support >= kSupport;
+  const auto weigh_cell = [](float moves, float still, float score, float z, float& weighted,
+                             float& weights) DKB_KERNEL_BODY {
+    const float stands = moves > 0 ? 0.0f : std::min(1.0f, still);
+    const float state = std::max(-1.0f, std::min(score, 1.0f)), weight = kState * std::abs(state);
+    const float doubt = z > 0 ? kPrior : kHolePrior;
+    weighted = moves - stands + weight * state - doubt;
+    weights = moves + stands + weight + doubt;
   };
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const bool hole = !(depth(x, y) > 0);
-      const float votes = hole ? 0.0f : intrusions_(x, y);
-      const float moves = votes > 0 && supported(x, y) ? votes / (votes + agreements_(x, y)) : 0.0f;
-      const float stands = moves > 0 ? 0.0f : std::min(1.0f, still_(x, y));
-      const float state = std::clamp(current_->score(x, y), -1.0f, 1.0f), weight = state_weight * std::abs(state);
-      const float doubt = hole ? hole_prior : prior;
-      weighted_(x, y) = moves - stands + weight * state - doubt;
-      weights_(x, y) = moves + stands + weight + doubt;
+  run_vectorised(
+      simd_, [weigh_cell, count = depth.size(), z = depth.data(), still = still_.data(), score = current_->score.data(),
+              weighted = weighted_.data(), weights = weights_.data()]() DKB_KERNEL_BODY {
+        for (size_t i = 0; i < count; ++i) weigh_cell(0.0f, still[i], score[i], z[i], weighted[i], weights[i]);
+      });
+  for (int y = 1; y + 1 < height; ++y) {
+    const std::array<const uint8_t*, 3> rows{intruding_.row(y - 1), intruding_.row(y), intruding_.row(y + 1)};
+    for (int x = 1; x + 1 < width; ++x) {
+      if (rows[1][x] == 0) continue;
+      int support = 0;
+      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
+      const float votes = intrusions_(x, y);
+      if (support >= kSupport)
+        weigh_cell(votes / (votes + agreements_(x, y)), still_(x, y), current_->score(x, y), depth(x, y),
+                   weighted_(x, y), weights_(x, y));
     }
+  }
 }
 
 void MotionSegmenter::update_scores() {
   const float gain = 1.0f / kFullEvidence;
-  for (size_t i = 0; i < weights_.size(); ++i) {
-    const float weight = weights_.data()[i];
-    if (!(weight > 0)) continue;
-    const float mean = weighted_.data()[i] / weight;
-    float& score = current_->score.data()[i];
-    const float before = known_.data()[i] != 0 ? score : mean;  // what is new is what it hangs together with
-    score = std::clamp(before + mean * std::min(1.0f, weight * gain), kMinScore, kMaxScore);
-  }
+  run_vectorised(simd_, [gain, count = weights_.size(), weights = weights_.data(), weighted = weighted_.data(),
+                         known = known_.data(), score = current_->score.data()]() DKB_KERNEL_BODY {
+    for (size_t i = 0; i < count; ++i) {
+      const float weight = weights[i], mean = weighted[i] / weight;
+      const float before = known[i] != 0 ? score[i] : mean;  // what is new is what it hangs together with
+      const float now = std::clamp(before + mean * std::min(1.0f, weight * gain), kMinScore, kMaxScore);
+      score[i] = weight > 0 ? now : score[i];
+    }
+  });
 }
 
 // Along the edges of things depth goes missing too, in strips; what stands too near for the sensor is broad.
@@ -320,11 +395,16 @@ MoverMask MotionSegmenter::mask() {
   result.cell = options_.cell;
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
   const auto threshold = static_cast<float>(options_.threshold);
-  rays_.project(current_->depth, kTooNear, depth_from_colour_, projection_);
-  for (size_t i = 0; i < result.cells.size(); ++i) {
-    const int at = projection_.cell[i];
-    if (at >= 0 && current_->score.data()[at] > threshold) result.cells.data()[i] = 255;
-  }
+  rays_.project(current_->depth, kTooNear, depth_from_colour_, rays_.all_cells(), projection_, simd_);
+  run_vectorised(simd_, [threshold, count = result.cells.size(), cells = projection_.cell.data(),
+                         score = current_->score.data(), marked = result.cells.data()]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (size_t i = 0; i < count; ++i) {
+      const int32_t cell = cells[i];
+      const float there = score[cell < 0 ? 0 : cell];
+      marked[i] = (cell >= 0) & (there > threshold) ? 255 : 0;
+    }
+  });
   clear_thin_holes(result);
   clear_lone_holes(result.cells);
   return result;
@@ -338,19 +418,21 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
   }
   current_->cam_from_world = depth_cam_from_cam(*cam_from_world) * *cam_from_world;
   last_ = Stamped{image_time_, *cam_from_world};
-  if (previous_) keep_as_view(std::move(previous_));
+  if (previous_) {
+    keep_as_view(*previous_);
+    spare_.push_back(std::move(previous_));
+  }
   previous_ = std::move(current_);
 }
 
 // The newest views lie `view_interval` apart; of more than `views`, the one goes whose loss leaves the smallest gap in
 // proportion to its age.
-void MotionSegmenter::keep_as_view(std::unique_ptr<MotionDepthGrid> grid) {
+void MotionSegmenter::keep_as_view(const MotionDepthGrid& grid) {
   const double interval = views_.size() == 1 ? 0.3 * kViewInterval : kViewInterval;
-  if (!views_.empty() && grid->time - views_.back()->time < interval) {
-    spare_.push_back(std::move(grid));
-    return;
-  }
-  views_.push_back(std::move(grid));
+  if (!views_.empty() && grid.time - views_.back()->time < interval) return;
+  auto view = take_spare(spare_views_);
+  view->set(grid);
+  views_.push_back(std::move(view));
   const double now = views_.back()->time;
   size_t drop = 0;
   if (now - views_.front()->time <= kViewAge) {
@@ -364,7 +446,7 @@ void MotionSegmenter::keep_as_view(std::unique_ptr<MotionDepthGrid> grid) {
       }
     }
   }
-  spare_.push_back(std::move(views_[drop]));
+  spare_views_.push_back(std::move(views_[drop]));
   views_.erase(views_.begin() + static_cast<std::ptrdiff_t>(drop));
 }
 

@@ -34,7 +34,8 @@ struct MotionOptions {
 // Calls alternate: segment() or observe() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
-  MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {});
+  MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {},
+                  Simd simd = best_simd());
 
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
@@ -66,28 +67,37 @@ class MotionSegmenter {
     Rigid3 cam_from_world;
   };
 
+  struct ChosenView {  // that the image last given is compared with
+    MotionView* view;
+    Rigid3 there_from_here;
+    float trust;
+  };
+
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_pose(const Matrix6d& step_covariance);
-  void carry_scores();
-  void compare(MotionDepthGrid& view);
-  void find_openings();
+  void choose_views();
+  void find_tolerances(CellRange block);
+  void carry_scores(CellRange block);
+  void compare(const ChosenView& view, CellRange block);
+  void find_openings(CellRange block);
   void weigh();
   void update_scores();
   void clear_thin_holes(MoverMask& mask) const;
   void clear_lone_holes(Image<uint8_t>& marked);
   MoverMask mask();
-  void keep_as_view(std::unique_ptr<MotionDepthGrid> grid);
-  std::unique_ptr<MotionDepthGrid> take_spare();
+  void keep_as_view(const MotionDepthGrid& grid);
 
   CameraModel camera_;
   SensorNoise noise_;
   MotionOptions options_;
+  Simd simd_;
   MotionRays rays_;
   MotionSmoothing smoothing_;
   DepthAlignment alignment_;
   std::unique_ptr<MotionDepthGrid> current_, previous_;
-  std::vector<std::unique_ptr<MotionDepthGrid>> views_;  // oldest first
+  std::vector<std::unique_ptr<MotionView>> views_;  // oldest first
   std::vector<std::unique_ptr<MotionDepthGrid>> spare_;
+  std::vector<std::unique_ptr<MotionView>> spare_views_;
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
@@ -101,6 +111,11 @@ class MotionSegmenter {
   Image<float> missing_;                          // share of the frames without depth there
   Image<float> weighted_, weights_;
   Image<uint8_t> known_, open_;
+  Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty
+  Image<uint8_t> outline_;    // 1 where a surface behind begins beside
+  std::vector<ChosenView> chosen_;
+  std::vector<uint8_t> verdict_;  // of the block at work
+  std::vector<MotionView::Bounds> bounds_;
 };
 
 }  // namespace dkb

@@ -301,5 +301,25 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   EXPECT_THROW(segmenter.segment(image, Rigid3()), InputError);
 }
 
+TEST(MotionSegmenter, FindsTheSameScoresWithEveryInstructionSet) {
+  World world;
+  world.holes = 0.1;
+  std::vector<MotionSegmenter> segmenters;
+  std::vector<Simd> kinds{Simd::scalar};
+  for (Simd simd : {Simd::avx2, Simd::avx512})
+    if (simd <= best_simd()) kinds.push_back(simd);
+  for (Simd simd : kinds) segmenters.emplace_back(world.camera, SensorNoise{}, MotionOptions{}, simd);
+  for (int f = 0; f < 25; ++f) {
+    const Picture p = world.render(f, {box_at(-0.5 + 0.03 * f), box_at(0.4, 0.5)});
+    std::vector<MoverMask> masks;
+    for (MotionSegmenter& s : segmenters) {
+      masks.push_back(s.segment(p.image, world.cam_from_world(f)));
+      ASSERT_EQ(masks.back().cells, masks.front().cells) << f;
+      ASSERT_EQ(s.score(), segmenters.front().score()) << f;
+      s.commit(world.cam_from_world(f));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dkb

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "dkb/features/vectorised.h"
+
 namespace dkb {
 namespace {
 
@@ -15,8 +17,9 @@ constexpr float kCreaseLink = 0.3f;  // share of what is said that crosses such 
 }  // namespace
 
 MotionSmoothing::MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell,
-                                 const MotionSmoothingOptions& options)
+                                 const MotionSmoothingOptions& options, Simd simd)
     : noise_(noise),
+      simd_(simd),
       focal_(camera.fx),
       cell_(cell),
       fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.distance))) {
@@ -46,22 +49,25 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
 
 void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t>& open) {
   find_creases(depth);
-  const auto near = static_cast<float>(kNearRange);
-  const auto link = [&](size_t a, size_t b) {
-    const float za = depth.data()[a], zb = depth.data()[b];
-    const float low = std::min(za, zb), high = std::max(za, zb);
-    const bool joined = high - low < static_cast<float>(noise_.max_depth_jump(low, cell_, focal_));
-    const bool too_near = (high < near) & ((za > 0) | (open.data()[a] != 0)) & ((zb > 0) | (open.data()[b] != 0));
-    const float strength =
-        low > 0 ? (joined ? std::min(damping_.data()[a], damping_.data()[b]) : 0.0f) : (too_near ? 1.0f : 0.0f);
-    return strength / (1.0f + fade_ * std::max(high, 0.5f * near));
+  // Link of each cell from `first` on to the one `step` cells before it.
+  const auto link = [&](size_t first, size_t step, Image<float>& links) {
+    run_vectorised(simd_, [first, step, count = depth.size(), depth = depth.data(), open = open.data(),
+                           damping = damping_.data(), links = links.data(), near = static_cast<float>(kNearRange),
+                           noise = noise_, cell = cell_, focal = focal_, fade = fade_]() DKB_KERNEL_BODY {
+      for (size_t i = first; i < count; ++i) {
+        const size_t k = i - step;
+        const float za = depth[i], zb = depth[k];
+        const float low = std::min(za, zb), high = std::max(za, zb);
+        const bool joined = high - low < static_cast<float>(noise.max_depth_jump(low, cell, focal));
+        const bool too_near = (high < near) & ((za > 0) | (open[i] != 0)) & ((zb > 0) | (open[k] != 0));
+        const float of_surface = joined ? std::min(damping[i], damping[k]) : 0.0f, of_hole = too_near ? 1.0f : 0.0f;
+        links[i] = (low > 0 ? of_surface : of_hole) / (1.0f + fade * std::max(high, 0.5f * near));
+      }
+    });
   };
-  const auto width = static_cast<size_t>(depth.width());
-  for (size_t y = 0, i = 0; y < static_cast<size_t>(depth.height()); ++y)
-    for (size_t x = 0; x < width; ++x, ++i) {
-      left_.data()[i] = x > 0 ? link(i, i - 1) : 0.0f;
-      up_.data()[i] = y > 0 ? link(i, i - width) : 0.0f;
-    }
+  link(1, 1, left_);
+  link(static_cast<size_t>(depth.width()), static_cast<size_t>(depth.width()), up_);
+  for (int y = 0; y < depth.height(); ++y) left_(0, y) = 0;
 }
 
 namespace {
@@ -88,25 +94,37 @@ void sweep_rows(Image<float>& weighted, Image<float>& weights, const Image<float
     }
 }
 
+// Down and up again, in strips so narrow that they stay in the nearest cache.
+constexpr int kStrip = 16;  // [cells]
+
+DKB_KERNEL_BODY inline void take_row(float* to, const float* from, const float* link, int count) {
+  DKB_INDEPENDENT_STEPS
+  for (int x = 0; x < count; ++x) to[x] += link[x] * (from[x] - to[x]);
+}
+
+DKB_KERNEL_BODY inline void sweep_columns(Image<float>& weighted, Image<float>& weights, const Image<float>& links,
+                                          int first, int count) {
+  for (int y = 1; y < weighted.height(); ++y) {
+    take_row(weighted.row(y) + first, weighted.row(y - 1) + first, links.row(y) + first, count);
+    take_row(weights.row(y) + first, weights.row(y - 1) + first, links.row(y) + first, count);
+  }
+  for (int y = weighted.height() - 2; y >= 0; --y) {
+    take_row(weighted.row(y) + first, weighted.row(y + 1) + first, links.row(y + 1) + first, count);
+    take_row(weights.row(y) + first, weights.row(y + 1) + first, links.row(y + 1) + first, count);
+  }
+}
+
 }  // namespace
 
 void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
   const int width = weighted.width(), height = weighted.height();
-  const auto take_row = [width](float* to, const float* from, const float* link) {
-    for (int x = 0; x < width; ++x) to[x] += link[x] * (from[x] - to[x]);
-  };
   for (int pass = 0; pass < 2; ++pass) {
     int y = 0;
     for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
     for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
-    for (y = 1; y < height; ++y) {
-      take_row(weighted.row(y), weighted.row(y - 1), up_.row(y));
-      take_row(weights.row(y), weights.row(y - 1), up_.row(y));
-    }
-    for (y = height - 2; y >= 0; --y) {
-      take_row(weighted.row(y), weighted.row(y + 1), up_.row(y + 1));
-      take_row(weights.row(y), weights.row(y + 1), up_.row(y + 1));
-    }
+    run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
+      for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
+    });
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/image.h"
@@ -20,7 +21,8 @@ struct MotionSmoothingOptions {
 // viewer.
 class MotionSmoothing {
  public:
-  MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, const MotionSmoothingOptions& options);
+  MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, const MotionSmoothingOptions& options,
+                  Simd simd = best_simd());
 
   // `depth`: of the cells' middles [m], 0 = none. `open`: 255 where missing depth may be a surface too near for the
   // sensor. Sets what smooth() stops at.
@@ -32,6 +34,7 @@ class MotionSmoothing {
   void find_creases(const Image<float>& depth);
 
   SensorNoise noise_;
+  Simd simd_;
   double focal_;
   int cell_;                        // [px]
   float fade_ = 0;                  // [1 / m of depth] of a link per cell

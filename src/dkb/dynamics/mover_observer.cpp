@@ -72,21 +72,31 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
 }
 
 // Between the twentieths at either end, which may be of other surfaces.
-Eigen::Vector3d MoverObserver::size_of(std::span<const size_t> cells) const {
+Eigen::Vector3d MoverObserver::size_of(std::span<const uint32_t> cells) const {
   std::array<std::vector<float>, 3> values;
-  for (size_t cell : cells) {
-    const Eigen::Vector2f& ray = rays_[cell];
-    values[0].push_back(depth_[cell] * ray.x());
-    values[1].push_back(depth_[cell] * ray.y());
-    values[2].push_back(depth_[cell]);
+  for (auto& v : values) v.resize(cells.size());
+  for (size_t k = 0; k < cells.size(); ++k) {
+    const Eigen::Vector2f& ray = rays_[cells[k]];
+    const float depth = depth_[cells[k]];
+    values[0][k] = depth * ray.x();
+    values[1][k] = depth * ray.y();
+    values[2][k] = depth;
   }
   Eigen::Vector3d size;
-  for (size_t i = 0; i < 3; ++i)
-    size[static_cast<Eigen::Index>(i)] = quantile(values[i], 0.95) - quantile(values[i], 0.05);
+  for (size_t i = 0; i < 3; ++i) {
+    const auto place = [n = values[i].size()](double share) {
+      return static_cast<std::ptrdiff_t>(std::min(n - 1, static_cast<size_t>(share * static_cast<double>(n))));
+    };
+    const auto begin = values[i].begin(), low = begin + place(0.05), high = begin + place(0.95);
+    std::nth_element(begin, high, values[i].end());
+    const float most = *high;
+    std::nth_element(begin, low, high + 1);  // the others are larger
+    size[static_cast<Eigen::Index>(i)] = most - *low;
+  }
   return size;
 }
 
-Eigen::Vector3d MoverObserver::median_position(std::span<const size_t> cells) const {
+Eigen::Vector3d MoverObserver::median_position(std::span<const uint32_t> cells) const {
   const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
   const size_t stride = (cells.size() + kMaxPoints - 1) / kMaxPoints;
   std::array<std::vector<float>, 3> values;
@@ -176,11 +186,11 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     });
   }
   std::vector<MoverObservation> observations;
-  std::vector<size_t> cells;
+  std::vector<uint32_t> cells;
   for (size_t b = 0; b < boxes.size(); ++b) {
     cells.clear();
     for_each_cell(ranges[b], [&](size_t i, int, int) {
-      if (owner[i] == static_cast<int>(b)) cells.push_back(i);
+      if (owner[i] == static_cast<int>(b)) cells.push_back(static_cast<uint32_t>(i));
     });
     if (cells.size() < kMinCells) continue;
     observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells),
@@ -199,23 +209,24 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
     size_t merged_into;
   };
   std::vector<Part> parts;
-  const auto width = static_cast<size_t>(columns_);
+  const auto width = static_cast<uint32_t>(columns_), size = static_cast<uint32_t>(rays_.size());
   std::vector<float> depths;
-  std::vector<size_t> part_of(rays_.size(), 0);  // seed + 1
-  for (size_t seed = 0; seed < free.size(); ++seed) {
+  std::vector<uint32_t> part_of(size, 0);  // seed + 1
+  std::vector<uint32_t> cells;
+  for (uint32_t seed = 0; seed < size; ++seed) {
     if (!free[seed]) continue;
     free[seed] = 0;
     part_of[seed] = seed + 1;
-    std::vector<size_t> cells{seed};
+    cells.assign(1, seed);
     CellRange bounds{columns_, rows_, 0, 0};
     depths.clear();
     for (size_t k = 0; k < cells.size(); ++k) {
-      const size_t i = cells[k];
+      const uint32_t i = cells[k];
       const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
       bounds = {std::min(bounds.x0, x), std::min(bounds.y0, y), std::max(bounds.x1, x + 1), std::max(bounds.y1, y + 1)};
       const float d = depth_[i];
       depths.push_back(d);
-      const auto visit = [&](bool there, size_t j) {
+      const auto visit = [&](bool there, uint32_t j) {
         if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.depth_jump) * d) return;
         free[j] = 0;
         part_of[j] = seed + 1;
@@ -228,14 +239,14 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
     }
     // The mask's rim lies on what is behind the movers: a ring one or two cells wide is no object, nor are specks.
     size_t inner = 0;
-    for (size_t i : cells) {
-      const size_t x = i % width, y = i / width;
-      const auto mine = [&](size_t j) { return part_of[j] == seed + 1; };
+    for (const uint32_t i : cells) {
+      const uint32_t x = i % width, y = i / width;
+      const auto mine = [&](uint32_t j) { return part_of[j] == seed + 1; };
       inner += (x == 0 || mine(i - 1)) && (x + 1 == width || mine(i + 1)) && (y == 0 || mine(i - width)) &&
-               (i + width >= part_of.size() || mine(i + width));
+               (i + width >= size || mine(i + width));
     }
     if (static_cast<double>(inner) < kInnerShare * static_cast<double>(cells.size())) continue;
-    parts.push_back({{bounds, std::move(cells)}, upper_median(depths), parts.size()});
+    parts.push_back({{bounds, cells}, upper_median(depths), parts.size()});
   }
   // Holes of the depth image and arms held out cut bodies into parts.
   const auto root = [&](size_t p) {

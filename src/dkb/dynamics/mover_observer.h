@@ -43,14 +43,14 @@ class MoverObserver {
   };
   struct Region {
     CellRange bounds;
-    std::vector<size_t> cells;
+    std::vector<uint32_t> cells;
   };
   CellRange cells_in(const Box& box, double margin) const;
   template <class Function>
   void for_each_cell(const CellRange& range, const Function& function) const;
   float depth_near(const DepthImage& depth, int x, int y) const;
-  Eigen::Vector3d median_position(std::span<const size_t> cells) const;
-  Eigen::Vector3d size_of(std::span<const size_t> cells) const;
+  Eigen::Vector3d median_position(std::span<const uint32_t> cells) const;
+  Eigen::Vector3d size_of(std::span<const uint32_t> cells) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
   std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellRange>& ranges) const;

@@ -23,10 +23,11 @@ class PointEvidence {
       const auto it = suspicion_.find(point);
       if (it != suspicion_.end() && (it->second -= 2 * seconds) <= 0) suspicion_.erase(it);
     }
-    for (PointId point : on_mover) suspicion_[point] += seconds;
     std::vector<PointId> convicted;
-    for (const auto& [point, suspicion] : suspicion_)
-      if (suspicion >= kConvicting) convicted.push_back(point);
+    for (PointId point : on_mover)
+      if ((suspicion_[point] += seconds) >= kConvicting) convicted.push_back(point);
+    std::sort(convicted.begin(), convicted.end());
+    convicted.erase(std::unique(convicted.begin(), convicted.end()), convicted.end());
     for (PointId point : convicted) suspicion_.erase(point);
     return convicted;
   }

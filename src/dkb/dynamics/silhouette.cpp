@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 namespace dkb {
@@ -155,13 +156,16 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
   if (boxes.empty()) return mask;
   const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
   mask.cells = Image<uint8_t>(columns, rows);
-  Image<float> grid(columns, rows);
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
-
+  constexpr float kNotLookedAt = -1;
+  constexpr int kAround = 3;  // [cells] to all sides that a hole's neighbours lie
+  std::vector<int> sides;
+  Image<float> grid(columns, rows, kNotLookedAt);
   for (const Detection& detection : boxes) {
     const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
     const CellRange core = cells_of(scaled(detection.box, kCore), kMaskCell, columns, rows);
+    for (int y = range.y0; y < range.y1; ++y)
+      for (int x = range.x0; x < range.x1; ++x)
+        if (grid(x, y) == kNotLookedAt) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
     const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
@@ -182,15 +186,22 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     add_limbs(surfaces, within_depth, mine);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.
-    for (int y = range.y0; y < range.y1; ++y)
+    sides.assign(static_cast<size_t>(range.x1 - range.x0) + 2 * kAround, 0);
+    for (int y = range.y0; y < range.y1; ++y) {
+      // Known cells of each column around this row: those of the object less the others.
+      std::fill(sides.begin(), sides.end(), 0);
+      for (int v = std::max(range.y0, y - kAround); v <= std::min(range.y1 - 1, y + kAround); ++v) {
+        int* const side = sides.data() + kAround;
+        const float* const known = grid.row(v) + range.x0;
+        const uint8_t* const object = mine.row(v) + range.x0;
+        for (int k = 0; k < range.x1 - range.x0; ++k) side[k] += known[k] > 0 ? (object[k] != 0 ? 1 : -1) : 0;
+      }
       for (int x = range.x0; x < range.x1; ++x) {
         if (grid(x, y) > 0 || mine(x, y)) continue;
-        int in = 0, out = 0;
-        for (int ny = std::max(range.y0, y - 3); ny < std::min(range.y1, y + 4); ++ny)
-          for (int nx = std::max(range.x0, x - 3); nx < std::min(range.x1, x + 4); ++nx)
-            if (grid(nx, ny) > 0) ++(mine(nx, ny) ? in : out);
-        if (in >= out) mask.cells(x, y) = 255;
+        const int* const first = sides.data() + (x - range.x0);
+        if (std::accumulate(first, first + 2 * kAround + 1, 0) >= 0) mask.cells(x, y) = 255;
       }
+    }
     for (int y = range.y0; y < range.y1; ++y)
       for (int x = range.x0; x < range.x1; ++x)
         if (mine(x, y)) mask.cells(x, y) = 255;

@@ -7,11 +7,8 @@
 
 namespace dkb {
 
-void CornerSpread::sort_into_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners) {
-  const size_t cells = static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows);
-  starts_.assign(cells + 1, 0);
+void CornerSpread::find_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners) {
   cell_of_.resize(corners.size());
-  order_.resize(corners.size());
   // Cell of a pixel = (pixel - left) * columns / width, by a 16-bit reciprocal that is exact enough to be monotonous.
   const uint64_t step_x = (static_cast<uint64_t>(grid.columns) << 32) / static_cast<uint64_t>(region.width());
   const uint64_t step_y = (static_cast<uint64_t>(grid.rows) << 32) / static_cast<uint64_t>(region.height());
@@ -19,8 +16,15 @@ void CornerSpread::sort_into_cells(const CornerRegion& region, Grid grid, const 
     const uint64_t column = (static_cast<uint64_t>(corners[i].x - region.left) * step_x) >> 32;
     const uint64_t row = (static_cast<uint64_t>(corners[i].y - region.top) * step_y) >> 32;
     cell_of_[i] = static_cast<uint32_t>(row * static_cast<uint64_t>(grid.columns) + column);
-    ++starts_[cell_of_[i] + 1];
   }
+}
+
+void CornerSpread::sort_into_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners) {
+  const size_t cells = grid.cells();
+  find_cells(region, grid, corners);
+  starts_.assign(cells + 1, 0);
+  order_.resize(corners.size());
+  for (const uint32_t cell : cell_of_) ++starts_[cell + 1];
   for (size_t c = 0; c < cells; ++c) starts_[c + 1] += starts_[c];
   // Fill each cell from its start; the starts move up by one cell and are moved back at the end.
   for (size_t i = 0; i < corners.size(); ++i) order_[starts_[cell_of_[i]]++] = static_cast<uint32_t>(i);
@@ -31,13 +35,16 @@ void CornerSpread::sort_into_cells(const CornerRegion& region, Grid grid, const 
 void CornerSpread::drop_weak(const CornerRegion& region, int strong, int cell_size, std::vector<PixelCorner>& corners) {
   if (corners.empty()) return;
   const Grid grid{std::max(1, region.width() / cell_size), std::max(1, region.height() / cell_size)};
-  sort_into_cells(region, grid, corners);
-  taken_.assign(starts_.size(), 0);
+  find_cells(region, grid, corners);
+  taken_.assign(grid.cells(), 0);
   for (size_t i = 0; i < corners.size(); ++i)
     if (corners[i].score >= strong) taken_[cell_of_[i]] = 1;
   size_t kept = 0;
-  for (size_t i = 0; i < corners.size(); ++i)
-    if (corners[i].score >= strong || taken_[cell_of_[i]] == 0) corners[kept++] = corners[i];
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const PixelCorner corner = corners[i];
+    corners[kept] = corner;
+    kept += (corner.score >= strong) | (taken_[cell_of_[i]] == 0);
+  }
   corners.resize(kept);
 }
 

@@ -37,7 +37,10 @@ class CornerSpread {
  private:
   struct Grid {
     int columns = 0, rows = 0;
+    size_t cells() const { return static_cast<size_t>(columns) * static_cast<size_t>(rows); }
   };
+  // The cell of each corner, into cell_of_.
+  void find_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners);
   // Sorts the indices of corners by cell into order_; cell c has order_[starts_[c] ... starts_[c + 1]).
   void sort_into_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners);
 

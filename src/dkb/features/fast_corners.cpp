@@ -12,7 +12,8 @@
 namespace dkb {
 namespace {
 
-constexpr int kRowPadding = 32;  // bytes on both sides of a score row
+constexpr int kRowPadding = 64;  // bytes on both sides of a score row
+constexpr int kSpare = 4;        // corners written at once
 
 // Offsets of the 16 pixels of the circle in order, for rows `stride` bytes apart.
 std::array<ptrdiff_t, 16> circle_offsets(ptrdiff_t stride) {
@@ -67,8 +68,9 @@ void emit_scalar(const uint8_t* above, const uint8_t* here, const uint8_t* below
 #if defined(__x86_64__)
 // Scores of 32 pixels; pixels at or below the threshold score 0. With kEarlyOut blocks without any corner cost less.
 template <bool kEarlyOut>
-DKB_TARGET_AVX2 inline __m256i contrast_avx2(const uint8_t* centre, const std::array<ptrdiff_t, 16>& circle,
-                                             __m256i threshold) {
+DKB_TARGET_AVX2 __attribute__((always_inline)) inline __m256i contrast_avx2(const uint8_t* centre,
+                                                                            const std::array<ptrdiff_t, 16>& circle,
+                                                                            __m256i threshold) {
   const __m256i zero = _mm256_setzero_si256();
   const __m256i c = load_avx2(centre);
   // An arc of 9 holds two neighbours of any four pixels at right angles: the larger of one diameter and the larger of
@@ -125,23 +127,36 @@ DKB_TARGET_AVX2 void score_row_avx2(const uint8_t* row, int begin, int end, cons
   }
 }
 
-DKB_TARGET_AVX2 void emit_avx2(const uint8_t* above, const uint8_t* here, const uint8_t* below, int begin, int end,
-                               int y, std::vector<PixelCorner>& corners) {
-  for (int x = begin; x < end; x += 32) {
-    const __m256i s = load_avx2(here + x);
-    if (_mm256_testz_si256(s, s)) continue;
-    __m256i m = _mm256_max_epu8(load_avx2(here + x - 1), load_avx2(here + x + 1));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above + x - 1), load_avx2(above + x)));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above + x + 1), load_avx2(below + x - 1)));
-    m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(below + x), load_avx2(below + x + 1)));
-    const __m256i not_above = _mm256_cmpeq_epi8(_mm256_subs_epu8(s, m), _mm256_setzero_si256());
-    uint32_t peaks = ~static_cast<uint32_t>(_mm256_movemask_epi8(not_above));
-    if (end - x < 32) peaks &= (1u << (end - x)) - 1;
-    for (; peaks != 0; peaks &= peaks - 1) {
-      const int at = x + std::countr_zero(peaks);
-      corners.push_back({static_cast<uint16_t>(at), static_cast<uint16_t>(y), static_cast<uint8_t>(here[at] - 1)});
-    }
+// Which of 32 pixels score more than all their neighbours, as bits.
+DKB_TARGET_AVX2 inline uint64_t peaks_avx2(const uint8_t* above, const uint8_t* here, const uint8_t* below) {
+  const __m256i s = load_avx2(here);
+  __m256i m = _mm256_max_epu8(load_avx2(here - 1), load_avx2(here + 1));
+  m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above - 1), load_avx2(above)));
+  m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(above + 1), load_avx2(below - 1)));
+  m = _mm256_max_epu8(m, _mm256_max_epu8(load_avx2(below), load_avx2(below + 1)));
+  const __m256i not_above = _mm256_cmpeq_epi8(_mm256_subs_epu8(s, m), _mm256_setzero_si256());
+  return ~static_cast<uint32_t>(_mm256_movemask_epi8(not_above));
+}
+
+// Corners of a row to `out`, which has room for kSpare more than there can be; returns the end of them.
+DKB_TARGET_AVX2 PixelCorner* emit_avx2(const uint8_t* above, const uint8_t* here, const uint8_t* below, int begin,
+                                       int end, int y, PixelCorner* out) {
+  for (int x = begin; x < end; x += 64) {
+    uint64_t peaks = peaks_avx2(above + x, here + x, below + x);
+    if (end - x > 32) peaks |= peaks_avx2(above + x + 32, here + x + 32, below + x + 32) << 32;
+    if (end - x < 64) peaks &= (uint64_t{1} << (end - x)) - 1;
+    const int count = std::popcount(peaks);
+    const auto put = [&](int k) {
+      const int at = x + std::countr_zero(peaks | uint64_t{1} << 63);
+      out[k] = {static_cast<uint16_t>(at), static_cast<uint16_t>(y), static_cast<uint8_t>(here[at] - 1)};
+      peaks &= peaks - 1;
+    };
+    // Always a few, of which those that are none are written over: how many there are nobody could foresee.
+    for (int k = 0; k < kSpare; ++k) put(k);
+    for (int k = kSpare; k < count; ++k) put(k);
+    out += count;
   }
+  return out;
 }
 #endif
 
@@ -151,7 +166,7 @@ void fast_contrasts_5x5(const GreyImage& image, int x, int y, uint8_t (&contrast
 #if defined(__x86_64__)
   // The vector kernel loads 32 pixels from three columns left of the window on, in rows up to five below (x, y).
   const size_t last = static_cast<size_t>(y + 5) * static_cast<size_t>(image.width()) + static_cast<size_t>(x + 1 + 31);
-  if (simd == Simd::avx2 && last < image.size()) return contrasts_5x5_avx2(image.row(y) + x, image.width(), contrasts);
+  if (simd >= Simd::avx2 && last < image.size()) return contrasts_5x5_avx2(image.row(y) + x, image.width(), contrasts);
 #endif
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
   for (int row = 0; row < 5; ++row)
@@ -169,10 +184,11 @@ void FastCornerFinder::find(const GreyImage& image, int threshold, int border, s
   // One pixel more on each side, since suppression compares with the neighbours.
   const int score_begin = std::max(begin - 1, 3), score_end = std::min(end + 1, image.width() - 3);
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
-  const bool vectorised = simd_ == Simd::avx2 && score_end - score_begin >= 32;
+  const bool vectorised = simd_ >= Simd::avx2 && score_end - score_begin >= 32;
 
   const size_t stride = static_cast<size_t>(image.width() + 2 * kRowPadding);
   scores_.assign(3 * stride, 0);
+  row_.resize(static_cast<size_t>(image.width() / 2 + 1 + kSpare));
   const auto score_row = [&](int y) { return scores_.data() + static_cast<size_t>(y % 3) * stride + kRowPadding; };
   const auto fill_row = [&](int y) {
     uint8_t* scores = score_row(y);
@@ -192,7 +208,9 @@ void FastCornerFinder::find(const GreyImage& image, int threshold, int border, s
     fill_row(y + 1);
 #if defined(__x86_64__)
     if (vectorised) {
-      emit_avx2(score_row(y - 1), score_row(y), score_row(y + 1), begin, end, y, corners);
+      const PixelCorner* const found =
+          emit_avx2(score_row(y - 1), score_row(y), score_row(y + 1), begin, end, y, row_.data());
+      corners.insert(corners.end(), static_cast<const PixelCorner*>(row_.data()), found);
       continue;
     }
 #endif

@@ -30,7 +30,8 @@ class FastCornerFinder {
 
  private:
   Simd simd_;
-  std::vector<uint8_t> scores_;  // three padded rows
+  std::vector<uint8_t> scores_;   // three padded rows
+  std::vector<PixelCorner> row_;  // of one row, with room to spare
 };
 
 // FAST-9 contrasts (score + 1; 0 if the pixel is no corner at any threshold) of the 5 x 5 pixels about (x, y),

@@ -41,18 +41,22 @@ class ExtractedFeatures final : public FrameFeatures {
  public:
   ExtractedFeatures(const OrbFeatures& orb, const RgbdImage& image, const Camera& camera,
                     const UndistortionTable& undistort, const DepthOptions& options)
-      : orb_(orb), image_(image), camera_(camera), undistort_(undistort), options_(options) {}
+      : orb_(orb),
+        image_(image),
+        camera_(camera),
+        options_(options),
+        as_seen_(keypoints_as_seen(orb, image, undistort, options)) {}
   std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
     return std::make_shared<const RgbdFeatures>(
-        make_rgbd_features(orb_, image_, camera_, undistort_, velocity, options_));
+        make_rgbd_features(orb_, as_seen_, image_, camera_, velocity, options_));
   }
 
  private:
   const OrbFeatures& orb_;
   const RgbdImage& image_;
   const Camera& camera_;
-  const UndistortionTable& undistort_;
   const DepthOptions& options_;
+  const std::vector<Keypoint> as_seen_;
 };
 
 }  // namespace dkb

@@ -71,7 +71,7 @@ void GaussianBlur::apply(const GreyImage& image, GreyImage& blurred) {
     std::copy(in, in + r, out);
     std::copy(in + width - r, in + width, out + width - r);
 #if defined(__x86_64__)
-    if (simd_ == Simd::avx2 && width >= 32 + 2 * r) {
+    if (simd_ >= Simd::avx2 && width >= 32 + 2 * r) {
       filter_avx2(in, width, 0, width, row_.data());
       filter_avx2(row_.data(), 1, r, width - r, out);
       continue;

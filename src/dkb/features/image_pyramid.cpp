@@ -97,7 +97,7 @@ void ImagePyramid::build(const GreyImage& image) {
   for (size_t i = 0; i < resamplings_.size(); ++i) {
     const Resampling& resampling = resamplings_[i];
 #if defined(__x86_64__)
-    if (simd_ == Simd::avx2 && resampling.vectorised) {
+    if (simd_ >= Simd::avx2 && resampling.vectorised) {
       resample_avx2(resampling, images_[i], row_buffer_.data(), images_[i + 1]);
       continue;
     }

@@ -13,29 +13,28 @@ class KeypointGrid {
  public:
   KeypointGrid() = default;
   KeypointGrid(std::span<const float> x, std::span<const float> y, int width, int height)
-      : x_(x.begin(), x.end()), y_(y.begin(), y.end()), columns_(width / kCell + 1), rows_(height / kCell + 1) {
+      : columns_(width / kCell + 1), rows_(height / kCell + 1) {
     first_.assign(static_cast<size_t>(columns_ * rows_) + 1, 0);
-    for (size_t i = 0; i < x_.size(); ++i) ++first_[cell(x_[i], y_[i]) + 1];
+    for (size_t i = 0; i < x.size(); ++i) ++first_[cell(x[i], y[i]) + 1];
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-    index_.resize(x_.size());
+    points_.resize(x.size());
     std::vector<int32_t> next(first_.begin(), first_.end() - 1);
-    for (size_t i = 0; i < x_.size(); ++i)
-      index_[static_cast<size_t>(next[cell(x_[i], y_[i])]++)] = static_cast<int32_t>(i);
+    for (size_t i = 0; i < x.size(); ++i)
+      points_[static_cast<size_t>(next[cell(x[i], y[i])]++)] = {x[i], y[i], static_cast<int32_t>(i)};
   }
 
   // Calls visit(i) for every point within `radius` (in both x and y) of (x, y), cell by cell in row-major order, by
   // increasing index within a cell.
   template <class Visit>
   void for_each_near(float x, float y, float radius, Visit&& visit) const {
-    if (index_.empty()) return;
+    if (points_.empty()) return;
     const int c0 = column(x - radius), c1 = column(x + radius), r0 = row(y - radius), r1 = row(y + radius);
     for (int r = r0; r <= r1; ++r) {
       const auto from = static_cast<size_t>(first_[static_cast<size_t>(r * columns_ + c0)]);
       const auto to = static_cast<size_t>(first_[static_cast<size_t>(r * columns_ + c1) + 1]);
       for (size_t k = from; k < to; ++k) {
-        const auto i = static_cast<size_t>(index_[k]);
-        const float dx = x_[i] - x, dy = y_[i] - y;
-        if (dx <= radius && dx >= -radius && dy <= radius && dy >= -radius) visit(static_cast<int>(i));
+        const float dx = points_[k].x - x, dy = points_[k].y - y;
+        if ((dx <= radius) & (dx >= -radius) & (dy <= radius) & (dy >= -radius)) visit(points_[k].index);
       }
     }
   }
@@ -46,9 +45,13 @@ class KeypointGrid {
   int row(float y) const { return std::clamp(static_cast<int>(y) / kCell, 0, rows_ - 1); }
   size_t cell(float x, float y) const { return static_cast<size_t>(row(y) * columns_ + column(x)); }
 
-  std::vector<float> x_, y_;
+  struct Point {
+    float x, y;
+    int32_t index;
+  };
   int columns_ = 0, rows_ = 0;
-  std::vector<int32_t> first_, index_;
+  std::vector<int32_t> first_;  // point of each cell
+  std::vector<Point> points_;   // by cells
 };
 
 }  // namespace dkb

@@ -141,7 +141,7 @@ void lk_sample(const GreyImage& image, double x, double y, int size, int16_t* sa
   const size_t columns = static_cast<size_t>((size + 15) / 16 * 16);
   const size_t last =
       static_cast<size_t>(p.y + size) * static_cast<size_t>(image.width()) + static_cast<size_t>(p.x) + columns;
-  if (simd == Simd::avx2 && last < image.size()) return sample_avx2(image, p, size, samples);
+  if (simd >= Simd::avx2 && last < image.size()) return sample_avx2(image, p, size, samples);
 #endif
   sample_scalar(image, p, size, samples);
 }
@@ -186,7 +186,7 @@ void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& tar
 
 LkSums lk_sums(const LkTemplate& reference, const int16_t* samples, [[maybe_unused]] Simd simd) {
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) return sums_avx2(reference, samples);
+  if (simd >= Simd::avx2) return sums_avx2(reference, samples);
 #endif
   return sums_scalar(reference, samples);
 }

@@ -35,7 +35,7 @@ DKB_TARGET_AVX2 void distances_popcnt(const Descriptor& query, const Descriptor*
 void distances_of(const Descriptor& query, const Descriptor* set, const int32_t* candidates, size_t count,
                   int32_t* distances, [[maybe_unused]] Simd simd) {
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) return distances_popcnt(query, set, candidates, count, distances);
+  if (simd >= Simd::avx2) return distances_popcnt(query, set, candidates, count, distances);
 #endif
   distances_scalar(query, set, candidates, count, distances);
 }

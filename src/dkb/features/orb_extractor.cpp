@@ -103,6 +103,7 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
     for (size_t i = 0; i < corners_.size(); ++i)
       corners_[i].insert(corners_[i].end(), poor_corners_[i].begin(), poor_corners_[i].end());
   }
+  blurred_.resize(corners_.size());
   OrbFeatures features;
   features.corners.reserve(static_cast<size_t>(options_.count));
   features.descriptors.reserve(static_cast<size_t>(options_.count));
@@ -111,7 +112,8 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
     const std::vector<PixelCorner>& corners = corners_[i];
     if (corners.empty()) continue;
     const GreyImage& pixels = pyramid_.level(level);
-    blur_.apply(pixels, blurred_);
+    GreyImage& blurred = blurred_[i];
+    blur_.apply(pixels, blurred);
     for (const PixelCorner& pixel : corners) {
       Corner corner;
       corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
@@ -122,7 +124,7 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
       corner.response = pixel.score;
       corner.octave = static_cast<uint8_t>(level);
       features.corners.push_back(corner);
-      features.descriptors.push_back(brief_.describe(blurred_.row(pixel.y) + pixel.x, pixels.width(), corner.angle));
+      features.descriptors.push_back(brief_.describe(blurred.row(pixel.y) + pixel.x, pixels.width(), corner.angle));
     }
   }
   return features;

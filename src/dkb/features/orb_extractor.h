@@ -59,7 +59,7 @@ class OrbExtractor {
   GaussianBlur blur_;
   SteeredBrief brief_;
   std::vector<std::vector<PixelCorner>> corners_, poor_corners_;  // per level
-  GreyImage blurred_;
+  std::vector<GreyImage> blurred_;                                // per level
 };
 
 }  // namespace dkb

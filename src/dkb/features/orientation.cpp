@@ -100,7 +100,7 @@ DKB_TARGET_AVX2 CentroidMoments moments_avx2(const uint8_t* centre, ptrdiff_t st
 
 CentroidMoments centroid_moments(const uint8_t* centre, ptrdiff_t stride, [[maybe_unused]] Simd simd) {
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) return moments_avx2(centre, stride);
+  if (simd >= Simd::avx2) return moments_avx2(centre, stride);
 #endif
   return moments_scalar(centre, stride);
 }

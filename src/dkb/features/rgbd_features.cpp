@@ -11,23 +11,42 @@ namespace {
 
 constexpr int kNodeSpacing = 8;  // [px]
 
+struct Triple {
+  float low, mid, high;
+};
+
+// Three depths from `p` on in order, what is not valid as 0.
+inline Triple sorted(const float* p) {
+  const auto valid = [](float d) { return d > 0 ? d : 0.0f; };
+  const float a = valid(p[0]), b = valid(p[1]), c = valid(p[2]);
+  const float low = std::min(a, b), high = std::max(a, b);
+  return {std::min(low, c), std::max(low, std::min(high, c)), std::max(high, c)};
+}
+
 // Depth at a pixel: the median of the valid 3 x 3 neighbours around a valid centre; 0 where the surface is torn.
 float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
   const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
   if (cx < 1 || cy < 1 || cx >= depth.width() - 1 || cy >= depth.height() - 1) return 0;
   const float centre = depth(cx, cy);
   if (!(centre > 0)) return 0;
+  const Triple a = sorted(&depth(cx - 1, cy - 1)), b = sorted(&depth(cx - 1, cy)), c = sorted(&depth(cx - 1, cy + 1));
+  const float torn = edge_fraction * centre;
+  if ((a.low > 0) & (b.low > 0) & (c.low > 0)) {
+    if (std::max({a.high, b.high, c.high}) - std::min({a.low, b.low, c.low}) > torn) return 0;
+    // The median of nine: of the greatest low, the middle mid and the least high.
+    const float low = std::max({a.low, b.low, c.low}), high = std::min({a.high, b.high, c.high});
+    const float mid = std::max(std::min(a.mid, b.mid), std::min(std::max(a.mid, b.mid), c.mid));
+    return std::max(std::min(low, mid), std::min(std::max(low, mid), high));
+  }
   float values[9];
   int n = 0;
-  for (int dy = -1; dy <= 1; ++dy)
-    for (int dx = -1; dx <= 1; ++dx) {
-      const float d = depth(cx + dx, cy + dy);
-      if (!(d > 0)) continue;
-      int at = n++;
-      for (; at > 0 && values[at - 1] > d; --at) values[at] = values[at - 1];  // insertion keeps them sorted
-      values[at] = d;
-    }
-  if (values[n - 1] - values[0] > edge_fraction * centre) return 0;
+  for (const float d : {a.low, a.mid, a.high, b.low, b.mid, b.high, c.low, c.mid, c.high}) {
+    if (!(d > 0)) continue;
+    int at = n++;
+    for (; at > 0 && values[at - 1] > d; --at) values[at] = values[at - 1];  // insertion keeps them sorted
+    values[at] = d;
+  }
+  if (values[n - 1] - values[0] > torn) return 0;
   return n % 2 == 1 ? values[n / 2] : 0.5f * (values[n / 2 - 1] + values[n / 2]);
 }
 
@@ -61,12 +80,44 @@ Eigen::Vector2f UndistortionTable::operator()(float x, float y) const {
          fy * ((1 - fx) * node[columns_] + fx * node[columns_ + 1]);
 }
 
-RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
-                                const UndistortionTable& undistort, const Vector6d& velocity,
-                                const DepthOptions& options) {
+std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
+                                        const UndistortionTable& undistort, const DepthOptions& options) {
+  std::vector<Keypoint> keypoints(orb.corners.size());
+  // The images have mostly left the cache by now, and corners lie all over them.
+  const auto ask_early = [&image](const Corner& c) {
+    const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
+    if (!image.depth.contains(x, y - 1) || !image.depth.contains(x, y + 1)) return;
+    for (int row = y - 1; row <= y + 1; ++row) __builtin_prefetch(&image.depth(x, row));
+    if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
+  };
+  constexpr size_t kAhead = 12;
+  for (size_t i = 0; i < orb.corners.size(); ++i) {
+    if (i + kAhead < orb.corners.size()) ask_early(orb.corners[i + kAhead]);
+    const Corner& c = orb.corners[i];
+    Keypoint& k = keypoints[i];
+    k.image_pixel = {c.x, c.y};
+    k.pixel = undistort(c.x, c.y);
+    k.angle = c.angle;
+    k.response = c.response;
+    k.octave = c.octave;
+    k.depth = depth_at(image.depth, c.x, c.y, options.edge_fraction);
+    const int ix = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.grey.width() - 1);
+    const int iy = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.grey.height() - 1);
+    if (!image.colour.empty()) {
+      k.colour = image.colour(ix, iy);
+    } else {
+      const uint8_t g = image.grey(ix, iy);
+      k.colour = {g, g, g};
+    }
+  }
+  return keypoints;
+}
+
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
+                                const CameraModel& camera, const Vector6d& velocity, const DepthOptions& options) {
   RgbdFeatures result;
   result.descriptors = orb.descriptors;
-  result.keypoints.resize(orb.corners.size());
+  result.keypoints = std::move(as_seen);
   const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
   const Eigen::Matrix3d back = rotation.transpose();
@@ -78,12 +129,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     const Corner& c = orb.corners[i];
     Keypoint& k = result.keypoints[i];
-    k.image_pixel = {c.x, c.y};
-    k.pixel = undistort(c.x, c.y);
-    k.angle = c.angle;
-    k.response = c.response;
-    k.octave = c.octave;
-    float z = depth_at(image.depth, c.x, c.y, options.edge_fraction);
+    float z = k.depth;
     if (moved && z > 0) {
       // Where was this surface point when the depth image was taken? Ask there, and carry the answer over.
       const Eigen::Vector3d now = camera.unproject(k.pixel.cast<double>(), z);
@@ -111,14 +157,6 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, 
     xs[i] = k.pixel.x();
     ys[i] = k.pixel.y();
     k.depth = z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max) ? z : 0.0f;
-    const int ix = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.grey.width() - 1);
-    const int iy = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.grey.height() - 1);
-    if (!image.colour.empty()) {
-      k.colour = image.colour(ix, iy);
-    } else {
-      const uint8_t g = image.grey(ix, iy);
-      k.colour = {g, g, g};
-    }
   }
   result.width = camera.width;
   result.height = camera.height;
@@ -131,6 +169,10 @@ RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indice
   result.width = features.width;
   result.height = features.height;
   std::vector<float> xs, ys;
+  result.keypoints.reserve(indices.size());
+  result.descriptors.reserve(indices.size());
+  xs.reserve(indices.size());
+  ys.reserve(indices.size());
   for (int i : indices) {
     const auto f = static_cast<size_t>(i);
     result.keypoints.push_back(features.keypoints[f]);

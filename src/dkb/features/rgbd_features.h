@@ -55,12 +55,13 @@ class UndistortionTable {
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
 };
 
-// Joins corners with the depth image. `cam_motion` is the motion of the camera from the depth image's time to the
-// colour image's, as colour_cam_from_depth_cam (identity when unknown): hand-held Kinects move millimetres between the
-// two stamps.
-RgbdFeatures make_rgbd_features(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
-                                const UndistortionTable& undistort, const Vector6d& velocity,
-                                const DepthOptions& options);
+// Corners joined with the depth image, of which a camera that stands still would have made its features.
+std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
+                                        const UndistortionTable& undistort, const DepthOptions& options);
+// Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen: hand-held
+// Kinects move millimetres between the stamps of colour and depth.
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
+                                const CameraModel& camera, const Vector6d& velocity, const DepthOptions& options);
 
 // The features of these indices, in this order, with a grid of their own.
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices);

@@ -9,21 +9,28 @@
 
 namespace dkb {
 
-// Which implementation of a kernel runs. All of them give the same bits; the choice only costs or saves time.
-enum class Simd : uint8_t { scalar, avx2 };
+// Which implementation of a kernel runs, each for processors that can do what those before it need as well. All of them
+// give the same bits; the choice only costs or saves time.
+enum class Simd : uint8_t { scalar, avx2, avx512 };
 
 // The fastest kind that the processor at hand supports.
 inline Simd best_simd() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return Simd::avx2;
-#endif
+  if (!__builtin_cpu_supports("avx2")) return Simd::scalar;
+  const bool wide = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+                    __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+  return wide ? Simd::avx512 : Simd::avx2;
+#else
   return Simd::scalar;
+#endif
 }
 
 }  // namespace dkb
 
 #if defined(__x86_64__)
 #define DKB_TARGET_AVX2 __attribute__((target("avx2,popcnt")))
+#define DKB_TARGET_AVX512 \
+  __attribute__((target("avx2,popcnt,avx512f,avx512bw,avx512dq,avx512vl,prefer-vector-width=512")))
 
 namespace dkb {
 

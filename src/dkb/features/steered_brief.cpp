@@ -140,7 +140,7 @@ Descriptor SteeredBrief::describe(const uint8_t* centre, ptrdiff_t stride, float
   const Offset* first = offsets_.data() + static_cast<size_t>(rotation) * 2 * kTests;
   const Offset* second = first + kTests;
 #if defined(__x86_64__)
-  if (simd_ == Simd::avx2) return describe_avx2(centre, stride, first, second);
+  if (simd_ >= Simd::avx2) return describe_avx2(centre, stride, first, second);
 #endif
   Descriptor descriptor;
   for (size_t word = 0; word < 4; ++word) {

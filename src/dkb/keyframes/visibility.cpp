@@ -46,6 +46,7 @@ class NearestSet {
   size_t size() const { return size_; }
   std::vector<int> indices() const {
     std::vector<int> result;
+    result.reserve(size_);
     for (size_t i = 0; i < size_; ++i) result.push_back(static_cast<int>(entries_[i].index));
     return result;
   }

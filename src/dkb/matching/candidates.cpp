@@ -101,6 +101,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (best < match.distance) match = {best_feature, static_cast<int>(i), best};
   }
   std::vector<ProjectionMatch> result;
+  result.reserve(std::min(candidates.size(), features.size()));
   for (const ProjectionMatch& m : best_of_feature)
     if (m.feature >= 0) result.push_back(m);
   return result;

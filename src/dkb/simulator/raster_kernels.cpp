@@ -211,7 +211,7 @@ uint64_t shaded(uint64_t colour, float shade) {
 void draw_patch_span(const PatchSpan& span, int count, float* inverse_depth, int32_t* ids, [[maybe_unused]] Simd simd) {
   int done = 0;
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) done = patch_pixels_avx2(span, count, inverse_depth, ids);
+  if (simd >= Simd::avx2) done = patch_pixels_avx2(span, count, inverse_depth, ids);
 #endif
   patch_pixels(span, done, count, inverse_depth, ids);
 }
@@ -220,7 +220,7 @@ void draw_quadric_span(const QuadricSpan& span, int count, float* inverse_depth,
                        [[maybe_unused]] Simd simd) {
   int done = 0;
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) done = quadric_pixels_avx2(span, count, inverse_depth, ids);
+  if (simd >= Simd::avx2) done = quadric_pixels_avx2(span, count, inverse_depth, ids);
 #endif
   quadric_pixels(span, done, count, inverse_depth, ids);
 }
@@ -229,7 +229,7 @@ void add_texture_span(const TextureSpan& span, const Texture& texture, int count
                       [[maybe_unused]] Simd simd) {
   int done = 0;
 #if defined(__x86_64__)
-  if (simd == Simd::avx2) done = texture_pixels_avx2(span, texture, count, sum);
+  if (simd >= Simd::avx2) done = texture_pixels_avx2(span, texture, count, sum);
 #endif
   texture_pixels(span, texture, done, count, sum);
 }

@@ -18,7 +18,9 @@ FrameResult Pipeline::process(const Frame& frame) {
   result.waiting_ms = waiting.ms();
 
   const Stopwatch working;
-  const Scene scene = scenes_.look(extract(frame), undistort_, detections, expect(frame), outcome_);  // DKB 3.1
+  const Expectation expected = expect(frame);
+  scenes_.begin(next_frame_, frame, expected, outcome_);
+  const Scene scene = scenes_.look(extract(frame), undistort_, detections, expected);  // DKB 3.1
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene, context_.camera.fx);
   TrackedFrame tracked = track(scene, usable);

@@ -186,6 +186,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
 void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   if (!tracked.tracked() || scene.mask.empty()) return;
   std::vector<PointId> matched, on_mover;
+  matched.reserve(tracked.points.size());
   for (PointId p : tracked.points)
     if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());

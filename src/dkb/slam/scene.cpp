@@ -12,6 +12,10 @@ UsableFeatures usable_features(const Scene& scene, double focal) {
   UsableFeatures usable;
   const MoverMask around = spread_into_holes(scene.mask, scene.extracted.image().depth, kBaseline, focal);
   const OrbFeatures& orb = scene.extracted.orb;
+  usable.corner.reserve(orb.corners.size());
+  usable.motion.reserve(orb.corners.size());
+  usable.orb.corners.reserve(orb.corners.size());
+  usable.orb.descriptors.reserve(orb.corners.size());
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     if (scene.rejected[i] == FeatureReason::moved) continue;
     const Corner& corner = orb.corners[i];

@@ -31,7 +31,11 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
   if (!segments_motion_) options_.motion.cell = kSupportCell;
-  if (segments_motion_ || supports) motion_.emplace(camera, noise, options_.motion);
+  if (segments_motion_ || supports) {
+    motion_.emplace(camera, noise, options_.motion);
+    segmenting_.emplace([this](const SegmentationTask& task) { return segment_motion(task); },
+                        DueStageOptions{"motion segmentation", threaded, ThreadPriority::normal});
+  }
   for (const auto& detector : prompt_) detector->reset();
   if (slow_ == nullptr) return;
   slow_->reset();
@@ -80,17 +84,33 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
   return given;
 }
 
-MoverMask SceneStage::segment_motion(const RgbdImage& image, const Expectation& expected,
-                                     std::vector<Detection>& boxes) {
-  if (!motion_) return {};
+Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   const Stopwatch watch;
-  const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
-  MoverMask moving;
+  Segmentation made;
   if (segments_motion_)
-    moving = motion_->segment(image, expected.cam_from_world, covariance);
+    made.mask = motion_->segment(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
   else
-    motion_->observe(image, expected.cam_from_world, covariance);
+    motion_->observe(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
+  made.ms = watch.ms();
+  return made;
+}
+
+void SceneStage::begin(FrameIndex index, const Frame& frame, const Expectation& expected,
+                       const std::optional<FrameOutcome>& before) {
+  // What is left of a frame that failed in between belongs to nobody.
+  while (segmenting_ && segmenting_->outstanding() > 0) segmenting_->take_due(index, true);
+  if (before) learn(*before);
+  const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
+  if (segmenting_) segmenting_->push({frame, expected.cam_from_world, covariance}, index);
+}
+
+MoverMask SceneStage::take_motion(FrameIndex index, std::vector<Detection>& boxes) {
+  if (!segmenting_) return {};
+  const Stopwatch watch;
+  Segmentation made = *segmenting_->take_due(index, true);
   times_.add("motion", watch.ms());
+  times_.add("segmentation", made.ms);
+  MoverMask moving = std::move(made.mask);
   if (rival_ && !moving.empty())  // the rivals know boxes only
     for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
       const float c = static_cast<float>(moving.cell);
@@ -117,8 +137,7 @@ void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const Ima
 }
 
 Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
-                       const Expectation& expected, const std::optional<FrameOutcome>& before) {
-  if (before) learn(*before);
+                       const Expectation& expected) {
   Scene scene;
   scene.rejected.assign(frame.orb.corners.size(), FeatureReason::none);
   scene.extracted = std::move(frame);
@@ -143,9 +162,9 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   if (carried_.mask().empty()) unmasked = scene.boxes;
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
-  const MoverMask moving = segment_motion(image, expected, scene.boxes);
-  if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
   times_.add("flow", watch.ms());
+  const MoverMask moving = take_motion(scene.extracted.index, scene.boxes);
+  if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
 
   watch = Stopwatch();
   const auto& corners = scene.extracted.orb.corners;

@@ -11,6 +11,7 @@
 #include "dkb/dynamics/motion_segmenter.h"
 #include "dkb/slam/detection_stage.h"
 #include "dkb/slam/scene.h"
+#include "dkb/util/due_stage.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -29,6 +30,17 @@ struct Expectation {
   std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes
 
   Rigid3 current_from_previous() const { return step ? step->previous_from_current.inverse() : Rigid3(); }
+};
+
+// Of one frame.
+struct Segmentation {
+  MoverMask mask;  // nothing when the segmentation only supports other detectors
+  double ms = 0;
+};
+struct SegmentationTask {
+  Frame frame;
+  Rigid3 cam_from_world_expected;
+  Matrix6d step_covariance;
 };
 
 // What became of the frame before: what the stage learns by it.
@@ -50,8 +62,12 @@ class SceneStage {
 
   // What the slow detector has due at this frame. It may wait.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  // Motion segmentation needs no corners: it starts, on a thread of its own, while they are extracted.
+  void begin(FrameIndex index, const Frame& frame, const Expectation& expected,
+             const std::optional<FrameOutcome>& before);
+  // Of the frame that was begun.
   Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
-             const Expectation& expected, const std::optional<FrameOutcome>& before);
+             const Expectation& expected);
 
   int keyframes_looked_at() const { return rival_ ? rival_->keyframes_looked_at() : 0; }
   // [frames] after which no late mask of a keyframe can come any more.
@@ -62,13 +78,15 @@ class SceneStage {
   double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
   int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
   std::string detector_inference() const { return slow_stage_ ? inference_ : std::string(); }
-  // Durations of flow, motion, filter and of the detector since they were taken last.
+  // Durations since they were taken last. Parts of tracking: flow, motion (what it waits for the segmentation), filter.
+  // Beside it: segmentation, and those of the detector.
   StageTimes take_times();
 
  private:
   void learn(const FrameOutcome& before);
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
-  MoverMask segment_motion(const RgbdImage& image, const Expectation& expected, std::vector<Detection>& boxes);
+  Segmentation segment_motion(const SegmentationTask& task);
+  MoverMask take_motion(FrameIndex index, std::vector<Detection>& boxes);
   MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                     const MoverMask& moving) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
@@ -88,6 +106,7 @@ class SceneStage {
   PastFrames past_;               // as many as the slow detector's latency needs
   std::vector<std::string> warnings_;
   StageTimes times_;
+  std::optional<DueStage<SegmentationTask, Segmentation>> segmenting_;  // last: its thread ends first
 };
 
 }  // namespace dkb

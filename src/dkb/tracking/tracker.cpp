@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "dkb/matching/pose_observation.h"
@@ -57,11 +56,17 @@ Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
   const Rigid3 moved = frame.cam_from_reference * map_.cam_from_world(frame.reference);
   const Rigid3 new_world_from_old = moved.inverse() * frame.cam_from_world;
   frame.cam_from_world = moved;
-  std::set<PointId> seen;  // two features may show points that have been fused since: the first keeps it
-  for (PointId& p : frame.points) {
+  std::vector<std::pair<PointId, size_t>> shown;
+  shown.reserve(frame.points.size());
+  for (size_t f = 0; f < frame.points.size(); ++f) {
+    PointId& p = frame.points[f];
     if (p != kNoPoint && !provisional_.contains(p)) p = map_.view().resolve(p);
-    if (p != kNoPoint && !seen.insert(p).second) p = kNoPoint;
+    if (p != kNoPoint) shown.emplace_back(p, f);
   }
+  std::sort(shown.begin(), shown.end());
+  // Two features may show points that have been fused since: the first keeps it.
+  for (size_t i = 1; i < shown.size(); ++i)
+    if (shown[i].first == shown[i - 1].first) frame.points[shown[i].second] = kNoPoint;
   return new_world_from_old;
 }
 
@@ -147,6 +152,7 @@ bool Tracker::established(PointId id, double now) const {
 // Features on movers that showed no well-known point end here: mapping never sees them.
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   frame.source.clear();
+  frame.source.reserve(frame.points.size());
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (!frame.matchable().on_mover(f) || frame.points[f] != kNoPoint) frame.source.push_back(static_cast<int>(f));
   const size_t left = frame.source.size();
@@ -171,6 +177,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const RgbdFeatures& features = *frame.features;
   std::vector<uint8_t> taken(features.size(), 0);
   std::vector<PointId> matched;
+  matched.reserve(features.size());
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) {
       taken[f] = 1;
@@ -205,6 +212,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
   std::vector<Pair> pairs;
+  pairs.reserve(features.size());
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
   const size_t in_map = pairs.size();
@@ -222,9 +230,13 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
   if (inliers < min_inliers) return false;
 
+  std::vector<PointId> in_view, found;
+  in_view.reserve(candidates.size());
+  found.reserve(features.size());
   for (size_t i = 0; i < candidates.size(); ++i)
-    if (visible[i]) ++visibility_[candidates[i].id].visible;
-  for (PointId id : matched) ++visibility_[id].visible;
+    if (visible[i]) in_view.push_back(candidates[i].id);
+  visibility_.add_visible(std::move(in_view));
+  visibility_.add_visible(std::move(matched));
   // A guessed depth is let pass more; not where a mover may be.
   const auto strays = [&](const Pair& pair) {
     const auto f = static_cast<size_t>(pair.feature);
@@ -243,13 +255,14 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
-      ++visibility_[points[f]].found;
+      found.push_back(points[f]);
     } else if (strays(pairs[i])) {
       frame.outlier[f] = 1;
     } else {
       frame.odometry[f] = OdometryMatch{pairs[i].point_in_world, !pairs[i].use_depth};
     }
   }
+  visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
   frame.inliers = static_cast<int>(inliers);
@@ -285,6 +298,7 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
 void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& made, TrackedFrame& frame) const {
   auto features = made.at(velocity);
   std::vector<Pair> pairs;
+  pairs.reserve(frame.points.size());
   int in_map = 0;
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (frame.points[f] != kNoPoint) {

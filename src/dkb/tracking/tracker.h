@@ -18,6 +18,7 @@
 #include "dkb/tracking/odometry_points.h"
 #include "dkb/tracking/relocaliser.h"
 #include "dkb/tracking/tracking_map.h"
+#include "dkb/tracking/visibility_counts.h"
 
 namespace dkb {
 
@@ -136,7 +137,7 @@ class Tracker {
 
   TrackingMap map_;
   std::map<PointId, ProvisionalPoint> provisional_;
-  std::map<PointId, PointVisibility> visibility_;
+  VisibilityCounts visibility_;
   std::vector<PointId> retracted_;   // increasing; until the view has dropped them
   std::vector<PointId> unreported_;  // of these, what mapping was not told yet
 

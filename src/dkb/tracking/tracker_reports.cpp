@@ -14,11 +14,7 @@ constexpr int kMinNewPoints = 100;  // nearest depths that make points at a keyf
 }  // namespace
 
 void Tracker::take_reports(KeyframePacket& packet) {
-  for (auto& [point, visibility] : visibility_) {
-    visibility.point = point;
-    packet.visibility.push_back(visibility);
-  }
-  visibility_.clear();
+  packet.visibility = visibility_.take();
   packet.retracted = std::exchange(unreported_, {});
 }
 
@@ -48,6 +44,7 @@ void Tracker::retract(const std::vector<PointId>& points) {
 std::vector<PointInView> Tracker::points_in_view() const {
   std::vector<PointInView> in_view;
   if (!last_) return in_view;
+  in_view.reserve(candidates_.size() + provisional_.size());
   const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
     const Eigen::Vector3d p = last_->cam_from_world * world;
     if (p.z() < 0.1) return;

@@ -22,6 +22,7 @@ constexpr int kMinMatches = 20;            // with the last frame that make a po
 std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius,
                                                 const MatchableFeatures& features, std::vector<PointId>& points) const {
   std::vector<Candidate> candidates;
+  candidates.reserve(last_->points.size());
   // What was seen last may have been seen from elsewhere: scale and orientation are of that view.
   const Eigen::Vector3d centre = centre_in_world(last_->seen_cam_from_cam * last_->cam_from_world);
   const bool seen_from_here = last_->state != TrackingState::predicted;
@@ -45,6 +46,7 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
       match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
   if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
   std::vector<Pair> pairs;
+  pairs.reserve(matches.size());
   for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
   const PoseEstimate pose = refine(predicted, pairs, features.features);
   if (!pose.ok || pose.inliers < kMinMatches / 2) return std::nullopt;
