@@ -105,6 +105,35 @@ TEST_F(LibraryPriors, AWrongOneInTheDarkIsCorrectedByTheImages) {
   EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(20), 3e-3);
 }
 
+// Before a wall without a picture its depth tells the distance and two rotations; along the wall the velocity lasts.
+TEST_F(LibraryPriors, BeforeABlankWallDepthCarriesThePose) {
+  Slam slam(world.camera(), Options(), Detectors());
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(slam.process(world.frame(i, {.shift = i})).tracked());
+  Vector6d before = Vector6d::Zero(), variance = Vector6d::Zero();
+  for (int i = 20; i < 35; ++i) {
+    const FrameResult r = slam.process(world.frame(i, {.shift = i, .blank = true}));
+    ASSERT_EQ(r.state, TrackingState::predicted) << i;
+    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 0.02) << i;
+    EXPECT_NEAR(r.world_from_cam->translation.z(), 0, 0.01) << i;
+    variance = r.covariance->diagonal();
+    EXPECT_GT(variance[0], before[0]) << i;
+    EXPECT_FALSE(r.keyframe);
+    before = variance;
+  }
+  EXPECT_GT(variance[0], 4 * variance[2]) << "what the wall shows is known better";
+  for (int i = 35; i < 45; ++i) {
+    const FrameResult r = slam.process(world.frame(i, {.shift = i}));
+    ASSERT_TRUE(r.tracked()) << i;
+    if (i > 36) {
+      EXPECT_NE(r.state, TrackingState::predicted) << i;
+      EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 5e-3) << i;
+    }
+  }
+  slam.finish();
+  EXPECT_EQ(slam.statistics().lost, 0);
+  EXPECT_EQ(slam.statistics().maps, 1);
+}
+
 TEST_F(LibraryPriors, WithoutOneTheDarkIsALoss) {
   Slam slam(world.camera(), Options(), Detectors::none());
   for (int i = 0; i < 20; ++i) slam.process(driven(i, {.shift = i}, i > 0));
@@ -129,8 +158,8 @@ TEST_F(LibraryPriors, ARotationBridgesAsLongAsTheVelocityCanBeTakenToLast) {
       EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 0.02) << i;
     }
   }
-  // Half of 1 m/s^2 over t seconds is 0.25 m after 0.7 s, 21 frames.
-  EXPECT_NEAR(predicted, 21, 1);
+  // Half of 2 m/s^2 over t seconds is 0.25 m after 0.5 s, 15 frames.
+  EXPECT_NEAR(predicted, 15, 1);
   EXPECT_EQ(lost, 60 - predicted);
 }
 

@@ -65,8 +65,9 @@ Frame WallWorld::frame(int index, const Look& look) const {
       const bool on_card = card.contains(static_cast<float>(x), static_cast<float>(y));
       int column = x + look.shift;
       if (period_ > 0) column = (column % period_ + period_) % period_;
-      grey[i] = on_card ? block(77, (x - look.card) / kCardBlock, y / kCardBlock)
-                        : block(look.picture, (column + 100 * kBlock) / kBlock, y / kBlock);
+      grey[i] = look.blank ? 128
+                : on_card  ? block(77, (x - look.card) / kCardBlock, y / kCardBlock)
+                           : block(look.picture, (column + 100 * kBlock) / kBlock, y / kBlock);
       depth[i] = static_cast<float>(on_card ? kCard : kWall);
     }
   FrameInput input;

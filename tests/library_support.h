@@ -19,6 +19,7 @@ class WallWorld {
     int shift = 0;         // [px of the wall] the camera's place
     int card = -1000;      // [px] left edge of the card in the image; out of sight unless told
     bool dark = false;     // no picture and no depth
+    bool blank = false;    // no picture
     uint64_t picture = 1;  // on the wall: another number is another place
   };
 

@@ -75,7 +75,7 @@ enum class TrackingState {
   lost,          ///< there is no pose
   relocalised,   ///< found again; the pose is good
   paused,        ///< Slam::pause(true): the frame was not looked at
-  predicted,     ///< the images do not tell; the pose goes on by the motion prior, and the covariance grows
+  predicted,     ///< the images do not tell; the pose goes on by a motion prior or by depth, and the covariance grows
 };
 DKB_SLAM_API const char* name_of(TrackingState state);
 

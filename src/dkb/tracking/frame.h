@@ -24,6 +24,9 @@ struct PosePrediction {
   Rigid3 cam_from_world;
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
 
+  // It may weigh in a pose by the images: told by the camera itself, and not where the map shows another place.
+  bool weighs = false;
+
   // Whether a pose by the images may be the same one.
   bool agrees(const Rigid3& found_cam_from_world) const;
 };

@@ -129,7 +129,7 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
-  if (!expected) return optimise_pose(camera_, initial, observations);
+  if (!expected || !expected->weighs) return optimise_pose(camera_, initial, observations);
   const PosePrior prior{expected->cam_from_world, expected->covariance.inverse()};
   return optimise_pose(camera_, initial, observations, {}, &prior);
 }
@@ -343,6 +343,7 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
     if (!within_travel_distance(*found, frame.timestamp) && found->similarity() < kMinSimilarityFar) return false;
   }
   candidates_made_.reset();
+  if (frame.predicted) frame.predicted->weighs = false;
   return track_local_map(found->cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->points, frame);
 }
 
@@ -450,8 +451,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
     velocity_ = seen_before ? velocity_to(frame) : step;
     const double seconds = frame.timestamp - last_->timestamp;
-    if (seen_before)
-      filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);
+    if (seen_before) filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);
   }
   drop_unmatched_suspects(frame);
   finish(frame);

@@ -9,8 +9,8 @@ namespace dkb {
 namespace {
 
 // Standard deviations of a place that nothing but the camera tells, beyond which nobody knows it.
-constexpr double kMaxGuessedPosition = 1.0;  // [m]
-constexpr double kMaxGuessedRotation = 0.5;  // [rad]
+constexpr double kMaxGuessedPosition = 0.25;  // [m]
+constexpr double kMaxGuessedRotation = 0.25;  // [rad]
 
 constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
 // What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
@@ -33,6 +33,10 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   const VelocityFilter filter = velocity_ ? filter_ : VelocityFilter::at_rest();
   step.covariance = seconds * seconds * filter.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
+  // Nothing corrects the translation: an acceleration since the camera was seen is off by half its time squared.
+  const auto off = [](double t) { return 0.25 * kAccelerationSd * kAccelerationSd * t * t * t * t; };
+  const double variance = off(timestamp - last_seen_) - off(last_->timestamp - last_seen_);
+  step.covariance = Vector6d::Constant(variance).asDiagonal();
   step.previous_from_current.rotation = prior->previous_from_current.rotation;
   step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
   return step;
@@ -48,7 +52,7 @@ std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
   const Rigid3 cam_from_world = whole.previous_from_current.inverse();
   if (!(told || known) || !plausible_motion(cam_from_world, input.timestamp)) return std::nullopt;
-  return PosePrediction{cam_from_world, whole.covariance};
+  return PosePrediction{cam_from_world, whole.covariance, input.prior == nullptr};
 }
 
 bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
