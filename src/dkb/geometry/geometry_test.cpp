@@ -30,12 +30,12 @@ TEST(VelocityFilter, WeighsWhatIsMeasuredByItsNoise) {
   const Vector6d speed = Vector6d::Constant(0.2);
   filter.update(speed, exact, 0.1);
   EXPECT_LT((filter.velocity() - speed).norm(), 1e-9);
-  // By hand: 0.1 s of 1 m/s^2 leave a variance of 0.01 beside 0.25, those of 3 rad/s^2 one of 0.09.
+  // By hand: 0.1 s of 2 m/s^2 leave a variance of 0.04 beside 0.25, those of 6 rad/s^2 one of 0.36.
   filter.update(Vector6d::Zero(), noisy, 0.1);
-  EXPECT_NEAR(filter.velocity()[0], 0.2 * (1 - 0.01 / 0.26), 1e-6);
-  EXPECT_NEAR(filter.velocity()[5], 0.2 * (1 - 0.09 / 0.34), 1e-6);
-  EXPECT_NEAR(filter.covariance(0, 0)(0, 0), 0.01 * 0.25 / 0.26, 1e-6);
-  EXPECT_NEAR(filter.covariance(0.1, 0.2)(0, 0) - filter.covariance(0, 0)(0, 0), 0.03, 1e-9);
+  EXPECT_NEAR(filter.velocity()[0], 0.2 * (1 - 0.04 / 0.29), 1e-6);
+  EXPECT_NEAR(filter.velocity()[5], 0.2 * (1 - 0.36 / 0.61), 1e-6);
+  EXPECT_NEAR(filter.covariance(0, 0)(0, 0), 0.04 * 0.25 / 0.29, 1e-6);
+  EXPECT_NEAR(filter.covariance(0.1, 0.2)(0, 0) - filter.covariance(0, 0)(0, 0), 0.12, 1e-9);
 }
 
 TEST(VelocityFilter, FollowsNoisyStepsWithinItsCovariance) {
