@@ -264,7 +264,7 @@ TEST(PeopleControl, BoxesBesideThePeopleAreNoticed) {
   const PeopleRun run(temp / "out", {"--detector", "file", "--boxes", temp / "boxes.txt"});
   EXPECT_GT(run.ape, 0.03);
   EXPECT_GT(run.features.leak, 0.15);
-  EXPECT_GT(run.map_points_on_people, 50);
+  EXPECT_GT(run.map_points_on_people, 40) << "twice what right boxes may leave";
 }
 
 TEST(PeopleControl, MasksOfEarlierFramesAreNoticed) {
