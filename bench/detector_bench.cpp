@@ -87,7 +87,7 @@ int main(int argc, char** argv) try {
   FileDetector truth(sequence / "boxes.txt", camera.width, camera.height);
   MaskFolder masks(sequence / "masks", read_grey, {}, camera.width, camera.height);
   std::vector<double> milliseconds, filling_ms;
-  const Preprocessing& preprocessing = network.head().facts.preprocessing;
+  const Preprocessing& preprocessing = network.head().preprocessing;
   const Letterbox letterbox =
       Letterbox::place(preprocessing.fit, camera.width, camera.height, network.input_width(), network.input_height());
   std::vector<float> blob;
@@ -108,9 +108,9 @@ int main(int argc, char** argv) try {
       "{:.1f}% of {} boxes hold "
       "nobody; "
       "{:.1f}% of the people's pixels covered, and as many as {:.1f}% of them beside\n",
-      network.head().facts.name, network.input_width(), network.input_height(), to_string(network.inference()),
-      counts.frames, quantile(milliseconds, 0.5), quantile(filling_ms, 0.5), percent(counts.found, counts.people),
-      counts.people, percent(counts.wrong, counts.boxes), counts.boxes, percent(counts.covered, counts.pixels),
+      network.head().name, network.input_width(), network.input_height(), to_string(network.inference()), counts.frames,
+      quantile(milliseconds, 0.5), quantile(filling_ms, 0.5), percent(counts.found, counts.people), counts.people,
+      percent(counts.wrong, counts.boxes), counts.boxes, percent(counts.covered, counts.pixels),
       percent(counts.beside, counts.pixels));
   return 0;
 } catch (const std::exception& e) {

@@ -2,7 +2,6 @@
 #include "dkb/detection/detector_heads.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "dkb/detection/head_families.h"
 
@@ -31,11 +30,7 @@ std::vector<Tap> mask_taps(int first, int end, float scale, float offset, int si
 
 }  // namespace
 
-MaskLogits DetectorHead::mask(const HeadLayout&, NetworkOutputs, const Prediction&) const {
-  throw std::logic_error(std::string(facts.name) + " has no masks");
-}
-
-bool has_dims(const OnnxNetwork::Output& output, std::span<const int> dims) {
+bool has_dims(const OnnxNetwork::Output& output, std::initializer_list<int> dims) {
   return std::equal(output.dims.begin(), output.dims.end(), dims.begin(), dims.end(),
                     [](int have, int want) { return want == -1 || have == want; });
 }
@@ -52,9 +47,21 @@ std::optional<size_t> output_of_dims(NetworkOutputs outputs, std::initializer_li
   return std::nullopt;
 }
 
-std::span<const DetectorHead* const> detector_heads() {
-  static const std::vector<const DetectorHead*> heads = [] {
-    std::vector<const DetectorHead*> all;
+std::optional<HeadLayout> rows_of(NetworkOutputs outputs, int predictions, int others) {
+  const auto output = output_of_dims(outputs, {1, predictions, -1});
+  if (predictions == 0 || !output || outputs[*output].dims[2] <= others) return std::nullopt;
+  return HeadLayout{nullptr, outputs[*output].dims[2] - others, predictions, {*output}};
+}
+
+int cell_count(std::span<const int> strides, int width, int height) {
+  int cells = 0;
+  for (const int stride : strides) cells += ((width + stride - 1) / stride) * ((height + stride - 1) / stride);
+  return cells;
+}
+
+std::span<const DetectorHead> detector_heads() {
+  static const std::vector<DetectorHead> heads = [] {
+    std::vector<DetectorHead> all;
     for (const auto& family : {yolo_heads(), distribution_heads(), detr_heads()})
       all.insert(all.end(), family.begin(), family.end());
     return all;
@@ -71,8 +78,11 @@ std::optional<HeadLayout> recognise_head(NetworkOutputs outputs, int width, int 
     }
     if (values != output.values.size()) return std::nullopt;
   }
-  for (const DetectorHead* head : detector_heads())
-    if (auto layout = head->recognise(outputs, width, height)) return layout;
+  for (const DetectorHead& head : detector_heads())
+    if (auto layout = head.recognise(outputs, width, height)) {
+      layout->head = &head;
+      return layout;
+    }
   return std::nullopt;
 }
 

@@ -81,8 +81,8 @@ std::string describe(NetworkOutputs outputs) {
 
 std::string known_heads() {
   std::string text;
-  for (const DetectorHead* head : detector_heads())
-    text += (text.empty() ? "" : "; ") + std::string(head->facts.name) + " (" + head->facts.outputs + ")";
+  for (const DetectorHead& head : detector_heads())
+    text += (text.empty() ? "" : "; ") + std::string(head.name) + " (" + head.outputs + ")";
   return text;
 }
 
@@ -110,9 +110,9 @@ std::pair<int, int> usual_input(OnnxNetwork& network, int width, int height) {
   for (const int size : kProbes) try {
       std::string outputs;
       if (const auto layout = head_at(network, size, size, &outputs)) {
-        const DetectorHead::Facts& facts = layout->head->facts;
-        return facts.square ? std::pair(facts.usual_input, facts.usual_input)
-                            : input_for(facts.usual_input, width, height);
+        const DetectorHead& head = *layout->head;
+        return head.transformer ? std::pair(head.usual_input, head.usual_input)
+                                : input_for(head.usual_input, width, height);
       }
     } catch (const InputError&) {  // it does not run at this size
     }
@@ -178,9 +178,9 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
                      (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : "") +
                      (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
   layout_ = *layout;
-  const DetectorHead::Facts& facts = layout_.head->facts;
+  const DetectorHead& head = *layout_.head;
   if (options_.labels.empty()) {
-    labels_ = facts.numbered_as_in_coco ? numbered_coco_labels() : coco_labels();
+    labels_ = head.numbered_as_in_coco ? numbered_coco_labels() : coco_labels();
     check_labels(name + ": the graph scores " + std::to_string(layout_.classes) + " classes, COCO has " +
                  std::to_string(labels_.size()) + "; give a file with its labels");
   } else {
@@ -193,7 +193,7 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
 void OnnxDetector::check_labels(const std::string& error) const {
   if (layout_.classes == 0) return;  // its outputs do not say how many there are
   const auto classes = static_cast<size_t>(layout_.classes);
-  const bool may_lack_one = layout_.head->facts.numbered_as_in_coco && !options_.labels.empty();
+  const bool may_lack_one = layout_.head->numbered_as_in_coco && !options_.labels.empty();
   if (labels_.size() != classes && !(may_lack_one && labels_.size() + 1 == classes)) throw InputError(error);
 }
 
@@ -214,20 +214,19 @@ Detections OnnxDetector::detect(const DetectorInput& image) {
   if (image.grey.empty()) throw InputError("the detector was given an empty image");
   const DetectorHead& head = *layout_.head;
   const Letterbox letterbox =
-      Letterbox::place(head.facts.preprocessing.fit, image.grey.width, image.grey.height, input_width_, input_height_);
-  fill_blob(image, letterbox, head.facts.preprocessing, &blob_);
+      Letterbox::place(head.preprocessing.fit, image.grey.width, image.grey.height, input_width_, input_height_);
+  fill_blob(image, letterbox, head.preprocessing, &blob_);
   const std::vector<OnnxNetwork::Output> outputs = network_->forward(blob_, input_width_, input_height_);
   if (recognise_head(outputs, input_width_, input_height_) != layout_)
     throw InputError(options_.model.string() + ": puts out other sizes than it did at first (" + describe(outputs) +
                      "); export it with outputs of fixed size");
   std::vector<Prediction> predictions = head.decode(layout_, outputs, input_width_, input_height_, wanted_);
   Detections found;
-  for (const Prediction& p :
-       suppress_overlaps(std::move(predictions), head.facts.one_box_an_object ? 1 : options_.max_overlap)) {
+  for (const Prediction& p : suppress_overlaps(std::move(predictions), head.transformer ? 1 : options_.max_overlap)) {
     const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
     if (!(box.w > 0 && box.h > 0)) continue;
     found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});
-    if (!head.facts.masks) continue;
+    if (head.mask == nullptr) continue;
     if (found.mask.empty()) found.mask = GreyImage(image.grey.width, image.grey.height, 0);
     paint_mask(head.mask(layout_, outputs, p), letterbox, box, &found.mask);
   }

@@ -99,7 +99,7 @@ std::string one_v8_box(int classes) {
 
 TEST_P(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
   OnnxDetector detector(write(one_box(3, 80, 1.0f)), 192, 128);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOv5");
+  EXPECT_STREQ(detector.head().name, "YOLOv5");
   EXPECT_EQ(detector.input_width(), 96);
   const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
@@ -111,7 +111,7 @@ TEST_P(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
 
 TEST_P(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
   OnnxDetector detector(write(one_v8_box(80)), 192, 128);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOv8");
+  EXPECT_STREQ(detector.head().name, "YOLOv8");
   const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
   EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
@@ -120,7 +120,7 @@ TEST_P(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
 
 TEST_P(OnnxDetectorTest, YoloxGraphsGetBgrUpTo255) {
   OnnxDetector detector(write(one_box(1, 80, 1.0f / 255)), 96, 64);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOX");
+  EXPECT_STREQ(detector.head().name, "YOLOX");
   EXPECT_TRUE(detect_in(detector, 96, 64, {204, 0, 0}).boxes.empty());
   const Detections found = detect_in(detector, 96, 64, {0, 0, 204});
   ASSERT_EQ(found.boxes.size(), 0u + 1);
@@ -133,7 +133,7 @@ TEST_P(OnnxDetectorTest, OpenYoloxGraphsTakeTheImagesShapeAt416) {
   cell[4] = 0.9f;
   cell[5] = 1.0f;
   OnnxDetector detector(write(yolox_graph(-1, -1, cell)), 640, 480);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOX");
+  EXPECT_STREQ(detector.head().name, "YOLOX");
   EXPECT_EQ(detector.input_width(), 416);
   EXPECT_EQ(detector.input_height(), 320);  // 416 x 480 / 640 = 312, rounded up to a multiple of 32
   // 13 x 10 cells of 32 px; the last row covers input rows 288 ... 320, of which the image has 24, so it is clipped.
@@ -211,7 +211,7 @@ TEST_P(OnnxDetectorTest, UnknownHeadsAreToldByTheirShapeAndTheKnownOnesListed) {
   const std::vector<float> zeros(300 * 6, 0.0f);
   const std::string text = error_of(write(mean_graph(64, 64, 300, 6, zeros, {zeros, zeros, zeros})));
   EXPECT_NE(text.find("1 x 300 x 6"), std::string::npos);
-  for (const DetectorHead* head : detector_heads()) EXPECT_NE(text.find(head->facts.name), std::string::npos) << text;
+  for (const DetectorHead& head : detector_heads()) EXPECT_NE(text.find(head.name), std::string::npos) << text;
 }
 
 TEST_P(OnnxDetectorTest, LayersThatAreLackingAreNamed) {
@@ -282,7 +282,7 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
   options.inference = inference;
   OnnxDetector detector(options, 640, 480);
   EXPECT_EQ(detector.inference(), inference);
-  EXPECT_STREQ(detector.head().facts.name, real.head);
+  EXPECT_STREQ(detector.head().name, real.head);
   EXPECT_EQ(detector.input_width(), real.width);
   EXPECT_EQ(detector.input_height(), real.height);
   EXPECT_EQ(detector.frames_per_detection(30),

@@ -42,7 +42,7 @@ class OnnxHeadsTest : public testing::TestWithParam<Inference> {
   Detections detect(const Sample& sample, int width, int height, Rgb colour, const std::string& more = "") const {
     OnnxDetector detector(write(onnx_test::put_graph(sample.width, sample.height, sample.outputs, more)), width,
                           height);
-    EXPECT_EQ(detector.head().facts.name, sample.head);
+    EXPECT_EQ(detector.head().name, sample.head);
     auto image = std::make_shared<RgbdImage>();
     image->colour = ColourImage(width, height, colour);
     image->grey = grey_from_colour(image->colour);
