@@ -10,24 +10,6 @@ namespace {
 
 constexpr size_t kMaxCandidates = 1000;
 
-// One direction of a bilinear look-up: two places and the weight of the second, for the pixels first ... end of an
-// image along this direction.
-struct Tap {
-  int first, second;
-  float weight;
-};
-
-std::vector<Tap> mask_taps(int first, int end, float scale, float offset, int size) {
-  std::vector<Tap> taps;
-  for (int i = first; i < end; ++i) {
-    const float at =
-        std::clamp((static_cast<float>(i) + 0.5f) * scale + offset - 0.5f, 0.0f, static_cast<float>(size - 1));
-    const int left = static_cast<int>(at);
-    taps.push_back({left, std::min(left + 1, size - 1), at - static_cast<float>(left)});
-  }
-  return taps;
-}
-
 }  // namespace
 
 bool has_dims(const OnnxNetwork::Output& output, std::initializer_list<int> dims) {
@@ -109,8 +91,12 @@ void paint_mask(const MaskLogits& logits, const Letterbox& letterbox, const Box&
   // From the image's pixels over the input's to the mask's.
   const auto taps = [](int first, int end, int image, int scaled, int before, int input, int size) {
     const float to_mask = static_cast<float>(size) / static_cast<float>(input);
-    return mask_taps(first, end, static_cast<float>(scaled) / static_cast<float>(image) * to_mask,
-                     static_cast<float>(before) * to_mask, size);
+    const float scale = static_cast<float>(scaled) / static_cast<float>(image) * to_mask;
+    const float offset = static_cast<float>(before) * to_mask;
+    std::vector<Tap> all;
+    for (int i = first; i < end; ++i)
+      all.push_back(bilinear_tap((static_cast<float>(i) + 0.5f) * scale + offset, size));
+    return all;
   };
   const std::vector<Tap> columns = taps(left, right, letterbox.image_width, letterbox.scaled_width, letterbox.left,
                                         letterbox.input_width, logits.width);

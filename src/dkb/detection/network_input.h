@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -38,6 +39,18 @@ struct Letterbox {
   Box to_image(const Box& in_input) const;
   Box to_input(const Box& in_image) const;
 };
+
+// A bilinear look-up in a row of values: two places in it, and the weight of the second.
+struct Tap {
+  int first, second;
+  float weight;
+};
+// `at`: from the row's beginning, in values, whose centres lie at halves; beyond the outermost centres a value lasts.
+inline Tap bilinear_tap(float at, int size) {
+  at = std::clamp(at - 0.5f, 0.0f, static_cast<float>(size - 1));
+  const int first = static_cast<int>(at);
+  return {first, std::min(first + 1, size - 1), at - static_cast<float>(first)};
+}
 
 // The network's input, 3 x input_height x input_width floats: bilinear, pixel centres at half coordinates. Grey images
 // feed all three channels. `blob` is resized.

@@ -155,7 +155,8 @@ TEST(FillBlob, GivesTheBytesOfThePlainForm) {
     for (const Preprocessing& how : {kRgb, kBgr, stretched_by_imagenet(true), stretched_by_imagenet(false)}) {
       const std::vector<float> plain =
           plain_blob(image, Letterbox::place(how.fit, width, height, input_width, input_height), how);
-      for (const Simd simd : {Simd::scalar, best_simd()}) {
+      for (const Simd simd : {Simd::scalar, Simd::avx2, Simd::avx512}) {
+        if (simd > best_simd()) continue;
         const std::vector<float> blob = blob_of(image, how, input_width, input_height, simd);
         ASSERT_EQ(blob.size(), plain.size());
         EXPECT_EQ(std::memcmp(blob.data(), plain.data(), blob.size() * sizeof(float)), 0)
