@@ -8,7 +8,7 @@
 namespace dkb {
 namespace {
 
-constexpr size_t kMaxCandidates = 1000;
+constexpr size_t kMaxCandidates = 1000;  // suppression compares each with each
 
 }  // namespace
 

@@ -90,7 +90,7 @@ std::vector<DetectorHead> detr_heads() {
   // The same with masks 1 x N x height x width over all of the input.
   DetectorHead rf_detr_seg = rf_detr;
   rf_detr_seg.name = "RF-DETR-Seg";
-  rf_detr_seg.outputs = "the same and masks 1 x N x H x W";
+  rf_detr_seg.outputs = "those of RF-DETR and masks 1 x N x H x W";
   rf_detr_seg.usual_input = 384;
   rf_detr_seg.recognise = recognise_rf_detr_seg;
   rf_detr_seg.mask = mask_rf_detr;

@@ -8,7 +8,7 @@
 namespace dkb {
 namespace {
 
-constexpr float kPadding = 114;  // grey of the training's letterboxes
+constexpr float kPadding = 114;  // grey that YOLOv5 and YOLOX are trained with around images
 
 // The samples of a bilinear resize along one direction: places of both in the source, and the weight of the second.
 struct Taps {
@@ -90,12 +90,6 @@ Box Letterbox::to_image(const Box& b) const {
   const float sx = static_cast<float>(image_width) / static_cast<float>(scaled_width);
   const float sy = static_cast<float>(image_height) / static_cast<float>(scaled_height);
   return {(b.x - static_cast<float>(left)) * sx, (b.y - static_cast<float>(top)) * sy, b.w * sx, b.h * sy};
-}
-
-Box Letterbox::to_input(const Box& b) const {
-  const float sx = static_cast<float>(scaled_width) / static_cast<float>(image_width);
-  const float sy = static_cast<float>(scaled_height) / static_cast<float>(image_height);
-  return {b.x * sx + static_cast<float>(left), b.y * sy + static_cast<float>(top), b.w * sx, b.h * sy};
 }
 
 void fill_blob(const DetectorInput& image, const Letterbox& box, const Preprocessing& preprocessing,

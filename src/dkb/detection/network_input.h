@@ -24,7 +24,7 @@ struct Preprocessing {
   std::array<float, 3> scale{1.0f / 255.0f, 1.0f / 255.0f, 1.0f / 255.0f};
 };
 
-// Mean and deviation of ImageNet's colours, which many networks are trained with.
+// Mean and deviation of ImageNet's colours as torchvision gives them, times 255: many networks are trained with these.
 Preprocessing stretched_by_imagenet(bool blue_first);
 
 // Where an image lies in a network's input.
@@ -37,7 +37,6 @@ struct Letterbox {
   static Letterbox place(Preprocessing::Fit fit, int image_width, int image_height, int input_width, int input_height);
 
   Box to_image(const Box& in_input) const;
-  Box to_input(const Box& in_image) const;
 };
 
 // A bilinear look-up in a row of values: two places in it, and the weight of the second.
