@@ -17,6 +17,13 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   return parse_trajectory(read_file(path), path.string());
 }
 
+std::optional<Trajectory> truth_beside(const std::filesystem::path& recording) {
+  const std::filesystem::path file = recording / "groundtruth.txt";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  return read_trajectory(file);
+}
+
 Trajectory parse_trajectory(const std::string& text, const std::string& name) {
   Trajectory trajectory;
   for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
