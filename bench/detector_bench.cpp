@@ -33,8 +33,8 @@ bool holds(const std::vector<Detection>& boxes, float x, float y) {
 struct Counts {
   size_t frames = 0, people = 0, found = 0;  // of the people
   size_t boxes = 0, wrong = 0;               // boxes that no person is in
-  size_t pixels = 0, covered = 0,
-         beside = 0;  // of the people; of these, in boxes or masks; of boxes or masks, beside them
+  size_t pixels = 0, covered = 0;            // of the people, and of these in boxes or masks
+  size_t beside = 0;                         // pixels of boxes or masks that are not of people
 
   void add(const Detections& truth, const GreyImage& mask, const Detections& answer) {
     ++frames;
@@ -105,9 +105,8 @@ int main(int argc, char** argv) try {
   }
   fmt::print(
       "{}, {} x {}, {}: {} frames, {:.1f} ms each, {:.2f} to fill the input (medians); {:.1f}% of {} people found, "
-      "{:.1f}% of {} boxes hold "
-      "nobody; "
-      "{:.1f}% of the people's pixels covered, and as many as {:.1f}% of them beside\n",
+      "{:.1f}% of {} boxes hold nobody; {:.1f}% of the people's pixels covered, and as many as {:.1f}% of them "
+      "beside\n",
       network.head().name, network.input_width(), network.input_height(), to_string(network.inference()), counts.frames,
       quantile(milliseconds, 0.5), quantile(filling_ms, 0.5), percent(counts.found, counts.people), counts.people,
       percent(counts.wrong, counts.boxes), counts.boxes, percent(counts.covered, counts.pixels),
