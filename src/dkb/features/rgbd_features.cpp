@@ -90,7 +90,7 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
     for (int row = y - 1; row <= y + 1; ++row) __builtin_prefetch(&image.depth(x, row));
     if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
   };
-  constexpr size_t kAhead = 12;
+  constexpr size_t kAhead = 12;  // [corners] as measured, docs/decisions.md
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     if (i + kAhead < orb.corners.size()) ask_early(orb.corners[i + kAhead]);
     const Corner& c = orb.corners[i];
