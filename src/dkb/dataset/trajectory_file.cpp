@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-#include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
+#include "dkb/util/text_rows.h"
 #include "dkb_slam/slam.h"
 
 namespace dkb {
