@@ -13,7 +13,7 @@
 namespace dkb {
 namespace {
 
-constexpr double kLimit = 1e12;  // of all numbers: floats can hold what is clipped
+constexpr double kLimit = 1e12;  // of stamps, pixels and scores alike; floats hold more
 
 struct Row {
   double timestamp = 0;
