@@ -264,7 +264,7 @@ void RunSession::write(double seconds) {
   write_outputs(out_, *slam_, trajectories, facts_);
   const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
   write_file_atomically(out_ / "report.html",
-                        report_html(*log_, reported, report::truth_beside(args_.source, reported.trajectory)));
+                        report_html(*log_, reported, report::evaluated_by_truth(args_.source, reported.trajectory)));
   if (args_.cv_orb && interrupted_.empty()) write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
 }
 

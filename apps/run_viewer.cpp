@@ -16,18 +16,14 @@ namespace {
 
 constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed after so long
 
-std::vector<ViewerOptions::TruePosition> truth_beside(const fs::path& source) {
-  std::vector<ViewerOptions::TruePosition> truth;
-  std::error_code error;
-  const fs::path file = source / "groundtruth.txt";
-  if (!fs::is_regular_file(file, error)) return truth;
-  try {
-    for (const StampedPose& p : read_trajectory(file))
-      truth.push_back({std::llround(p.timestamp * 1e9), p.world_from_cam.translation});
-  } catch (const InputError&) {
-    truth.clear();  // a run does not depend on it
-  }
-  return truth;
+// None where the file cannot be used, for a run does not depend on it.
+std::vector<ViewerOptions::TruePosition> true_positions(const fs::path& source) try {
+  std::vector<ViewerOptions::TruePosition> positions;
+  for (const StampedPose& p : truth_beside(source).value_or(Trajectory()))
+    positions.push_back({std::llround(p.timestamp * 1e9), p.world_from_cam.translation});
+  return positions;
+} catch (const InputError&) {
+  return {};
 }
 
 }  // namespace
@@ -65,7 +61,7 @@ RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const st
   o.frames = source.size();
   if (o.camera.fps > 0) o.budget_ms = 1000 / o.camera.fps;
   o.realtime = options.realtime;
-  o.truth = truth_beside(source_name);
+  o.truth = true_positions(source_name);
   viewer_ = open_viewer(o);
   if (!serves_) return;
   fmt::print(stderr, "viewer: {}\n", viewer_->url());

@@ -33,8 +33,8 @@ bool holds(const std::vector<Detection>& boxes, float x, float y) {
 struct Counts {
   size_t frames = 0, people = 0, found = 0;  // of the people
   size_t boxes = 0, wrong = 0;               // boxes that no person is in
-  size_t pixels = 0, covered = 0,
-         beside = 0;  // of the people; of these, in boxes or masks; of boxes or masks, beside them
+  size_t pixels = 0, covered = 0;            // of the people, and of these in boxes or masks
+  size_t beside = 0;                         // pixels of boxes or masks that are not of people
 
   void add(const Detections& truth, const GreyImage& mask, const Detections& answer) {
     ++frames;
@@ -87,7 +87,7 @@ int main(int argc, char** argv) try {
   FileDetector truth(sequence / "boxes.txt", camera.width, camera.height);
   MaskFolder masks(sequence / "masks", read_grey, {}, camera.width, camera.height);
   std::vector<double> milliseconds, filling_ms;
-  const Preprocessing& preprocessing = network.head().facts.preprocessing;
+  const Preprocessing& preprocessing = network.head().preprocessing;
   const Letterbox letterbox =
       Letterbox::place(preprocessing.fit, camera.width, camera.height, network.input_width(), network.input_height());
   std::vector<float> blob;
@@ -105,12 +105,11 @@ int main(int argc, char** argv) try {
   }
   fmt::print(
       "{}, {} x {}, {}: {} frames, {:.1f} ms each, {:.2f} to fill the input (medians); {:.1f}% of {} people found, "
-      "{:.1f}% of {} boxes hold "
-      "nobody; "
-      "{:.1f}% of the people's pixels covered, and as many as {:.1f}% of them beside\n",
-      network.head().facts.name, network.input_width(), network.input_height(), to_string(network.inference()),
-      counts.frames, quantile(milliseconds, 0.5), quantile(filling_ms, 0.5), percent(counts.found, counts.people),
-      counts.people, percent(counts.wrong, counts.boxes), counts.boxes, percent(counts.covered, counts.pixels),
+      "{:.1f}% of {} boxes hold nobody; {:.1f}% of the people's pixels covered, and as many as {:.1f}% of them "
+      "beside\n",
+      network.head().name, network.input_width(), network.input_height(), to_string(network.inference()), counts.frames,
+      quantile(milliseconds, 0.5), quantile(filling_ms, 0.5), percent(counts.found, counts.people), counts.people,
+      percent(counts.wrong, counts.boxes), counts.boxes, percent(counts.covered, counts.pixels),
       percent(counts.beside, counts.pixels));
   return 0;
 } catch (const std::exception& e) {

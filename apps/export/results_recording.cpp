@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dkb/dataset/image_codecs.h"
-#include "dkb/dataset/text_rows.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/map_file.h"
@@ -19,6 +18,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
+#include "dkb/util/text_rows.h"
 
 namespace dkb {
 namespace {

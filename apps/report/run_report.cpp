@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <filesystem>
 #include <limits>
 
 #include "dkb/evaluation/svg_drawing.h"
@@ -43,13 +42,12 @@ std::vector<ChangedSetting> changed_settings(const std::string& effective, const
   return changed;
 }
 
-Truth truth_beside(const std::string& source, const Trajectory& trajectory) {
+Truth evaluated_by_truth(const std::string& source, const Trajectory& trajectory) {
   Truth truth;
-  const std::filesystem::path file = std::filesystem::path(source) / "groundtruth.txt";
-  std::error_code nobody_asks;
-  if (!std::filesystem::is_regular_file(file, nobody_asks)) return truth;
   try {
-    truth.poses = read_trajectory(file);
+    auto poses = truth_beside(source);
+    if (!poses) return truth;
+    truth.poses = std::move(*poses);
     if (!trajectory.empty()) truth.evaluation = evaluate(truth.poses, trajectory, {}, "trajectory.txt");
   } catch (const InputError& e) {
     truth.note = e.what();

@@ -43,8 +43,8 @@ struct Truth {
   std::optional<Evaluation> evaluation;  // of the trajectory, as `eval` makes it
   std::string note;                      // why there is none
 };
-// groundtruth.txt of that folder; without one all is empty. A file that cannot be used is a note and no error.
-Truth truth_beside(const std::string& source, const Trajectory& trajectory);
+// By truth_beside(source); without one all is empty. A file that cannot be used is a note and no error.
+Truth evaluated_by_truth(const std::string& source, const Trajectory& trajectory);
 
 // One page, complete without script and network. What a clock had a say in stands between <!--clock--> and
 // <!--/clock-->; the rest is the same in every run.

@@ -21,9 +21,9 @@ class Slam(_core.Slam):
     camera: of the frames; that of a source is `source.camera`.
     preset: "default", "paper" or "orb": what the settings start from.
     detector: "auto" (yolo where there is a model, else motion), "yolo" (or "network"), "motion", "file", "none",
-        "exec:COMMAND", several joined by "+"; or a function of one's own; or a list of both. A function is given a DetectorImage and
-        returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or (list, mask). What it
-        raises becomes a SlamWarning.
+        "exec:COMMAND", several joined by "+"; or a function of one's own; or a list of both. A function is given a
+        DetectorImage and returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or
+        (list, mask). What it raises becomes a SlamWarning.
     model, labels: ONNX file of the yolo detector (None: $DKB_SLAM_MODEL) and its class names.
     inference: what computes it: "onnxruntime", "opencv", or "auto" (ONNX Runtime where it is found, else OpenCV).
     boxes, masks: of the file detector, `stamp class x y w h [score]` per line; folder of STAMP.png, 255 = mover.

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/text_rows.h"
 
 namespace dkb {
 namespace {

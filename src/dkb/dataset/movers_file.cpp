@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <set>
 
@@ -13,6 +12,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/text_rows.h"
 
 namespace dkb {
 namespace {
@@ -32,13 +32,7 @@ std::vector<std::string_view> split(std::string_view line) {
 }
 
 double number(const std::vector<std::string_view>& columns, size_t column, const std::string& place) {
-  double value = 0;
-  const auto complaint = [&](const char* what) {
-    return place + ": " + kColumns[column] + " \"" + excerpt(columns[column]) + "\" is not " + what;
-  };
-  if (!parse_number(columns[column], &value)) throw InputError(complaint("a number"));
-  if (!(std::abs(value) < 1e12)) throw InputError(complaint("a finite number in range"));
-  return value;
+  return read_number(columns[column], place, kColumns[column], 1e12);
 }
 
 MoverRow parse_row(const std::vector<std::string_view>& columns, const std::string& place) {

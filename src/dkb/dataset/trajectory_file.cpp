@@ -5,16 +5,23 @@
 
 #include <algorithm>
 
-#include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
+#include "dkb/util/text_rows.h"
 #include "dkb_slam/slam.h"
 
 namespace dkb {
 
 Trajectory read_trajectory(const std::filesystem::path& path) {
   return parse_trajectory(read_file(path), path.string());
+}
+
+std::optional<Trajectory> truth_beside(const std::filesystem::path& recording) {
+  const std::filesystem::path file = recording / "groundtruth.txt";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  return read_trajectory(file);
 }
 
 Trajectory parse_trajectory(const std::string& text, const std::string& name) {

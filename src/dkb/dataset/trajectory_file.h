@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ using Trajectory = std::vector<StampedPose>;  // stamps not falling
 // gives an empty trajectory.
 Trajectory read_trajectory(const std::filesystem::path& path);
 Trajectory parse_trajectory(const std::string& text, const std::string& name);
+
+// groundtruth.txt of a recording's folder; none where it has no such file. Throws as read_trajectory().
+std::optional<Trajectory> truth_beside(const std::filesystem::path& recording);
 
 // TUM format with `#` header, 9 decimals, w of the quaternion not negative. Rows in the order given.
 std::string trajectory_to_text(const Trajectory& trajectory);

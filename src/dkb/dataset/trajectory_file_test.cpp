@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
@@ -59,6 +60,19 @@ TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
   std::filesystem::remove(path);
   EXPECT_THROW(read_trajectory(path), InputError);
   EXPECT_THROW(write_trajectory("/proc/none/t.txt", t), OutputError);
+}
+
+TEST(TrajectoryFile, OfTheTruthLiesInTheRecordingsFolder) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_truth");
+  EXPECT_FALSE(truth_beside(folder));
+  std::filesystem::create_directory(folder);
+  EXPECT_FALSE(truth_beside(folder));
+  std::ofstream(folder / "groundtruth.txt") << "1 0 0 0 0 0 0 1\n";
+  EXPECT_EQ(truth_beside(folder).value().size(), 1u);
+  std::ofstream(folder / "groundtruth.txt") << "nothing\n";
+  EXPECT_THROW(truth_beside(folder), InputError);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(TrajectoryFile, MutatedFilesThrowNothingButInputErrors) {

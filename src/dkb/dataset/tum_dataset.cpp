@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/dataset/text_rows.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
+#include "dkb/util/text_rows.h"
 
 namespace dkb {
 namespace fs = std::filesystem;

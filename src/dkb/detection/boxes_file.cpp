@@ -4,37 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
-#include "dkb/util/one_line.h"
-#include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
+#include "dkb/util/text_rows.h"
 
 namespace dkb {
 namespace {
 
-constexpr std::string_view kSpace = " \t\r\v\f";
-
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> columns;
-  for (;;) {
-    const size_t first = line.find_first_not_of(kSpace);
-    if (first == std::string_view::npos) return columns;
-    line.remove_prefix(first);
-    columns.push_back(line.substr(0, line.find_first_of(kSpace)));
-    line.remove_prefix(columns.back().size());
-  }
-}
-
-double number(std::string_view text, const std::string& place, const char* what) {
-  double value = 0;
-  if (!parse_number(text, &value)) throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a number");
-  if (!(std::abs(value) < 1e12))
-    throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a finite number in range");
-  return value;
-}
+constexpr double kLimit = 1e12;  // of stamps, pixels and scores alike; floats hold more
 
 struct Row {
   double timestamp = 0;
@@ -45,12 +24,14 @@ Row parse_row(const std::vector<std::string_view>& columns, const std::string& p
   if (columns.size() < 6)
     throw InputError(place + ": " + std::to_string(columns.size()) +
                      " of 6 columns; a row must be `rgb_timestamp class x y w h [score]`");
+  const auto number = [&](size_t column, const char* what) {
+    return read_number(columns[column], place, what, kLimit);
+  };
   Row row;
-  row.timestamp = number(columns[0], place, "timestamp");
+  row.timestamp = number(0, "timestamp");
   row.detection.class_name = std::string(columns[1]);
-  const double x = number(columns[2], place, "x"), y = number(columns[3], place, "y");
-  const double w = number(columns[4], place, "w"), h = number(columns[5], place, "h");
-  if (columns.size() > 6) row.detection.score = static_cast<float>(number(columns[6], place, "score"));
+  const double x = number(2, "x"), y = number(3, "y"), w = number(4, "w"), h = number(5, "h");
+  if (columns.size() > 6) row.detection.score = static_cast<float>(number(6, "score"));
   if (!(w > 0) || !(h > 0))
     throw InputError(place + fmt::format(": the box is {} x {} px; its size must be positive", w, h));
   const Box box{static_cast<float>(x), static_cast<float>(y), static_cast<float>(w), static_cast<float>(h)};
@@ -65,15 +46,10 @@ Row parse_row(const std::vector<std::string_view>& columns, const std::string& p
 }  // namespace
 
 BoxesByTime parse_boxes(std::string_view text, const std::string& name, int width, int height) {
-  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
   std::vector<Row> rows;
-  for (size_t line_number = 1; !text.empty(); ++line_number) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), line.size() + 1));
-    const std::vector<std::string_view> columns = split(line);
-    if (columns.empty() || columns.front().front() == '#') continue;
-    rows.push_back(parse_row(columns, name + ":" + std::to_string(line_number), width, height));
-  }
+  for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
+    rows.push_back(parse_row(columns, place, width, height));
+  });
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.timestamp < b.timestamp; });
   BoxesByTime boxes;
   for (Row& row : rows) {

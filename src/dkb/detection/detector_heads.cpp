@@ -2,40 +2,17 @@
 #include "dkb/detection/detector_heads.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "dkb/detection/head_families.h"
 
 namespace dkb {
 namespace {
 
-constexpr size_t kMaxCandidates = 1000;
-
-// One direction of a bilinear look-up: two places and the weight of the second, for the pixels first ... end of an
-// image along this direction.
-struct Tap {
-  int first, second;
-  float weight;
-};
-
-std::vector<Tap> mask_taps(int first, int end, float scale, float offset, int size) {
-  std::vector<Tap> taps;
-  for (int i = first; i < end; ++i) {
-    const float at =
-        std::clamp((static_cast<float>(i) + 0.5f) * scale + offset - 0.5f, 0.0f, static_cast<float>(size - 1));
-    const int left = static_cast<int>(at);
-    taps.push_back({left, std::min(left + 1, size - 1), at - static_cast<float>(left)});
-  }
-  return taps;
-}
+constexpr size_t kMaxCandidates = 1000;  // suppression compares each with each
 
 }  // namespace
 
-MaskLogits DetectorHead::mask(const HeadLayout&, NetworkOutputs, const Prediction&) const {
-  throw std::logic_error(std::string(facts.name) + " has no masks");
-}
-
-bool has_dims(const OnnxNetwork::Output& output, std::span<const int> dims) {
+bool has_dims(const OnnxNetwork::Output& output, std::initializer_list<int> dims) {
   return std::equal(output.dims.begin(), output.dims.end(), dims.begin(), dims.end(),
                     [](int have, int want) { return want == -1 || have == want; });
 }
@@ -52,9 +29,21 @@ std::optional<size_t> output_of_dims(NetworkOutputs outputs, std::initializer_li
   return std::nullopt;
 }
 
-std::span<const DetectorHead* const> detector_heads() {
-  static const std::vector<const DetectorHead*> heads = [] {
-    std::vector<const DetectorHead*> all;
+std::optional<HeadLayout> rows_of(NetworkOutputs outputs, int predictions, int others) {
+  const auto output = output_of_dims(outputs, {1, predictions, -1});
+  if (predictions == 0 || !output || outputs[*output].dims[2] <= others) return std::nullopt;
+  return HeadLayout{nullptr, outputs[*output].dims[2] - others, predictions, {*output}};
+}
+
+int cell_count(std::span<const int> strides, int width, int height) {
+  int cells = 0;
+  for (const int stride : strides) cells += ((width + stride - 1) / stride) * ((height + stride - 1) / stride);
+  return cells;
+}
+
+std::span<const DetectorHead> detector_heads() {
+  static const std::vector<DetectorHead> heads = [] {
+    std::vector<DetectorHead> all;
     for (const auto& family : {yolo_heads(), distribution_heads(), detr_heads()})
       all.insert(all.end(), family.begin(), family.end());
     return all;
@@ -71,8 +60,11 @@ std::optional<HeadLayout> recognise_head(NetworkOutputs outputs, int width, int 
     }
     if (values != output.values.size()) return std::nullopt;
   }
-  for (const DetectorHead* head : detector_heads())
-    if (auto layout = head->recognise(outputs, width, height)) return layout;
+  for (const DetectorHead& head : detector_heads())
+    if (auto layout = head.recognise(outputs, width, height)) {
+      layout->head = &head;
+      return layout;
+    }
   return std::nullopt;
 }
 
@@ -99,8 +91,12 @@ void paint_mask(const MaskLogits& logits, const Letterbox& letterbox, const Box&
   // From the image's pixels over the input's to the mask's.
   const auto taps = [](int first, int end, int image, int scaled, int before, int input, int size) {
     const float to_mask = static_cast<float>(size) / static_cast<float>(input);
-    return mask_taps(first, end, static_cast<float>(scaled) / static_cast<float>(image) * to_mask,
-                     static_cast<float>(before) * to_mask, size);
+    const float scale = static_cast<float>(scaled) / static_cast<float>(image) * to_mask;
+    const float offset = static_cast<float>(before) * to_mask;
+    std::vector<Tap> all;
+    for (int i = first; i < end; ++i)
+      all.push_back(bilinear_tap((static_cast<float>(i) + 0.5f) * scale + offset, size));
+    return all;
   };
   const std::vector<Tap> columns = taps(left, right, letterbox.image_width, letterbox.scaled_width, letterbox.left,
                                         letterbox.input_width, logits.width);

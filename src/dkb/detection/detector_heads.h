@@ -19,7 +19,7 @@ struct Prediction {
   int class_id = 0;
   Box box;
   float score = 0;
-  size_t index = 0;  // which of the head's predictions it is
+  size_t index = 0;  // which of its head's predictions it is, where that has masks
 };
 
 // The predictions that are asked for.
@@ -38,7 +38,7 @@ struct MaskLogits {
   std::vector<float> values;
 };
 
-class DetectorHead;
+struct DetectorHead;
 
 // A head as a graph has it.
 struct HeadLayout {
@@ -49,38 +49,27 @@ struct HeadLayout {
   bool operator==(const HeadLayout&) const = default;
 };
 
-// What a family of detection networks puts out, and what it wants to be given. Stateless; there is one of each.
-class DetectorHead {
- public:
-  struct Facts {
-    const char* name;
-    const char* outputs;  // in words; C classes, N predictions
-    Preprocessing preprocessing;
-    int usual_input = 640;             // [px] of graphs that leave it open
-    bool square = false;               // such graphs run at a square input only
-    bool one_box_an_object = false;    // nothing to suppress
-    bool numbered_as_in_coco = false;  // classes by COCO's own numbers, 1 ... 90 with gaps; the last may be no class
-    bool masks = false;
-  };
-  explicit DetectorHead(const Facts& its_facts) : facts(its_facts) {}
-  virtual ~DetectorHead() = default;
-  DetectorHead(const DetectorHead&) = delete;
-  DetectorHead& operator=(const DetectorHead&) = delete;
+// What a family of detection networks puts out, and what it wants to be given.
+struct DetectorHead {
+  const char* name;
+  const char* outputs;  // in words; C classes, N predictions
+  Preprocessing preprocessing{};
+  int usual_input = 640;             // [px] of graphs that leave it open
+  bool transformer = false;          // gives one box an object; graphs of open size run at a square input only
+  bool numbered_as_in_coco = false;  // classes by COCO's own numbers, 1 ... 90 with gaps; the last may be no class
 
   // None when the outputs at this input size [px] are not this head's. Every output holds as many values as its
   // dimensions say.
-  virtual std::optional<HeadLayout> recognise(NetworkOutputs outputs, int width, int height) const = 0;
+  std::optional<HeadLayout> (*recognise)(NetworkOutputs outputs, int width, int height) = nullptr;
   // The predictions that are wanted, in the output's order; what is not finite is left out.
-  virtual std::vector<Prediction> decode(const HeadLayout& layout, NetworkOutputs outputs, int width, int height,
-                                         const Wanted& wanted) const = 0;
-  // Of a head with masks.
-  virtual MaskLogits mask(const HeadLayout& layout, NetworkOutputs outputs, const Prediction& prediction) const;
-
-  const Facts facts;
+  std::vector<Prediction> (*decode)(const HeadLayout& layout, NetworkOutputs outputs, int width, int height,
+                                    const Wanted& wanted) = nullptr;
+  // Null where the head has no masks.
+  MaskLogits (*mask)(const HeadLayout& layout, NetworkOutputs outputs, const Prediction& prediction) = nullptr;
 };
 
 // Every head that is known, in the order in which they are looked for.
-std::span<const DetectorHead* const> detector_heads();
+std::span<const DetectorHead> detector_heads();
 
 // The head of a graph with these outputs; none when no known one has them.
 std::optional<HeadLayout> recognise_head(NetworkOutputs outputs, int width, int height);

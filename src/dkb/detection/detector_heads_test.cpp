@@ -27,8 +27,7 @@ Decoded decode(int rows, int columns, const std::vector<float>& values, int widt
   const std::vector<OnnxNetwork::Output> outputs = {{"output", {1, rows, columns}, values}};
   const auto layout = recognise_head(outputs, width, height);
   if (!layout) return {};
-  return {layout->head->facts.name, *layout,
-          layout->head->decode(*layout, outputs, width, height, {classes, min_score})};
+  return {layout->head->name, *layout, layout->head->decode(*layout, outputs, width, height, {classes, min_score})};
 }
 
 std::string head_of(const std::vector<int>& dims, int width, int height) {
@@ -37,7 +36,7 @@ std::string head_of(const std::vector<int>& dims, int width, int height) {
   const std::vector<float> values(size, 0.0f);
   const std::vector<OnnxNetwork::Output> outputs = {{"output", dims, values}};
   const auto layout = recognise_head(outputs, width, height);
-  return layout ? std::string(layout->head->facts.name) + " " + std::to_string(layout->classes) : "none";
+  return layout ? std::string(layout->head->name) + " " + std::to_string(layout->classes) : "none";
 }
 
 TEST(DetectorHead, IsToldByTheNumberOfPredictions) {
@@ -61,7 +60,7 @@ TEST(DetectorHead, OfEverySampleIsRecognised) {
   for (const head_test::Sample& sample : head_test::samples()) {
     const auto layout = recognise_head(as_network_outputs(sample.outputs), sample.width, sample.height);
     ASSERT_TRUE(layout) << sample.head;
-    EXPECT_EQ(layout->head->facts.name, sample.head);
+    EXPECT_EQ(layout->head->name, sample.head);
   }
 }
 
@@ -185,7 +184,7 @@ TEST(Decode, AnyMutationIsDecodedIntoFiniteBoxesOrRefused) {
       ++found;
       EXPECT_TRUE(std::isfinite(p.box.x + p.score) && p.box.w > 0 && p.box.h > 0) << sample.head;
       EXPECT_TRUE(p.class_id >= 0 && p.class_id < 80) << sample.head;
-      if (!layout->head->facts.masks) continue;
+      if (!layout->head->mask) continue;
       GreyImage mask(96, 72, 0);
       paint_mask(layout->head->mask(*layout, outputs, p), letterbox, letterbox.to_image(p.box), &mask);
     }

@@ -11,7 +11,7 @@
 namespace dkb::head_test {
 using onnx_test::Put;
 
-constexpr int kPerson = 0, kPersonOfCoco = 1;
+constexpr int kPerson = 0, kPersonOfCoco = 1;  // COCO itself counts its classes from 1
 
 struct Sample {
   std::string head;
@@ -79,15 +79,20 @@ inline Sample yolov8_seg() {
   return {"YOLOv8-seg", 96, 64, {out, prototypes}};
 }
 
-// 56 x 56, no multiple of 32. A person about (28, 14), 28 wide and 14 high, whose score is the sigmoid of the mean of
-// the first channel.
+// Makes the prediction `at` of a transformer a person about the middle of the input's upper half, half as wide and a
+// quarter as high as the input, whose score is the sigmoid of the mean of the first channel; the others nothing.
+inline void set_person(int at, int class_id, Put& boxes, Put& logits) {
+  const float box[] = {0.5f, 0.25f, 0.5f, 0.25f};
+  for (int k = 0; k < 4; ++k) boxes({0, at, k}) = box[k];
+  for (float& logit : logits.bias) logit = -9;
+  logits({0, at, class_id}) = 0;
+  logits.slope[0][logits.at({0, at, class_id})] = 1;
+}
+
+// 56 x 56, no multiple of 32: a person about (28, 14), 28 wide and 14 high.
 inline Sample rf_detr() {
   Put boxes("dets", {1, 3, 4}), logits("labels", {1, 3, 91});
-  const float box[] = {0.5f, 0.25f, 0.5f, 0.25f};
-  for (int k = 0; k < 4; ++k) boxes({0, 1, k}) = box[k];
-  for (float& logit : logits.bias) logit = -9;
-  logits({0, 1, kPersonOfCoco}) = 0;
-  logits.slope[0][logits.at({0, 1, kPersonOfCoco})] = 1;
+  set_person(1, kPersonOfCoco, boxes, logits);
   return {"RF-DETR", 56, 56, {boxes, logits}};
 }
 
@@ -102,14 +107,10 @@ inline Sample rf_detr_seg() {
   return sample;
 }
 
-// As rf_detr(), at 64 x 64 and with 80 classes.
+// At 64 x 64 and with 80 classes.
 inline Sample d_fine() {
   Put logits("logits", {1, 3, 80}), boxes("pred_boxes", {1, 3, 4});
-  const float box[] = {0.5f, 0.25f, 0.5f, 0.25f};
-  for (int k = 0; k < 4; ++k) boxes({0, 2, k}) = box[k];
-  for (float& logit : logits.bias) logit = -9;
-  logits({0, 2, kPerson}) = 0;
-  logits.slope[0][logits.at({0, 2, kPerson})] = 1;
+  set_person(2, kPerson, boxes, logits);
   return {"D-FINE or RT-DETR", 64, 64, {logits, boxes}};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct Preprocessing {
   std::array<float, 3> scale{1.0f / 255.0f, 1.0f / 255.0f, 1.0f / 255.0f};
 };
 
-// Mean and deviation of ImageNet's colours, which many networks are trained with.
+// Mean and deviation of ImageNet's colours as torchvision gives them, times 255: many networks are trained with these.
 Preprocessing stretched_by_imagenet(bool blue_first);
 
 // Where an image lies in a network's input.
@@ -36,8 +37,19 @@ struct Letterbox {
   static Letterbox place(Preprocessing::Fit fit, int image_width, int image_height, int input_width, int input_height);
 
   Box to_image(const Box& in_input) const;
-  Box to_input(const Box& in_image) const;
 };
+
+// A bilinear look-up in a row of values: two places in it, and the weight of the second.
+struct Tap {
+  int first, second;
+  float weight;
+};
+// `at`: from the row's beginning, in values, whose centres lie at halves; beyond the outermost centres a value lasts.
+inline Tap bilinear_tap(float at, int size) {
+  at = std::clamp(at - 0.5f, 0.0f, static_cast<float>(size - 1));
+  const int first = static_cast<int>(at);
+  return {first, std::min(first + 1, size - 1), at - static_cast<float>(first)};
+}
 
 // The network's input, 3 x input_height x input_width floats: bilinear, pixel centres at half coordinates. Grey images
 // feed all three channels. `blob` is resized.

@@ -17,12 +17,11 @@
 namespace dkb {
 namespace {
 
-constexpr int kStep = 32;            // [px] sizes are chosen in steps of the largest stride
-constexpr int kMaxInputSize = 4096;  // [px]
-// [px] Inputs that open graphs are tried at: the smallest whose cell count is no usual number of channels, and one that
-// transformers run at, which often keep to what they were trained for.
+constexpr int kStep = 32;            // [px] sizes are chosen in steps of the largest stride of YOLO heads
+constexpr int kMaxInputSize = 4096;  // [px] 200 MB of floats
+// [px] Inputs that open graphs are tried at. 96, since a smaller one has as many cells as a head may have channels: 84
+// at 64 px, where YOLOv8 has 4 + 80. 640, since transformers often keep to the size they were trained for.
 constexpr int kProbes[] = {96, 640};
-constexpr int kFloat = 1;  // TensorProto.DataType
 
 std::string_view trim(std::string_view text) {
   constexpr std::string_view kSpace = " \t\r\n";
@@ -81,8 +80,8 @@ std::string describe(NetworkOutputs outputs) {
 
 std::string known_heads() {
   std::string text;
-  for (const DetectorHead* head : detector_heads())
-    text += (text.empty() ? "" : "; ") + std::string(head->facts.name) + " (" + head->facts.outputs + ")";
+  for (const DetectorHead& head : detector_heads())
+    text += (text.empty() ? "" : "; ") + std::string(head.name) + " (" + head.outputs + ")";
   return text;
 }
 
@@ -98,21 +97,19 @@ std::pair<int, int> input_for(int size, int width, int height) {
   return width >= height ? std::pair(size, shorter(width, height)) : std::pair(shorter(height, width), size);
 }
 
-std::optional<HeadLayout> head_at(OnnxNetwork& network, int width, int height, std::string* outputs) {
+// What it puts out for an image of one grey.
+std::vector<OnnxNetwork::Output> try_out(OnnxNetwork& network, int width, int height) {
   const std::vector<float> blob(3 * static_cast<size_t>(width) * static_cast<size_t>(height), 0.5f);
-  const std::vector<OnnxNetwork::Output> found = network.forward(blob, width, height);
-  *outputs = describe(found);
-  return recognise_head(found, width, height);
+  return network.forward(blob, width, height);
 }
 
 // The input of a graph that leaves its size open, for images of this shape.
 std::pair<int, int> usual_input(OnnxNetwork& network, int width, int height) {
   for (const int size : kProbes) try {
-      std::string outputs;
-      if (const auto layout = head_at(network, size, size, &outputs)) {
-        const DetectorHead::Facts& facts = layout->head->facts;
-        return facts.square ? std::pair(facts.usual_input, facts.usual_input)
-                            : input_for(facts.usual_input, width, height);
+      if (const auto layout = recognise_head(try_out(network, size, size), size, size)) {
+        const DetectorHead& head = *layout->head;
+        return head.transformer ? std::pair(head.usual_input, head.usual_input)
+                                : input_for(head.usual_input, width, height);
       }
     } catch (const InputError&) {  // it does not run at this size
     }
@@ -121,7 +118,7 @@ std::pair<int, int> usual_input(OnnxNetwork& network, int width, int height) {
 
 // Width and height of the graph's input; 0 x 0 when it leaves them open.
 std::pair<int, int> declared_input(const OnnxInput& input, const std::string& name) {
-  if (input.element_type != kFloat)
+  if (input.element_type != kOnnxFloat)
     throw InputError(
         name + ": the graph's input is not of 32-bit floats; export it without half precision or quantised input");
   if (input.dims.size() != 4 || input.dims[0] > 1 || (input.dims[1] != 3 && input.dims[1] != -1))
@@ -160,44 +157,36 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
     std::tie(input_width_, input_height_) = declared;
   else
     std::tie(input_width_, input_height_) = usual_input(*network_, width, height);
-  std::string outputs;
-  const auto layout = [&] {
+  const auto outputs = [&] {
     try {
-      return head_at(*network_, input_width_, input_height_, &outputs);
+      return try_out(*network_, input_width_, input_height_);
     } catch (const InputError& e) {
       if (options_.input_size == 0) throw;
       throw InputError(std::string(e.what()) + "; or leave input_size at 0");
     }
   }();
+  const auto layout = recognise_head(outputs, input_width_, input_height_);
   const bool whole = input_width_ % kStep == 0 && input_height_ % kStep == 0;
   if (!layout)
-    throw InputError(name + ": has no known detection head (" + outputs + " at " + std::to_string(input_width_) +
-                     " x " + std::to_string(input_height_) + " px" +
+    throw InputError(name + ": has no known detection head (" + describe(outputs) + " at " +
+                     std::to_string(input_width_) + " x " + std::to_string(input_height_) + " px" +
                      (whole ? "" : ", where YOLO heads need multiples of 32") +
                      "); export it without NMS as one of: " + known_heads() +
                      (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : "") +
                      (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
   layout_ = *layout;
-  const DetectorHead::Facts& facts = layout_.head->facts;
-  if (options_.labels.empty()) {
-    labels_ = facts.numbered_as_in_coco ? numbered_coco_labels() : coco_labels();
-    check_labels(name + ": the graph scores " + std::to_string(layout_.classes) + " classes, COCO has " +
-                 std::to_string(labels_.size()) + "; give a file with its labels");
-  } else {
-    check_labels(options_.labels.string() + ": " + std::to_string(labels_.size()) + " labels for the " +
-                 std::to_string(layout_.classes) + " classes of " + name + "; write one per class and line");
-  }
+  const bool as_in_coco = layout_.head->numbered_as_in_coco, own_labels = !options_.labels.empty();
+  if (!own_labels) labels_ = as_in_coco ? numbered_coco_labels() : coco_labels();
+  const auto classes = static_cast<size_t>(layout_.classes);  // 0: its outputs do not say
+  const bool lack_the_last = as_in_coco && own_labels && labels_.size() + 1 == classes;
+  if (classes != 0 && labels_.size() != classes && !lack_the_last)
+    throw InputError(own_labels
+                         ? options_.labels.string() + ": " + std::to_string(labels_.size()) + " labels for the " +
+                               std::to_string(classes) + " classes of " + name + "; write one per class and line"
+                         : name + ": the graph scores " + std::to_string(classes) + " classes, COCO has " +
+                               std::to_string(labels_.size()) + "; give a file with its labels");
   wanted_ = {movable_classes(options_, labels_), options_.min_score};
 }
-
-void OnnxDetector::check_labels(const std::string& error) const {
-  if (layout_.classes == 0) return;  // its outputs do not say how many there are
-  const auto classes = static_cast<size_t>(layout_.classes);
-  const bool may_lack_one = layout_.head->facts.numbered_as_in_coco && !options_.labels.empty();
-  if (labels_.size() != classes && !(may_lack_one && labels_.size() + 1 == classes)) throw InputError(error);
-}
-
-OnnxDetector::~OnnxDetector() = default;
 
 int OnnxDetector::frames_per_detection(double frames_per_second) const {
   constexpr double kNanoBytes = 8e6;       // the nano models, on which the time per pixel was measured, lie below
@@ -214,20 +203,19 @@ Detections OnnxDetector::detect(const DetectorInput& image) {
   if (image.grey.empty()) throw InputError("the detector was given an empty image");
   const DetectorHead& head = *layout_.head;
   const Letterbox letterbox =
-      Letterbox::place(head.facts.preprocessing.fit, image.grey.width, image.grey.height, input_width_, input_height_);
-  fill_blob(image, letterbox, head.facts.preprocessing, &blob_);
+      Letterbox::place(head.preprocessing.fit, image.grey.width, image.grey.height, input_width_, input_height_);
+  fill_blob(image, letterbox, head.preprocessing, &blob_);
   const std::vector<OnnxNetwork::Output> outputs = network_->forward(blob_, input_width_, input_height_);
   if (recognise_head(outputs, input_width_, input_height_) != layout_)
     throw InputError(options_.model.string() + ": puts out other sizes than it did at first (" + describe(outputs) +
                      "); export it with outputs of fixed size");
   std::vector<Prediction> predictions = head.decode(layout_, outputs, input_width_, input_height_, wanted_);
   Detections found;
-  for (const Prediction& p :
-       suppress_overlaps(std::move(predictions), head.facts.one_box_an_object ? 1 : options_.max_overlap)) {
+  for (const Prediction& p : suppress_overlaps(std::move(predictions), head.transformer ? 1 : options_.max_overlap)) {
     const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
     if (!(box.w > 0 && box.h > 0)) continue;
     found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});
-    if (!head.facts.masks) continue;
+    if (head.mask == nullptr) continue;
     if (found.mask.empty()) found.mask = GreyImage(image.grey.width, image.grey.height, 0);
     paint_mask(head.mask(layout_, outputs, p), letterbox, box, &found.mask);
   }

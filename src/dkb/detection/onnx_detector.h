@@ -22,7 +22,7 @@ struct OnnxOptions {
   std::filesystem::path labels;           // class names, one per line, in the graph's order; empty = COCO's
   std::string classes = kMovableClasses;  // classes that may move, by comma
   // [px] longer side of the network's input, multiple of 32, <= 4096; the other side follows the images' shape. 0 = as
-  // the graph says, or where it leaves the size open what is usual for its head: 640 for most, 416 for YOLOX. Many
+  // the graph says, or where it leaves the size open what is usual for its head (DetectorHead::usual_input). Many
   // graphs run at other sizes than they say; one that does not is an error. ONNX Runtime holds a graph to the size that
   // it says.
   int input_size = 0;
@@ -44,9 +44,8 @@ class OnnxDetector final : public Detector {
   // cannot be run (named), when it has no known head, when labels do not match it, and when nothing is here that runs
   // networks.
   OnnxDetector(const OnnxOptions& options, int width, int height);
-  ~OnnxDetector() override;
 
-  // Throws InputError for an image without pixels, and std::runtime_error when the network fails.
+  // Throws InputError for an image without pixels and when the network fails.
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "yolo"; }
 
@@ -63,8 +62,6 @@ class OnnxDetector final : public Detector {
   Inference inference() const { return network_->inference(); }  // never `automatic`
 
  private:
-  void check_labels(const std::string& error) const;
-
   OnnxOptions options_;
   size_t model_bytes_ = 0;
   int input_width_ = 0, input_height_ = 0;

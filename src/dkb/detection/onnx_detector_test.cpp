@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/detection/onnx_detector.h"
 
-#include <gtest/gtest.h>
-
 // jpeglib.h needs stdio first
 #include <cstdio>
 
 #include <jpeglib.h>
 
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include "dkb/detection/onnx_graph_test_util.h"
-#include "dkb/image/test_frame.h"
+#include "dkb/detection/onnx_model_test_util.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_data.h"
@@ -23,26 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace onnx_test;
 
-class OnnxDetectorTest : public testing::TestWithParam<Inference> {
+class OnnxDetectorTest : public ModelTest {
  protected:
-  void SetUp() override {
-    if (!available(GetParam())) GTEST_SKIP() << "skipped: no " << to_string(GetParam()) << " here";
-    std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::replace(name.begin(), name.end(), '/', '_');
-    folder_ = fs::path(testing::TempDir()) / ("dkb_onnx_" + name);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override {
-    if (!folder_.empty()) fs::remove_all(folder_);
-  }
-
-  OnnxOptions write(const std::string& bytes, const std::string& name = "m.onnx") const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    OnnxOptions options;
-    options.model = folder_ / name;
-    options.inference = GetParam();
-    return options;
-  }
   // The error's message, which must be one line that names the file.
   static std::string error_of(const OnnxOptions& options) {
     try {
@@ -56,50 +32,29 @@ class OnnxDetectorTest : public testing::TestWithParam<Inference> {
     ADD_FAILURE() << "no error";
     return "";
   }
-
-  fs::path folder_;
 };
-
-Frame frame_of(ColourImage colour) {
-  auto image = std::make_shared<RgbdImage>();
-  image->grey = grey_from_colour(colour);
-  image->colour = std::move(colour);
-  return dkb::frame_of(std::move(image));
-}
-
-// What `detector` finds in an image of one colour.
-Detections detect_in(OnnxDetector& detector, int width, int height, Rgb colour) {
-  return detector.detect(detector_input(frame_of(ColourImage(width, height, colour))));
-}
 
 // 96 x 64: 12 x 8 + 6 x 4 + 3 x 2 = 126 cells. One prediction of class 0 in the first row, whose score is the first
 // channel's mean.
 std::string one_box(int boxes_a_cell, int classes, float per_unit) {
-  const int cells = 126, rows = boxes_a_cell * cells, columns = 5 + classes;
-  std::vector<float> bias(static_cast<size_t>(rows * columns), 0.0f);
-  std::array<std::vector<float>, 3> slope;
-  slope.fill(bias);
-  const float box[] = {32, 16, 20, 10};
-  std::copy_n(box, 4, bias.begin());
-  bias[4] = 1;
-  slope[0][5] = per_unit;
-  return mean_graph(96, 64, rows, columns, bias, slope);
+  Put out("output", {1, boxes_a_cell * 126, 5 + classes});
+  const float row[] = {32, 16, 20, 10, 1};
+  std::copy_n(row, 5, out.bias.begin());
+  out.slope[0][5] = per_unit;
+  return put_graph(96, 64, {out});
 }
 
 std::string one_v8_box(int classes) {
-  const int cells = 126;
-  std::vector<float> bias(static_cast<size_t>(cells * (4 + classes)), 0.0f);
-  std::array<std::vector<float>, 3> slope;
-  slope.fill(bias);
+  Put out("output", {1, 4 + classes, 126});
   const float box[] = {32, 16, 20, 10};
-  for (size_t i = 0; i < 4; ++i) bias[i * cells] = box[i];
-  slope[0][4 * cells] = 1;
-  return mean_graph(96, 64, 4 + classes, cells, bias, slope);
+  for (int i = 0; i < 4; ++i) out({0, i, 0}) = box[i];
+  out.slope[0][out.at({0, 4, 0})] = 1;
+  return put_graph(96, 64, {out});
 }
 
 TEST_P(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
   OnnxDetector detector(write(one_box(3, 80, 1.0f)), 192, 128);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOv5");
+  EXPECT_STREQ(detector.head().name, "YOLOv5");
   EXPECT_EQ(detector.input_width(), 96);
   const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
@@ -111,7 +66,7 @@ TEST_P(OnnxDetectorTest, YoloV5GraphsGetRgbUpToOneAndGiveBoxesInTheImage) {
 
 TEST_P(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
   OnnxDetector detector(write(one_v8_box(80)), 192, 128);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOv8");
+  EXPECT_STREQ(detector.head().name, "YOLOv8");
   const Detections found = detect_in(detector, 192, 128, {204, 0, 0});
   ASSERT_EQ(found.boxes.size(), 1u);
   EXPECT_NEAR(found.boxes[0].score, 0.8f, 1e-4f);
@@ -120,7 +75,7 @@ TEST_P(OnnxDetectorTest, YoloV8GraphsHaveNoObjectness) {
 
 TEST_P(OnnxDetectorTest, YoloxGraphsGetBgrUpTo255) {
   OnnxDetector detector(write(one_box(1, 80, 1.0f / 255)), 96, 64);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOX");
+  EXPECT_STREQ(detector.head().name, "YOLOX");
   EXPECT_TRUE(detect_in(detector, 96, 64, {204, 0, 0}).boxes.empty());
   const Detections found = detect_in(detector, 96, 64, {0, 0, 204});
   ASSERT_EQ(found.boxes.size(), 0u + 1);
@@ -133,7 +88,7 @@ TEST_P(OnnxDetectorTest, OpenYoloxGraphsTakeTheImagesShapeAt416) {
   cell[4] = 0.9f;
   cell[5] = 1.0f;
   OnnxDetector detector(write(yolox_graph(-1, -1, cell)), 640, 480);
-  EXPECT_STREQ(detector.head().facts.name, "YOLOX");
+  EXPECT_STREQ(detector.head().name, "YOLOX");
   EXPECT_EQ(detector.input_width(), 416);
   EXPECT_EQ(detector.input_height(), 320);  // 416 x 480 / 640 = 312, rounded up to a multiple of 32
   // 13 x 10 cells of 32 px; the last row covers input rows 288 ... 320, of which the image has 24, so it is clipped.
@@ -208,10 +163,9 @@ TEST_P(OnnxDetectorTest, MissingTruncatedAndForeignModelsAreNamed) {
 }
 
 TEST_P(OnnxDetectorTest, UnknownHeadsAreToldByTheirShapeAndTheKnownOnesListed) {
-  const std::vector<float> zeros(300 * 6, 0.0f);
-  const std::string text = error_of(write(mean_graph(64, 64, 300, 6, zeros, {zeros, zeros, zeros})));
+  const std::string text = error_of(write(put_graph(64, 64, {Put("output", {1, 300, 6})})));
   EXPECT_NE(text.find("1 x 300 x 6"), std::string::npos);
-  for (const DetectorHead* head : detector_heads()) EXPECT_NE(text.find(head->facts.name), std::string::npos) << text;
+  for (const DetectorHead& head : detector_heads()) EXPECT_NE(text.find(head.name), std::string::npos) << text;
 }
 
 TEST_P(OnnxDetectorTest, LayersThatAreLackingAreNamed) {
@@ -233,8 +187,7 @@ TEST_P(OnnxDetectorTest, InputsThatAreNoFloatImageAreRefused) {
   with_input(value_info(11, "images", {1, 3, 64}));
 }
 
-INSTANTIATE_TEST_SUITE_P(By, OnnxDetectorTest, testing::Values(Inference::onnxruntime, Inference::opencv),
-                         [](const auto& p) { return std::string(to_string(p.param)); });
+INSTANTIATE_TEST_SUITE_P(By, OnnxDetectorTest, kBoth, inference_name);
 
 // Real weights and images, where they are.
 
@@ -282,7 +235,7 @@ TEST_P(RealModelTest, FindsBothWalkingPeople) {
   options.inference = inference;
   OnnxDetector detector(options, 640, 480);
   EXPECT_EQ(detector.inference(), inference);
-  EXPECT_STREQ(detector.head().facts.name, real.head);
+  EXPECT_STREQ(detector.head().name, real.head);
   EXPECT_EQ(detector.input_width(), real.width);
   EXPECT_EQ(detector.input_height(), real.height);
   EXPECT_EQ(detector.frames_per_detection(30),

@@ -10,8 +10,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kInt64 = 7;  // TensorProto.DataType
-constexpr const char* kSizeInput = "orig_target_sizes";
+constexpr const char* kSizeInput = "orig_target_sizes";  // as RT-DETR and D-FINE export it
 
 // One field of a protobuf message (protobuf encoding guide; groups, which ONNX never uses, are refused).
 struct Field {
@@ -136,7 +135,7 @@ OnnxInput read_onnx_input(std::string_view bytes, const std::string& name) {
   if (!versioned || nodes == 0) wire.fail("it holds no graph");
   std::erase_if(inputs, [&](const OnnxInput& input) { return initialisers.count(input.name) != 0; });
   const auto size = std::find_if(inputs.begin(), inputs.end(), [](const OnnxInput& input) {
-    return input.name == kSizeInput && input.element_type == kInt64;
+    return input.name == kSizeInput && input.element_type == kOnnxInt64;
   });
   std::string size_name;
   if (size != inputs.end()) {

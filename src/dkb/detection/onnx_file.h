@@ -8,10 +8,13 @@
 
 namespace dkb {
 
+// Types of numbers: TensorProto.DataType of onnx.proto, which ONNX Runtime numbers alike.
+inline constexpr int kOnnxFloat = 1, kOnnxInt64 = 7;
+
 // What the detector must know of an ONNX graph before it runs: the image that goes in (initialisers are no inputs).
 struct OnnxInput {
   std::string name;
-  int element_type = 0;         // ONNX TensorProto.DataType; 1 = float
+  int element_type = 0;         // as above
   std::vector<int64_t> dims{};  // -1 = left open by the graph
   // A second input, by which RT-DETR and D-FINE are told the width and height that boxes shall refer to (1 x 2 integers
   // of 64 bits); empty = none.

@@ -110,15 +110,6 @@ inline std::string put_graph(int width, int height, const std::vector<Put>& outp
   return model(nodes + tensors + value_info(11, "images", {1, 3, height, width}) + infos + more);
 }
 
-// One output of 1 x rows x columns.
-inline std::string mean_graph(int width, int height, int rows, int columns, const std::vector<float>& bias,
-                              const std::array<std::vector<float>, 3>& slope) {
-  Put put("output", {1, rows, columns});
-  put.bias = bias;
-  put.slope = slope;
-  return put_graph(width, height, {put});
-}
-
 // A YOLOX head of any input size whose cells of each stride all say the same: `cell` (5 + classes values) at stride 32,
 // nothing at strides 8 and 16.
 inline std::string yolox_graph(int width, int height, const std::vector<float>& cell) {

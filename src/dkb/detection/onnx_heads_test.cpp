@@ -1,52 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole graphs of every head: preprocessing, network, decoding, suppression, masks.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "dkb/detection/head_samples_test_util.h"
-#include "dkb/detection/onnx_detector.h"
-#include "dkb/image/test_frame.h"
+#include "dkb/detection/onnx_model_test_util.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace {
-namespace fs = std::filesystem;
 using namespace head_test;
 
-class OnnxHeadsTest : public testing::TestWithParam<Inference> {
+class OnnxHeadsTest : public onnx_test::ModelTest {
  protected:
-  void SetUp() override {
-    if (!available(GetParam())) GTEST_SKIP() << "skipped: no " << to_string(GetParam()) << " here";
-    std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::replace(name.begin(), name.end(), '/', '_');
-    model_ = fs::path(testing::TempDir()) / ("dkb_onnx_heads_" + name + ".onnx");
-  }
-  void TearDown() override {
-    std::error_code error;
-    fs::remove(model_, error);
-  }
-
-  OnnxOptions write(const std::string& bytes) const {
-    std::ofstream(model_, std::ios::binary) << bytes;
-    OnnxOptions options;
-    options.model = model_;
-    options.inference = GetParam();
-    return options;
-  }
-
   // What the sample's graph finds in an image of `width` x `height` px of a colour.
   Detections detect(const Sample& sample, int width, int height, Rgb colour, const std::string& more = "") const {
     OnnxDetector detector(write(onnx_test::put_graph(sample.width, sample.height, sample.outputs, more)), width,
                           height);
-    EXPECT_EQ(detector.head().facts.name, sample.head);
-    auto image = std::make_shared<RgbdImage>();
-    image->colour = ColourImage(width, height, colour);
-    image->grey = grey_from_colour(image->colour);
-    return detector.detect(detector_input(frame_of(std::move(image))));
+    EXPECT_EQ(detector.head().name, sample.head);
+    return onnx_test::detect_in(detector, width, height, colour);
   }
 
   static void expect_person(const Detections& found, const Box& box, double score) {
@@ -61,8 +33,6 @@ class OnnxHeadsTest : public testing::TestWithParam<Inference> {
   }
   // The transformers' heads are told by names, which OpenCV does not tell.
   static bool has_names() { return GetParam() == Inference::onnxruntime; }
-
-  fs::path model_;
 };
 
 constexpr Rgb kRed{204, 0, 0}, kBlue{0, 0, 204};
@@ -116,11 +86,10 @@ TEST_P(OnnxHeadsTest, LabelsOfAModelOfOnesOwnMayLeaveOutItsBackground) {
   logits.bias = {-9, 2, -9};
   OnnxOptions options = write(onnx_test::put_graph(64, 64, {boxes, logits}));
   EXPECT_THROW(OnnxDetector(options, 64, 64), InputError);
-  options.labels = model_.string() + ".labels";
+  options.labels = folder_ / "labels.txt";
   std::ofstream(options.labels) << "chair\nrobot\n";
   options.classes = "robot";
   OnnxDetector detector(options, 64, 64);
-  fs::remove(options.labels);
   const GreyImage grey(64, 64, 0);
   DetectorInput image;
   image.grey = {grey.data(), 64, 64, 0, PixelFormat::grey8};
@@ -161,8 +130,7 @@ TEST_P(OnnxHeadsTest, OverlapsOfTransformersStay) {
   EXPECT_EQ(detect(sample, 64, 64, kRed).boxes.size(), 2u);
 }
 
-INSTANTIATE_TEST_SUITE_P(By, OnnxHeadsTest, testing::Values(Inference::onnxruntime, Inference::opencv),
-                         [](const auto& p) { return std::string(to_string(p.param)); });
+INSTANTIATE_TEST_SUITE_P(By, OnnxHeadsTest, onnx_test::kBoth, onnx_test::inference_name);
 
 }  // namespace
 }  // namespace dkb

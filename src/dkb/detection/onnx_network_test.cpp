@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/detection/onnx_network.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 
 #include "dkb/detection/onnx_file.h"
 #include "dkb/detection/onnx_graph_test_util.h"
+#include "dkb/detection/onnx_model_test_util.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/random.h"
@@ -42,16 +40,14 @@ TEST(Inference, IsToldByItsName) {
   }
 }
 
-class OnnxNetworkTest : public testing::TestWithParam<Inference> {
- protected:
-  void SetUp() override {
-    if (!available(GetParam())) GTEST_SKIP() << "skipped: no " << to_string(GetParam()) << " here";
-  }
-};
+class OnnxNetworkTest : public ModelTest {};
 
 TEST_P(OnnxNetworkTest, ComputesTheGraph) {
   // output[i] = bias[i] + slope of the first channel x its mean, as 1 x 2 x 1
-  const auto network = open(GetParam(), mean_graph(64, 32, 2, 1, {1, 2}, {std::vector{1.0f, 10.0f}, {0, 0}, {0, 0}}));
+  Put out("output", {1, 2, 1});
+  out.bias = {1, 2};
+  out.slope[0] = {1, 10};
+  const auto network = open(GetParam(), put_graph(64, 32, {out}));
   EXPECT_EQ(network->inference(), GetParam());
   std::vector<float> blob(3 * 64 * 32, 0.0f);
   std::fill_n(blob.begin(), 64 * 32, 0.5f);
@@ -90,8 +86,7 @@ TEST_P(OnnxNetworkTest, WhatCannotBeReadIsNamedInOneLine) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(By, OnnxNetworkTest, testing::Values(Inference::onnxruntime, Inference::opencv),
-                         [](const auto& p) { return std::string(to_string(p.param)); });
+INSTANTIATE_TEST_SUITE_P(By, OnnxNetworkTest, kBoth, inference_name);
 
 struct YoloModel {
   const char* file;

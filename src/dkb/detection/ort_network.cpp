@@ -14,7 +14,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kFatal = 4, kAllOptimisations = 99, kFloatType = 1, kInt64Type = 7;  // ONNX Runtime's and ONNX' numbers
+constexpr int kFatal = 4, kAllOptimisations = 99;  // ORT_LOGGING_LEVEL_FATAL, ORT_ENABLE_ALL of its C interface
 
 // An object of ONNX Runtime, with what gives it back.
 template <class T>
@@ -54,10 +54,10 @@ class OrtNetwork final : public OnnxNetwork {
     const int64_t dims[] = {1, 3, height, width}, size_dims[] = {1, 2};
     const auto image = make(ort_.release_value, what, ort_.create_tensor, memory_.get(),
                             static_cast<void*>(const_cast<float*>(blob.data())), blob.size() * sizeof(float), dims,
-                            std::size(dims), kFloatType);
+                            std::size(dims), kOnnxFloat);
     int64_t size[] = {width, height};
     const auto size_value = make(ort_.release_value, what, ort_.create_tensor, memory_.get(), static_cast<void*>(size),
-                                 sizeof size, size_dims, std::size(size_dims), kInt64Type);
+                                 sizeof size, size_dims, std::size(size_dims), kOnnxInt64);
     const char* const inputs[] = {input_.c_str(), size_input_.c_str()};
     const OrtValue* const input_values[] = {image.get(), size_value.get()};
     std::vector<const char*> names;
@@ -104,7 +104,7 @@ class OrtNetwork final : public OnnxNetwork {
     if (is_tensor == 0) return;
     const auto shape = make(ort_.release_shape, what, ort_.shape_of, static_cast<const OrtValue*>(value));
     check(ort_.element_type(shape.get(), &type), what);
-    if (type != kFloatType && type != kInt64Type) return;
+    if (type != kOnnxFloat && type != kOnnxInt64) return;
     size_t rank = 0, size = 1;
     check(ort_.rank(shape.get(), &rank), what);
     std::vector<int64_t> dims(rank);
@@ -113,7 +113,7 @@ class OrtNetwork final : public OnnxNetwork {
     void* data = nullptr;
     check(ort_.tensor_data(value, &data), what);
     const float* floats = static_cast<const float*>(data);
-    if (type == kInt64Type) {
+    if (type == kOnnxInt64) {
       const auto* integers = static_cast<const int64_t*>(data);
       integers_.emplace_back(integers, integers + size);
       floats = integers_.back().data();
@@ -146,7 +146,7 @@ std::string doubling_graph() {
   const auto tensor = [](int field, const char* name) {
     std::string dims;
     for (const int size : {1, 3, 2, 1}) dims += message_part(1, number_part(1, size));
-    return message_part(field, message_part(1, name) + message_part(2, message_part(1, number_part(1, kFloatType) +
+    return message_part(field, message_part(1, name) + message_part(2, message_part(1, number_part(1, kOnnxFloat) +
                                                                                            message_part(2, dims))));
   };
   const std::string node =

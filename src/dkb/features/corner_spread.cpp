@@ -9,7 +9,7 @@ namespace dkb {
 
 void CornerSpread::find_cells(const CornerRegion& region, Grid grid, const std::vector<PixelCorner>& corners) {
   cell_of_.resize(corners.size());
-  // Cell of a pixel = (pixel - left) * columns / width, by a 16-bit reciprocal that is exact enough to be monotonous.
+  // Cell of a pixel = (pixel - left) * columns / width, by a reciprocal with 32 binary places.
   const uint64_t step_x = (static_cast<uint64_t>(grid.columns) << 32) / static_cast<uint64_t>(region.width());
   const uint64_t step_y = (static_cast<uint64_t>(grid.rows) << 32) / static_cast<uint64_t>(region.height());
   for (size_t i = 0; i < corners.size(); ++i) {

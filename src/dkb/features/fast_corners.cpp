@@ -12,7 +12,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kRowPadding = 64;  // bytes on both sides of a score row
+constexpr int kRowPadding = 64;  // bytes on both sides of a score row: emit_avx2() looks at 64 pixels at once
 constexpr int kSpare = 4;        // corners written at once
 
 // Offsets of the 16 pixels of the circle in order, for rows `stride` bytes apart.
@@ -151,7 +151,8 @@ DKB_TARGET_AVX2 PixelCorner* emit_avx2(const uint8_t* above, const uint8_t* here
       out[k] = {static_cast<uint16_t>(at), static_cast<uint16_t>(y), static_cast<uint8_t>(here[at] - 1)};
       peaks &= peaks - 1;
     };
-    // Always a few, of which those that are none are written over: how many there are nobody could foresee.
+    // Always kSpare, of which those beyond `count` are written over: branches on how many there are would be
+    // mispredicted.
     for (int k = 0; k < kSpare; ++k) put(k);
     for (int k = kSpare; k < count; ++k) put(k);
     out += count;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 namespace dkb {
@@ -12,15 +11,17 @@ namespace dkb {
 class KeypointGrid {
  public:
   KeypointGrid() = default;
-  KeypointGrid(std::span<const float> x, std::span<const float> y, int width, int height)
-      : columns_(width / kCell + 1), rows_(height / kCell + 1) {
+  // Of points with a `pixel`.
+  template <class Points>
+  KeypointGrid(const Points& points, int width, int height) : columns_(width / kCell + 1), rows_(height / kCell + 1) {
     first_.assign(static_cast<size_t>(columns_ * rows_) + 1, 0);
-    for (size_t i = 0; i < x.size(); ++i) ++first_[cell(x[i], y[i]) + 1];
+    for (const auto& p : points) ++first_[cell(p.pixel.x(), p.pixel.y()) + 1];
     for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-    points_.resize(x.size());
+    points_.resize(points.size());
     std::vector<int32_t> next(first_.begin(), first_.end() - 1);
-    for (size_t i = 0; i < x.size(); ++i)
-      points_[static_cast<size_t>(next[cell(x[i], y[i])]++)] = {x[i], y[i], static_cast<int32_t>(i)};
+    int32_t index = 0;
+    for (const auto& p : points)
+      points_[static_cast<size_t>(next[cell(p.pixel.x(), p.pixel.y())]++)] = {p.pixel.x(), p.pixel.y(), index++};
   }
 
   // Calls visit(i) for every point within `radius` (in both x and y) of (x, y), cell by cell in row-major order, by

@@ -7,7 +7,7 @@
 #include <bit>
 #include <cmath>
 
-#include "dkb/features/keypoint_grid.h"
+#include "dkb/features/rgbd_features.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
@@ -131,12 +131,12 @@ TEST(Matching, NoTurnIsAPeakLikeAnyOther) {
 
 TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {
   Random random(10);
-  std::vector<float> x, y;
-  for (int i = 0; i < 500; ++i) {
-    x.push_back(static_cast<float>(random.uniform(-30, 670)));  // some outside the image
-    y.push_back(static_cast<float>(random.uniform(-30, 510)));
+  std::vector<Keypoint> points(500);
+  for (Keypoint& p : points) {
+    p.pixel.x() = static_cast<float>(random.uniform(-30, 670));  // some outside the image
+    p.pixel.y() = static_cast<float>(random.uniform(-30, 510));
   }
-  const KeypointGrid grid(x, y, 640, 480);
+  const KeypointGrid grid(points, 640, 480);
   for (int trial = 0; trial < 100; ++trial) {
     const float cx = static_cast<float>(random.uniform(-40, 680)), cy = static_cast<float>(random.uniform(-40, 520));
     const float radius = static_cast<float>(random.uniform(0, 60));
@@ -144,8 +144,9 @@ TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {
     grid.for_each_near(cx, cy, radius, [&](int i) { found.push_back(i); });
     grid.for_each_near(cx, cy, radius, [&](int i) { again.push_back(i); });
     EXPECT_EQ(found, again);
-    for (size_t i = 0; i < x.size(); ++i)
-      if (std::abs(x[i] - cx) <= radius && std::abs(y[i] - cy) <= radius) expected.push_back(static_cast<int>(i));
+    for (size_t i = 0; i < points.size(); ++i)
+      if (std::abs(points[i].pixel.x() - cx) <= radius && std::abs(points[i].pixel.y() - cy) <= radius)
+        expected.push_back(static_cast<int>(i));
     std::sort(found.begin(), found.end());
     EXPECT_EQ(found, expected);
   }
@@ -154,7 +155,7 @@ TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {
 TEST(KeypointGrid, AnEmptyGridHasNoNeighbours) {
   int visits = 0;
   KeypointGrid().for_each_near(1, 1, 100, [&](int) { ++visits; });
-  KeypointGrid({}, {}, 640, 480).for_each_near(1, 1, 100, [&](int) { ++visits; });
+  KeypointGrid(std::vector<Keypoint>(), 640, 480).for_each_near(1, 1, 100, [&](int) { ++visits; });
   EXPECT_EQ(visits, 0);
 }
 

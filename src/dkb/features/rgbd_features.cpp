@@ -90,7 +90,7 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
     for (int row = y - 1; row <= y + 1; ++row) __builtin_prefetch(&image.depth(x, row));
     if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
   };
-  constexpr size_t kAhead = 12;
+  constexpr size_t kAhead = 12;  // [corners] as measured, docs/decisions.md
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     if (i + kAhead < orb.corners.size()) ask_early(orb.corners[i + kAhead]);
     const Corner& c = orb.corners[i];
@@ -125,7 +125,6 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
       options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
                                     vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
   const bool rolling = options.model_rolling_shutter && camera.readout > 0 && velocity.squaredNorm() > 0;
-  std::vector<float> xs(orb.corners.size()), ys(orb.corners.size());
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     const Corner& c = orb.corners[i];
     Keypoint& k = result.keypoints[i];
@@ -154,13 +153,11 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
         if (z > 0) z = static_cast<float>(turned.z());
       }
     }
-    xs[i] = k.pixel.x();
-    ys[i] = k.pixel.y();
     k.depth = z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max) ? z : 0.0f;
   }
   result.width = camera.width;
   result.height = camera.height;
-  result.grid = KeypointGrid(xs, ys, camera.width, camera.height);
+  result.grid = KeypointGrid(result.keypoints, camera.width, camera.height);
   return result;
 }
 
@@ -168,19 +165,14 @@ RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indice
   RgbdFeatures result;
   result.width = features.width;
   result.height = features.height;
-  std::vector<float> xs, ys;
   result.keypoints.reserve(indices.size());
   result.descriptors.reserve(indices.size());
-  xs.reserve(indices.size());
-  ys.reserve(indices.size());
   for (int i : indices) {
     const auto f = static_cast<size_t>(i);
     result.keypoints.push_back(features.keypoints[f]);
     result.descriptors.push_back(features.descriptors[f]);
-    xs.push_back(features.keypoints[f].pixel.x());
-    ys.push_back(features.keypoints[f].pixel.y());
   }
-  result.grid = KeypointGrid(xs, ys, features.width, features.height);
+  result.grid = KeypointGrid(result.keypoints, features.width, features.height);
   return result;
 }
 

@@ -55,7 +55,7 @@ class UndistortionTable {
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
 };
 
-// Corners joined with the depth image, of which a camera that stands still would have made its features.
+// Corners with depth and colour, as a camera that stands still has them.
 std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
                                         const UndistortionTable& undistort, const DepthOptions& options);
 // Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen: hand-held

@@ -29,8 +29,12 @@ inline Simd best_simd() {
 
 #if defined(__x86_64__)
 #define DKB_TARGET_AVX2 __attribute__((target("avx2,popcnt")))
-#define DKB_TARGET_AVX512 \
-  __attribute__((target("avx2,popcnt,avx512f,avx512bw,avx512dq,avx512vl,prefer-vector-width=512")))
+#if defined(__clang__)
+#define DKB_WHOLE_WIDTH  // which Clang cannot be told here, and without which it uses all of it
+#else
+#define DKB_WHOLE_WIDTH ",prefer-vector-width=512"
+#endif
+#define DKB_TARGET_AVX512 __attribute__((target("avx2,popcnt,avx512f,avx512bw,avx512dq,avx512vl" DKB_WHOLE_WIDTH)))
 
 namespace dkb {
 

@@ -148,13 +148,10 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
   std::vector<std::shared_ptr<RgbdFeatures>> result;
   uint8_t octave_before = 0;
   size_t i = 0;
-  std::vector<float> xs, ys;
   for (size_t count : keyframes.feature_counts) {
     auto features = std::make_shared<RgbdFeatures>();
     features->keypoints.resize(count);
     features->descriptors.resize(count);
-    xs.resize(count);
-    ys.resize(count);
     for (size_t f = 0; f < count; ++f, ++i) {
       Keypoint& p = features->keypoints[f];
       p.image_pixel = {image_x[i], image_y[i]};
@@ -168,11 +165,10 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
       p.octave = octave_before = static_cast<uint8_t>(octave_before + static_cast<uint8_t>(octave[i]));
       p.colour = colour[i];
       features->descriptors[f] = read_descriptor(descriptor_reader);
-      xs[f] = p.pixel.x();
-      ys[f] = p.pixel.y();
-      if (!(std::abs(xs[f]) <= 1e6f && std::abs(ys[f]) <= 1e6f)) in.fail("has a feature far outside its image");
+      if (!(std::abs(p.pixel.x()) <= 1e6f && std::abs(p.pixel.y()) <= 1e6f))
+        in.fail("has a feature far outside its image");
     }
-    if (count > 0) features->grid = KeypointGrid(xs, ys, camera.width, camera.height);
+    if (count > 0) features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
     result.push_back(std::move(features));
   }
   return result;

@@ -146,7 +146,6 @@ CameraModel distorted_camera() {
 std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, const CameraModel& camera, bool follow) {
   const UndistortionTable undistort(camera);
   auto features = std::make_shared<RgbdFeatures>();
-  std::vector<float> xs, ys;
   for (int i = 0; i < count; ++i) {
     Keypoint k;
     k.image_pixel = {static_cast<float>(random.uniform(16, camera.width - 16)),
@@ -161,10 +160,8 @@ std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, c
     k.colour = {static_cast<uint8_t>(grey + random.below(16)), grey, static_cast<uint8_t>(grey + random.below(16))};
     features->keypoints.push_back(k);
     features->descriptors.push_back({random.next(), random.next(), random.next(), random.next()});
-    xs.push_back(k.pixel.x());
-    ys.push_back(k.pixel.y());
   }
-  if (count > 0) features->grid = KeypointGrid(xs, ys, camera.width, camera.height);
+  if (count > 0) features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
   return features;
 }
 

@@ -48,12 +48,7 @@ class CandidateMatching : public ::testing::Test {
   std::vector<ProjectionMatch> match(const std::vector<Candidate>& candidates,
                                      const std::vector<uint8_t>* taken = nullptr,
                                      std::vector<uint8_t>* visible = nullptr) {
-    std::vector<float> x, y;
-    for (const Keypoint& k : features.keypoints) {
-      x.push_back(k.pixel.x());
-      y.push_back(k.pixel.y());
-    }
-    features.grid = KeypointGrid(x, y, camera.width, camera.height);
+    features.grid = KeypointGrid(features.keypoints, camera.width, camera.height);
     return match_by_projection(candidates, {features, motion}, camera, cam_from_world, 1.2, 8, options, taken, visible);
   }
 

@@ -93,12 +93,7 @@ class TestScene {
     for (int i = 0; i < options.clutter; ++i)
       add(-1, {random.uniform(0, camera.width), random.uniform(0, camera.height)}, random.uniform(1, 4),
           static_cast<int>(random.below(kLevels)), random_descriptor(random));
-    std::vector<float> x, y;
-    for (const Keypoint& k : features->keypoints) {
-      x.push_back(k.pixel.x());
-      y.push_back(k.pixel.y());
-    }
-    features->grid = KeypointGrid(x, y, camera.width, camera.height);
+    features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
     view.features = std::move(features);
     return view;
   }

@@ -11,23 +11,20 @@ namespace {
 // A frame at the world's origin with features at the given pixels and depths (0 = none), all of the finest level.
 TrackedFrame frame_of(const std::vector<Eigen::Vector3f>& pixels_and_depths) {
   auto features = std::make_shared<RgbdFeatures>();
-  std::vector<float> x, y;
   for (const Eigen::Vector3f& p : pixels_and_depths) {
     Keypoint k;
     k.pixel = k.image_pixel = p.head<2>();
     k.depth = p.z();
     features->keypoints.push_back(k);
     features->descriptors.push_back({});
-    x.push_back(p.x());
-    y.push_back(p.y());
   }
   const CameraModel camera;
-  features->grid = KeypointGrid(x, y, camera.width, camera.height);
+  features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
   TrackedFrame frame;
   frame.features = features;
-  frame.points.assign(x.size(), kNoPoint);
-  frame.outlier.assign(x.size(), 0);
-  frame.odometry.assign(x.size(), std::nullopt);
+  frame.points.assign(features->size(), kNoPoint);
+  frame.outlier.assign(features->size(), 0);
+  frame.odometry.assign(features->size(), std::nullopt);
   return frame;
 }
 

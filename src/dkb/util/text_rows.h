@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,7 +15,8 @@ void for_each_row(
     std::string_view text, const std::string& name,
     const std::function<void(const std::string& place, const std::vector<std::string_view>& columns)>& row);
 
-// A finite number, else InputError `place: what "text" is not a number`.
-double read_number(std::string_view text, const std::string& place, const std::string& what);
+// A number whose amount is below `limit`, else InputError `place: what "text" is not a number`.
+double read_number(std::string_view text, const std::string& place, const std::string& what,
+                   double limit = std::numeric_limits<double>::infinity());
 
 }  // namespace dkb

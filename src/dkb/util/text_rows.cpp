@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/dataset/text_rows.h"
+#include "dkb/util/text_rows.h"
 
 #include <cmath>
 
@@ -31,11 +31,12 @@ void for_each_row(std::string_view text, const std::string& name,
   }
 }
 
-double read_number(std::string_view text, const std::string& place, const std::string& what) {
+double read_number(std::string_view text, const std::string& place, const std::string& what, double limit) {
   double value = 0;
   if (!parse_number(text, &value)) throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a number");
-  if (!std::isfinite(value))
-    throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a finite number");
+  if (!(std::abs(value) < limit))
+    throw InputError(place + ": " + what + " \"" + excerpt(text) + "\" is not a finite number" +
+                     (std::isfinite(limit) ? " in range" : ""));
   return value;
 }
 
