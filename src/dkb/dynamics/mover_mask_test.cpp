@@ -33,20 +33,6 @@ TEST(MoverMask, NothingIsMarkedLeftOfOrAboveTheImage) {
   EXPECT_FALSE(mask.at(0, -3));
 }
 
-TEST(MoverMask, SpreadsIntoHolesThatTouchItButNoFartherThanTheMaxDistance) {
-  const MoverMask mask = one_cell(40, 10, 2, 5);
-  DepthImage depth(160, 40, 2.0f);
-  for (int y = 20; y < 24; ++y)
-    for (int x = 12; x < 160; ++x) depth(x, y) = 0;  // right of the marked cell
-  for (int x = 0; x < 160; ++x) depth(x, 2) = 0;     // touches nothing
-  // 0.2 m at 2 m with 400 px: 40 px, 10 cells.
-  const MoverMask spread = spread_into_holes(mask, depth, 0.2, 400);
-  EXPECT_EQ(marked(spread), 11);
-  EXPECT_TRUE(spread.at(51, 22));
-  EXPECT_FALSE(spread.at(52, 22));
-  EXPECT_TRUE(spread_into_holes(MoverMask(), depth, 0.2, 400).empty());
-}
-
 TEST(MoverMask, AnEmptyMaskMarksNothing) {
   MoverMask mask;
   EXPECT_TRUE(mask.empty());

@@ -11,9 +11,8 @@ namespace dkb {
 
 // What is known of the surface that a feature lies on.
 enum class FeatureMotion : uint8_t {
-  still,       // nothing speaks against it
-  near_mover,  // hangs together with a mover: where depth is missing, it may be the mover's
-  on_mover,    // a mover is seen there: only well-established map points may be found
+  still,     // nothing speaks against it
+  on_mover,  // a mover is seen there: only well-established map points may be found
 };
 
 // Features as matching takes them. Without `motion` all of them stand still.
@@ -22,8 +21,7 @@ struct MatchableFeatures {
   std::span<const FeatureMotion> motion;  // per feature
 
   MatchableFeatures(const RgbdFeatures& f, std::span<const FeatureMotion> m = {}) : features(f), motion(m) {}
-  FeatureMotion motion_of(size_t feature) const { return motion.empty() ? FeatureMotion::still : motion[feature]; }
-  bool on_mover(size_t feature) const { return motion_of(feature) == FeatureMotion::on_mover; }
+  bool on_mover(size_t feature) const { return !motion.empty() && motion[feature] == FeatureMotion::on_mover; }
 };
 
 // The features of a frame that tracking may use. Where they lie and how deep depends on the camera's velocity [m/s,

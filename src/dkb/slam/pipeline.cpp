@@ -22,7 +22,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   scenes_.begin(next_frame_, frame, expected, outcome_);
   const Scene scene = scenes_.look(extract(frame), undistort_, detections, expected);  // DKB 3.1
   retract_late(scene.late_masks);
-  const UsableFeatures usable = usable_features(scene, context_.camera.fx);
+  const UsableFeatures usable = usable_features(scene);
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
   const KeyframeDecision decision = decide(scene, tracked);  // DKB 3.2

@@ -6,11 +6,8 @@
 
 namespace dkb {
 
-UsableFeatures usable_features(const Scene& scene, double focal) {
-  // Beside what is near the projector's light is hidden from the sensor, by no more than the two lie apart.
-  constexpr double kBaseline = 0.075;  // [m] of the Kinect
+UsableFeatures usable_features(const Scene& scene) {
   UsableFeatures usable;
-  const MoverMask around = spread_into_holes(scene.mask, scene.extracted.image().depth, kBaseline, focal);
   const OrbFeatures& orb = scene.extracted.orb;
   usable.corner.reserve(orb.corners.size());
   usable.motion.reserve(orb.corners.size());
@@ -21,7 +18,6 @@ UsableFeatures usable_features(const Scene& scene, double focal) {
     const Corner& corner = orb.corners[i];
     usable.corner.push_back(static_cast<int>(i));
     usable.motion.push_back(scene.rejected[i] == FeatureReason::on_mover ? FeatureMotion::on_mover
-                            : around.at(corner.x, corner.y)              ? FeatureMotion::near_mover
                                                                          : FeatureMotion::still);
     usable.orb.corners.push_back(corner);
     usable.orb.descriptors.push_back(orb.descriptors[i]);

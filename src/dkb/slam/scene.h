@@ -40,7 +40,7 @@ struct UsableFeatures {
   std::vector<FeatureMotion> motion;
 };
 // `focal`: the camera's focal length [px].
-UsableFeatures usable_features(const Scene& scene, double focal);
+UsableFeatures usable_features(const Scene& scene);
 
 // What became of every corner in the end. `tracked.source` are indices of `usable`.
 std::vector<FeatureReport> report_features(const Scene& scene, const UsableFeatures& usable,

@@ -31,27 +31,13 @@ constexpr FeatureReason kNone = FeatureReason::none, kOnMover = FeatureReason::o
 
 TEST(UsableFeatures, AreAllButThoseThatARivalFilterRejected) {
   const Scene scene = scene_with({kNone, kMoved, kOnMover, kMoved, kNone});
-  const UsableFeatures usable = usable_features(scene, 1333);
+  const UsableFeatures usable = usable_features(scene);
   EXPECT_EQ(usable.corner, (std::vector<int>{0, 2, 4}));
   ASSERT_EQ(usable.orb.corners.size(), 3U);
   EXPECT_EQ(usable.orb.corners[1].x, 50);
   EXPECT_EQ(usable.orb.descriptors[2][0], 4U);
   EXPECT_EQ(usable.motion,
             (std::vector<FeatureMotion>{FeatureMotion::still, FeatureMotion::on_mover, FeatureMotion::still}));
-}
-
-TEST(UsableFeatures, WhatHangsTogetherWithAMoverWithoutDepthIsNearIt) {
-  Scene scene = scene_with({kOnMover, kNone, kNone});
-  auto image = std::make_shared<RgbdImage>(scene.extracted.image());
-  for (int y = 80; y < 120; ++y)
-    for (int x = 20; x < 40; ++x) image->depth(x, y) = 0;  // a hole beside the mover, where corner 1 is
-  scene.extracted.frame = frame_of(std::move(image));
-  scene.mask.cell = 4;
-  scene.mask.cells = Image<uint8_t>(80, 60);
-  for (int y = 20; y < 30; ++y)
-    for (int x = 0; x < 5; ++x) scene.mask.cells(x, y) = 255;
-  EXPECT_EQ(usable_features(scene, 1333).motion,
-            (std::vector<FeatureMotion>{FeatureMotion::on_mover, FeatureMotion::near_mover, FeatureMotion::still}));
 }
 
 // A tracked frame whose features are those with these indices of the usable ones.
@@ -71,7 +57,7 @@ void expect_report(const FeatureReport& report, FeatureState state, FeatureReaso
 
 TEST(ReportFeatures, EveryFeatureHasOneStateAndARejectedOneOneReason) {
   const Scene scene = scene_with({kNone, kMoved, kOnMover, kNone, kNone, kNone, kOnMover, kOnMover});
-  const UsableFeatures usable = usable_features(scene, 1333);  // corners 0 2 3 4 5 6 7
+  const UsableFeatures usable = usable_features(scene);  // corners 0 2 3 4 5 6 7
   TrackedFrame tracked = tracked_with({0, 1, 2, 3, 4, 5, 6});
   tracked.points[0] = make_point_id(0, 7);                // corner 0 shows a map point
   tracked.outlier[2] = 1;                                 // corner 3 was matched, and does not fit
@@ -100,7 +86,7 @@ TEST(ReportFeatures, FeaturesThatTrackingLeftOutKeepWhatTheFilterSaid) {
   const Scene scene = scene_with({kNone, kOnMover, kNone});
   TrackedFrame tracked = tracked_with({2});  // the first two were dropped
   tracked.points[0] = make_point_id(0, 1);
-  const auto reports = report_features(scene, usable_features(scene, 1333), tracked);
+  const auto reports = report_features(scene, usable_features(scene), tracked);
   expect_report(reports[0], FeatureState::unused, FeatureReason::none);
   expect_report(reports[1], FeatureState::dynamic, FeatureReason::on_mover);
   expect_report(reports[2], FeatureState::used, FeatureReason::none);
@@ -113,14 +99,14 @@ TEST(ReportFeatures, WhatMadeAMapPointWasUsed) {
   tracked.outlier.assign(2, 0);
   tracked.odometry.assign(2, std::nullopt);
   tracked.makes_point = {0, 1};
-  const auto reports = report_features(scene, usable_features(scene, 1333), tracked);
+  const auto reports = report_features(scene, usable_features(scene), tracked);
   expect_report(reports[0], FeatureState::unused, FeatureReason::none);
   expect_report(reports[1], FeatureState::used, FeatureReason::none);
 }
 
 TEST(ReportFeatures, ALostFrameReportsWhatTheFilterSaw) {
   const Scene scene = scene_with({kNone, kOnMover});
-  const auto reports = report_features(scene, usable_features(scene, 1333), TrackedFrame());
+  const auto reports = report_features(scene, usable_features(scene), TrackedFrame());
   expect_report(reports[0], FeatureState::unused, FeatureReason::none);
   expect_report(reports[1], FeatureState::dynamic, FeatureReason::on_mover);
 }

@@ -13,10 +13,18 @@
 
 namespace dkb {
 
+// Along it a feature was seen. The direction is in front of the camera at a depth of 1.
+struct SightRay {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(), direction = Eigen::Vector3d::UnitZ();  // [m]
+  double pixel_sigma = 0;
+};
+
 // A visual-odometry point that a feature shows (see OdometryPoints).
 struct OdometryMatch {
   Eigen::Vector3d point_in_world;  // [m]
   bool guessed = false;            // at the depth of its surroundings
+  SightRay first = {};             // of a guessed one: how it was seen first, in the world
+  bool moves = false;              // it has left that ray: it says nothing of the pose, but is followed on
 };
 
 // Where the camera is by what is not in the images.
@@ -44,7 +52,7 @@ struct TrackedFrame {
   std::vector<FeatureMotion> motion;  // per feature
   std::vector<PointId> points;        // per feature: the map point it shows (inliers of the pose), else kNoPoint
   std::vector<uint8_t> outlier;       // per feature: 1 = matched, but rejected by the robust pose
-  std::vector<std::optional<OdometryMatch>> odometry;  // per feature: inliers of the pose that are no map points
+  std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
   std::vector<uint8_t> makes_point;  // per feature: 1 = it made a map point, when the frame became a keyframe
   std::vector<int> source;           // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;

@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/tracking/odometry_points.h"
 
+#include <algorithm>
+
+#include "dkb/solver/pose_optimiser.h"
+
 namespace dkb {
 namespace {
 
 constexpr float kSurroundings = 40;  // [px] within which features lend their depth
+constexpr double kNearest = 0.3;     // [m] that anything is taken to be from the camera
+
+SightRay transformed(const Rigid3& pose, const SightRay& ray) {
+  return {pose * ray.origin, pose.rotation * ray.direction, ray.pixel_sigma};
+}
 
 }  // namespace
 
@@ -18,6 +27,27 @@ std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) con
         candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(), scale_factor_));
   }
   return result;
+}
+
+OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
+  const Point& p = points_[i];
+  const Rigid3 world_from_cam = frame.cam_from_world.inverse();
+  return {world_from_cam * p.point_in_cam, p.guessed, transformed(world_from_cam, p.first_in_cam), p.moves};
+}
+
+bool OdometryPoints::has_moved(const SightRay& first, const Keypoint& keypoint, const Rigid3& cam_from_world) const {
+  const SightRay ray = transformed(cam_from_world, first);
+  if (!(ray.direction.z() > 0)) return false;
+  // It is seen from where it is near to either camera up to infinity.
+  const double nearest = std::max(kNearest, (kNearest - ray.origin.z()) / ray.direction.z());
+  const Eigen::Vector2d from = camera_.project(ray.origin + nearest * ray.direction);
+  const Eigen::Vector2d along = camera_.project(ray.direction) - from;
+  const Eigen::Vector2d seen = keypoint.pixel.cast<double>();
+  const double length = along.squaredNorm();
+  const double t = length > 0 ? std::clamp((seen - from).dot(along) / length, 0.0, 1.0) : 0.0;
+  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_);
+  const double variance = sigma * sigma + ray.pixel_sigma * ray.pixel_sigma;
+  return (seen - from - t * along).squaredNorm() > PoseOptions().chi2_pixel * variance;
 }
 
 // Harmonic mean of the depths of the features nearby, since parallax goes with the inverse depth; 0 when there is none.
@@ -37,18 +67,22 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
   points_.clear();
   for (size_t f = 0; f < frame.points.size(); ++f) {
     const Keypoint& k = frame.features->keypoints[f];
-    if (frame.points[f] != kNoPoint || frame.outlier[f] || frame.matchable().on_mover(f)) continue;
+    const auto& before = frame.odometry[f];
+    const bool left_out = frame.outlier[f] && !(before && before->moves);
+    if (frame.points[f] != kNoPoint || left_out || frame.matchable().on_mover(f)) continue;
     Point p;
     p.feature = static_cast<int>(f);
-    p.guessed = !(k.depth > 0);
-    const float depth = p.guessed ? depth_around(frame, k) : k.depth;
+    p.guessed = !(k.depth > 0) && (!before || before->guessed);
+    const float depth = k.depth > 0 ? k.depth : depth_around(frame, k);
     if (!(depth > 0) || depth > max_depth_) continue;
-    const auto& before = frame.odometry[f];
-    if (before && !before->guessed)
-      p.point_in_cam = frame.cam_from_world * before->point_in_world;
-    else
-      p.point_in_cam = camera_.unproject(k.pixel.cast<double>(), depth);
-    p.guessed = p.guessed && (!before || before->guessed);
+    p.point_in_cam = before && !before->guessed ? frame.cam_from_world * before->point_in_world
+                                                : camera_.unproject(k.pixel.cast<double>(), depth);
+    if (p.guessed) {
+      p.moves = before && before->moves;
+      p.first_in_cam = before ? transformed(frame.cam_from_world, before->first)
+                              : SightRay{Eigen::Vector3d::Zero(), p.point_in_cam / p.point_in_cam.z(),
+                                         noise_.corner_sigma(k.octave, scale_factor_)};
+    }
     points_.push_back(p);
   }
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dkb/geometry/camera.h"
+#include "dkb/geometry/sensor_noise.h"
 #include "dkb/matching/candidates.h"
 #include "dkb/tracking/frame.h"
 
@@ -12,19 +13,23 @@ namespace dkb {
 // Visual-odometry points: features that show no map point are followed from frame to frame until a keyframe makes map
 // points of them, so that what has just come into view steadies the pose at once. They never enter the map. Features
 // without depth of their own are taken at that of the features around them, which between two frames is near enough to
-// tell the camera's rotation.
+// tell the camera's rotation. As long as they are followed they must stay on the ray of their first sighting, whatever
+// their depth: what leaves it moves (the epipolar constraint; Hartley and Zisserman, 2004, section 9.1).
 //
 // Deterministic.
 class OdometryPoints {
  public:
-  OdometryPoints(const CameraModel& camera, double scale_factor, double max_depth)
-      : camera_(camera), scale_factor_(scale_factor), max_depth_(max_depth) {}
+  OdometryPoints(const CameraModel& camera, const SensorNoise& noise, double scale_factor, double max_depth)
+      : camera_(camera), noise_(noise), scale_factor_(scale_factor), max_depth_(max_depth) {}
 
   // The points as matching wants them, in the world that `frame`, the one last remembered, lives in now. Candidate ids
   // are kNoPoint.
   std::vector<Candidate> candidates(const TrackedFrame& frame) const;
-  // Candidate `i` is at the depth of its surroundings.
-  bool guessed(size_t i) const { return points_[i].guessed; }
+  // Candidate `i`, shown by a feature of the frame after.
+  OdometryMatch match(size_t i, const TrackedFrame& frame) const;
+  // Whether a point without depth that was seen along `first` has moved when `keypoint` shows it: no place on that ray
+  // is seen there.
+  bool has_moved(const SightRay& first, const Keypoint& keypoint, const Rigid3& cam_from_world) const;
   // Takes the features of `frame`, which has a pose: inliers of points known before keep their place in the world, but
   // for guessed ones; the others start at their depth.
   void remember(const TrackedFrame& frame);
@@ -37,10 +42,13 @@ class OdometryPoints {
     int feature = -1;              // of the frame last remembered
     Eigen::Vector3d point_in_cam;  // [m] in that frame's camera
     bool guessed = false;          // its depth is that of its surroundings
+    SightRay first_in_cam;         // of guessed ones, in that frame's camera
+    bool moves = false;            // it has left that ray
   };
   static float depth_around(const TrackedFrame& frame, const Keypoint& keypoint);
 
   CameraModel camera_;
+  SensorNoise noise_;
   double scale_factor_, max_depth_;
   std::vector<Point> points_;  // by feature
 };

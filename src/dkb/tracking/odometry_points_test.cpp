@@ -30,29 +30,29 @@ TrackedFrame frame_of(const std::vector<Eigen::Vector3f>& pixels_and_depths) {
 
 TEST(OdometryPoints, StartAtTheirDepth) {
   const CameraModel camera;
-  OdometryPoints points(camera, 1.2, 4.0);
+  OdometryPoints points(camera, SensorNoise(), 1.2, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 2}});
   frame.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {0, 0, 1});
   points.remember(frame);
   const auto candidates = points.candidates(frame);
   ASSERT_EQ(candidates.size(), 1u);
-  EXPECT_FALSE(points.guessed(0));
+  EXPECT_FALSE(points.match(0, frame).guessed);
   EXPECT_LT((camera.project(frame.cam_from_world * candidates[0].position) - Eigen::Vector2d(100, 80)).norm(), 1e-9);
   EXPECT_NEAR(candidates[0].position.z(), 1.0, 1e-12);
 }
 
 TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
-  OdometryPoints points(CameraModel(), 1.2, 4.0);
+  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
   const TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 1}, {100, 90, 3}, {300, 80, 2}, {500, 400, 0}});
   points.remember(frame);
   const auto candidates = points.candidates(frame);
   ASSERT_EQ(candidates.size(), 4u);  // nothing is near the last
-  EXPECT_TRUE(points.guessed(0));
+  EXPECT_TRUE(points.match(0, frame).guessed);
   EXPECT_NEAR(candidates[0].position.z(), 1.5, 1e-6);  // 2 / (1/1 + 1/3)
 }
 
 TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
-  OdometryPoints points(CameraModel(), 1.2, 4.0);
+  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 1}, {200, 80, 1}, {300, 80, 1}, {400, 80, 5}, {500, 80, 1}});
   frame.points[0] = make_point_id(0, 0);
   frame.outlier[1] = 1;
@@ -67,7 +67,7 @@ TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
 }
 
 TEST(OdometryPoints, KeepTheirPlaceInTheWorldWhileFollowedButForGuessedOnes) {
-  OdometryPoints points(CameraModel(), 1.2, 4.0);
+  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 2}, {300, 80, 2}, {310, 80, 0}});
   frame.odometry[0] = OdometryMatch{{0.1, 0.2, 1.9}, false};
   frame.odometry[2] = OdometryMatch{{0.1, 0.2, 1.5}, true};
@@ -76,7 +76,60 @@ TEST(OdometryPoints, KeepTheirPlaceInTheWorldWhileFollowedButForGuessedOnes) {
   ASSERT_EQ(candidates.size(), 3u);
   EXPECT_LT((candidates[0].position - Eigen::Vector3d(0.1, 0.2, 1.9)).norm(), 1e-12);
   EXPECT_NEAR(candidates[2].position.z(), 2.0, 1e-6);
-  EXPECT_TRUE(points.guessed(2));
+  EXPECT_TRUE(points.match(2, frame).guessed);
+}
+
+// A point without depth at 100 px right of and 80 px below the corner of the image, seen first at the world's origin.
+struct SeenWithoutDepth : testing::Test {
+  const CameraModel camera;
+  OdometryPoints points{camera, SensorNoise(), 1.2, 4.0};
+  TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 2}});
+
+  SightRay first() {
+    points.remember(frame);
+    return points.match(0, frame).first;
+  }
+  static Keypoint keypoint_at(const Eigen::Vector2d& pixel) {
+    Keypoint k;
+    k.pixel = pixel.cast<float>();
+    return k;
+  }
+};
+
+TEST_F(SeenWithoutDepth, HasNotMovedWhereAnyDepthOnItsRayIsSeen) {
+  const SightRay ray = first();
+  const Rigid3 cam_from_world(Eigen::Quaterniond(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY())), {0.2, -0.1, 0.3});
+  for (const double depth : {0.31, 0.7, 2.0, 9.0, 1e4}) {
+    const Eigen::Vector3d point = camera.unproject({100, 80}, depth);
+    EXPECT_FALSE(points.has_moved(ray, keypoint_at(camera.project(cam_from_world * point)), cam_from_world)) << depth;
+  }
+}
+
+TEST_F(SeenWithoutDepth, HasMovedBesideItsRayAndBeyondItsEnds) {
+  const SightRay ray = first();
+  // Both sightings are off by 1 px: 95 % lie within sqrt(2 * 5.991) = 3.46 px.
+  EXPECT_FALSE(points.has_moved(ray, keypoint_at({103.4, 80}), {}));
+  EXPECT_TRUE(points.has_moved(ray, keypoint_at({103.5, 80}), {}));
+  const Rigid3 beside(Eigen::Quaterniond::Identity(), {-0.1, 0, 0});  // the camera went to the right: points go left
+  const double nearest = camera.fx * 0.1 / 0.3;                       // [px] that a point 0.3 m away goes
+  EXPECT_FALSE(points.has_moved(ray, keypoint_at({100 - nearest - 3.4, 80}), beside));
+  EXPECT_TRUE(points.has_moved(ray, keypoint_at({100 - nearest - 3.5, 80}), beside));
+  EXPECT_FALSE(points.has_moved(ray, keypoint_at({103.4, 80}), beside));  // infinitely far
+  EXPECT_TRUE(points.has_moved(ray, keypoint_at({103.5, 80}), beside));
+  EXPECT_TRUE(points.has_moved(ray, keypoint_at({90, 83.5}), beside));
+}
+
+TEST_F(SeenWithoutDepth, IsFollowedOnWhenItMovesAndKeepsItsFirstRay) {
+  const SightRay ray = first();
+  TrackedFrame next = frame_of({{104, 80, 0}, {110, 80, 2}});
+  next.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {0, 0, 0.2});
+  next.odometry[0] = points.match(0, frame);
+  next.odometry[0]->moves = true;
+  next.outlier[0] = 1;
+  points.remember(next);
+  const OdometryMatch match = points.match(0, next);
+  EXPECT_TRUE(match.moves);
+  EXPECT_LT((match.first.origin - ray.origin).norm() + (match.first.direction - ray.direction).norm(), 1e-12);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       options_(options),
       seed_(seed),
       relocaliser_(camera, noise, scale_factor, levels, seed),
-      odometry_(camera, scale_factor, options.close_depth) {
+      odometry_(camera, noise, scale_factor, options.close_depth) {
   noise_.check();
 }
 
@@ -216,13 +216,15 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   for (size_t f = 0; f < points.size(); ++f)
     if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
   const size_t in_map = pairs.size();
+  std::vector<std::optional<OdometryMatch>> followed(features.size());
   if (last_) {
     for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
     const std::vector<Candidate> others = odometry_.candidates(*last_);
     for (const auto& m : match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match,
                                              &taken, nullptr)) {
-      const auto c = static_cast<size_t>(m.candidate);
-      pairs.push_back(odometry_pair(m.feature, {others[c].position, odometry_.guessed(c)}));
+      auto& shown = followed[static_cast<size_t>(m.feature)];
+      shown = odometry_.match(static_cast<size_t>(m.candidate), *last_);
+      if (!shown->moves) pairs.push_back(odometry_pair(m.feature, *shown));
     }
   }
   const PoseEstimate pose = refine(initial, pairs, features, frame.predicted);
@@ -237,15 +239,6 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     if (visible[i]) in_view.push_back(candidates[i].id);
   visibility_.add_visible(std::move(in_view));
   visibility_.add_visible(std::move(matched));
-  // A guessed depth is let pass more; not where a mover may be.
-  const auto strays = [&](const Pair& pair) {
-    const auto f = static_cast<size_t>(pair.feature);
-    if (pair.use_depth || frame.matchable().motion_of(f) == FeatureMotion::still) return false;
-    const Keypoint& k = features.keypoints[f];
-    const double sigma = pose_observation(k, pair.point_in_world, noise_, scale_factor_).pixel_sigma;
-    const Eigen::Vector2d seen = camera_.project(pose.cam_from_world * pair.point_in_world);
-    return (seen - k.pixel.cast<double>()).squaredNorm() > PoseOptions().chi2_pixel * sigma * sigma;
-  };
   frame.points.assign(points.size(), kNoPoint);
   frame.outlier.assign(points.size(), 0);
   frame.odometry.assign(points.size(), std::nullopt);
@@ -256,11 +249,17 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     } else if (i < in_map) {
       frame.points[f] = points[f];
       found.push_back(points[f]);
-    } else if (strays(pairs[i])) {
-      frame.outlier[f] = 1;
     } else {
-      frame.odometry[f] = OdometryMatch{pairs[i].point_in_world, !pairs[i].use_depth};
+      frame.odometry[f] = followed[f];
     }
+  }
+  // A guessed depth is let pass more by the pose: the ray of the first sighting tells.
+  for (size_t f = 0; f < followed.size(); ++f) {
+    auto& shown = frame.odometry[f];
+    if (followed[f] && followed[f]->moves) shown = followed[f];
+    if (!shown || !shown->guessed) continue;
+    shown->moves = shown->moves || odometry_.has_moved(shown->first, features.keypoints[f], pose.cam_from_world);
+    frame.outlier[f] = shown->moves;
   }
   visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
@@ -306,7 +305,8 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
       ++in_map;
     }
   for (size_t f = 0; f < frame.points.size(); ++f)
-    if (frame.odometry[f]) pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
+    if (frame.odometry[f] && !frame.odometry[f]->moves)
+      pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
   if (!pose.ok) return;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
