@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kFirstAnswer = 10;  // [s] that a real-time run waits for the first answer: it may have to load a model
 
+constexpr FrameIndex kRest = 3;  // times what an answer took, while the detector is to rest
+
 bool finite(const Box& b) {
   return std::isfinite(b.x) && std::isfinite(b.y) && std::isfinite(b.w) && std::isfinite(b.h);
 }
@@ -67,6 +69,7 @@ DetectionStage::Answer DetectionStage::detect(const Task& task) {
 void DetectionStage::offer(FrameIndex index, const Frame& frame) {
   if (index < next_) return;
   const bool first = next_ == 0;
+  if (rests_ && !first && (stage_.outstanding() > 0 || index < rest_until_)) return;
   next_ = index + schedule_.every;
   if (realtime_ && !first) dropped_ += stage_.drop_waiting();  // only the newest image is worth waiting
   stage_.push({index, frame}, first ? index : index + schedule_.latency);
@@ -95,6 +98,7 @@ std::vector<DueDetections> DetectionStage::exchange(FrameIndex index, const Fram
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;
       last_stamp_ = answer->due.stamp_ns;
     }
+    rest_until_ = index + kRest * (index - answer->due.frame);
     due.push_back(std::move(answer->due));
   }
   if (waits) times_.add("wait_detector", watch.ms());
