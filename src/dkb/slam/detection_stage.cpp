@@ -12,8 +12,6 @@ namespace {
 
 constexpr double kFirstAnswer = 10;  // [s] that a real-time run waits for the first answer: it may have to load a model
 
-constexpr FrameIndex kRest = 3;  // times what an answer took, while the detector is to rest
-
 bool finite(const Box& b) {
   return std::isfinite(b.x) && std::isfinite(b.y) && std::isfinite(b.w) && std::isfinite(b.h);
 }
@@ -98,7 +96,7 @@ std::vector<DueDetections> DetectionStage::exchange(FrameIndex index, const Fram
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;
       last_stamp_ = answer->due.stamp_ns;
     }
-    rest_until_ = index + kRest * (index - answer->due.frame);
+    rest_until_ = index + (index - answer->due.frame);
     due.push_back(std::move(answer->due));
   }
   if (waits) times_.add("wait_detector", watch.ms());

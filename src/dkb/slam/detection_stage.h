@@ -34,7 +34,7 @@ class DetectionStage {
 
   // Offers the image of a frame, by increasing index, and takes what counts from this frame on, oldest first.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
-  // For real-time runs: while on, the detector rests three times as long as its last answer took, in frames.
+  // For real-time runs: while on, the detector rests as long as its last answer took, in frames.
   void rest(bool on) { rests_ = on; }
   std::vector<std::string> take_warnings();
 

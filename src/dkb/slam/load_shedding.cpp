@@ -9,7 +9,7 @@ namespace {
 
 // In frames, since a queue of live frames is as long at every rate: 30 (PacedSource), of which the oldest is dropped.
 constexpr int kLate = 5;     // behind, more than any single keyframe or correction costs
-constexpr int kSettle = 5;   // until a step can have shown what it saves
+constexpr int kSettle = 5;   // in which it is seen whether the run catches up, also by what a step saves
 constexpr int kOnTime = 60;  // in a row until a step is taken back: two seconds at 30 Hz
 
 }  // namespace
@@ -30,13 +30,19 @@ void LoadShedding::begin(int64_t stamp_ns, int64_t now_ns) {
 }
 
 void LoadShedding::choose(int64_t interval_ns) {
-  ++frames_at_level_;
   frames_on_time_ = late_ns_ <= interval_ns ? frames_on_time_ + 1 : 0;
   const auto step = [this](int by) {
     level_ = static_cast<Level>(level_ + by);
-    frames_at_level_ = frames_on_time_ = 0;
+    frames_on_time_ = 0;
   };
-  if (late_ns_ > kLate * interval_ns && frames_at_level_ >= kSettle && level_ + 1 < kLevels) {
+  bool falls_behind = false;
+  if (++frames_watched_ == kSettle) {
+    // Late for a while already, and no less than it was: one wait for a detector that is loaded is made up for.
+    falls_behind = late_ns_ > kLate * interval_ns && late_before_ns_ > interval_ns && late_ns_ >= late_before_ns_;
+    frames_watched_ = 0;
+    late_before_ns_ = late_ns_;
+  }
+  if (falls_behind && level_ + 1 < kLevels) {
     step(1);
     if (!std::exchange(warned_, true))
       warning_ =

@@ -21,7 +21,7 @@ class LoadShedding {
  public:
   enum Level {
     kFull,
-    kDetection,  // the slow detector rests most of the time
+    kDetection,  // the slow detector rests half of the time
     kLoops,      // and loop search and global adjustment wait until there is time
     kFeatures,   // and a frame gets fewer features
     kLevels
@@ -43,9 +43,9 @@ class LoadShedding {
   void choose(int64_t interval_ns);
 
   std::optional<int64_t> stamp_ns_, began_ns_, done_ns_;  // of the frame before
-  int64_t late_ns_ = 0;
+  int64_t late_ns_ = 0, late_before_ns_ = 0;              // now; when it was looked at last
   Level level_ = kFull;
-  int frames_at_level_ = 0;
+  int frames_watched_ = 0;                 // since then
   int frames_on_time_ = 0;                 // in a row
   std::array<double, kLevels> seconds_{};  // at each level
   bool warned_ = false;

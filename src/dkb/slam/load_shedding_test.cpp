@@ -79,6 +79,13 @@ TEST(LoadShedding, OneSlowFrameIsNoReason) {
   EXPECT_EQ(queue.work(50, 20), Levels{LoadShedding::kFull});
 }
 
+TEST(LoadShedding, WhoCatchesUpLeavesNothingOut) {
+  LoadShedding load;
+  Queue queue(load);
+  EXPECT_EQ(queue.work(1, 20 * 33), Levels{LoadShedding::kFull}) << "as while a detector is loaded";
+  EXPECT_EQ(queue.work(100, 25), Levels{LoadShedding::kFull});
+}
+
 TEST(LoadShedding, StepsAreTakenBackInTurnOnceNothingIsLate) {
   LoadShedding load;
   Queue queue(load);

@@ -62,7 +62,7 @@ class SceneStage {
 
   // What the slow detector has due at this frame. It may wait.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
-  // While on, the slow detector of a real-time run rests most of the time.
+  // While on, the slow detector of a real-time run rests half of the time.
   void rest_detector(bool on) {
     if (slow_stage_) slow_stage_->rest(on);
   }
