@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct RunFacts {
   MoverRows movers;
   StageTimes times;  // of stages that the system does not have
   bool writes_map = true;
+  std::optional<int> dropped;  // of `skipped`, in real time: those for which there was no time
 };
 
 // Seconds since this process was started, by the kernel's account.

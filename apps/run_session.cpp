@@ -208,6 +208,7 @@ void RunSession::track() {
     SourceFrame next = source_->next();
     warn_of_source();
     if (next.state == SourceState::ended) break;
+    warn_of_dropped(next.index);
     if (next.state != SourceState::unplugged) facts_.offered = static_cast<int>(next.index) + 1;
     if (facts_.startup_s == 0) facts_.startup_s = seconds_since_process_start() - loading_s_;
     camera_.add(next);
@@ -234,7 +235,8 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   for (const Event& event : events) {
     log_->event(event);
     if (event.kind == Event::Kind::warning)
-      warnings_.warn("detector", "frame " + std::to_string(next.index) + ": " + event.text);
+      warnings_.warn(event.text.substr(0, event.text.find(':')),
+                     "frame " + std::to_string(next.index) + ": " + event.text);
   }
   if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
   if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
@@ -247,7 +249,10 @@ void RunSession::write(double seconds) {
     interrupted_ = fmt::format("interrupted after {} frames; ", facts_.offered);
     facts_.offered = std::max(facts_.offered, static_cast<int>(recording_->size().value_or(0)));
   }
-  if (paced_ || live_) facts_.skipped += static_cast<int>(source_->counts().dropped);
+  if (paced_ || live_) {
+    facts_.dropped = static_cast<int>(source_->counts().dropped);
+    facts_.skipped += *facts_.dropped;
+  }
   // Nobody knows how many a camera could have given.
   if (live_) facts_.offered = static_cast<int>(facts_.stamps.size()) + facts_.skipped;
   facts_.wall_s = seconds;
@@ -290,6 +295,16 @@ int RunSession::tell_the_end() {
                "units of the camera's depth_factor ({} per metre)?\n",
                options_.tracking.initial_points, opened_.camera().depth_factor);
   return 1;
+}
+
+// No frame is lost in silence.
+void RunSession::warn_of_dropped(size_t next_index) {
+  const auto* paced = dynamic_cast<const PacedSource*>(source_);
+  for (; paced != nullptr && dropped_ < paced->dropped(); ++dropped_)
+    warnings_.warn("frame dropped, the machine is too slow for this pace",
+                   "frame " + std::to_string(next_index) +
+                       ": one before it was dropped, the machine is too slow for "
+                       "this pace");
 }
 
 void RunSession::warn_of_source() {

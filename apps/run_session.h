@@ -60,6 +60,7 @@ class RunSession {
   void write(double seconds);
   int tell_the_end();
   void warn_of_source();
+  void warn_of_dropped(size_t next_index);
 
   RunArguments args_;
   WarningLog warnings_;
@@ -73,6 +74,7 @@ class RunSession {
   std::filesystem::path out_;
   std::optional<PacedSource> paced_;  // in real time
   Source* source_ = nullptr;          // that frames are taken from
+  int dropped_ = 0;                   // frames of it that were told
   std::unique_ptr<RunViewer> viewer_;
 
   RunFacts facts_;

@@ -66,26 +66,28 @@ def nice_step(span):
 
 
 def panel(rows, columns, title, top, height=150, left=60, width=640):
-    """One diagram over the minutes, from zero. `columns`: (name in the file, its legend, colour)."""
-    minutes = [float(r["seconds"]) / 60 for r in rows]
+    """One diagram over the frames, from zero. `columns`: (name in the file, its legend, colour)."""
+    thousands = [float(r["frames"]) / 1000 for r in rows]
     highest = max(float(r[name]) for r in rows for name, _, _ in columns) * 1.08
-    x = lambda m: left + width * m / max(minutes)
+    x = lambda t: left + width * t / max(thousands)
     y = lambda v: top + height - height * v / highest
     out = [f'<text x="{left}" y="{top - 8}" font-weight="bold">{title}</text>']
     step = nice_step(highest)
     for k in range(int(highest / step) + 1):
         out.append(f'<path d="M{left} {y(k * step):.1f}h{width}" stroke="#ddd"/>')
         out.append(f'<text x="{left - 6}" y="{y(k * step) + 4:.1f}" text-anchor="end">{k * step:g}</text>')
-    for lap in range(0, int(max(minutes) / 2 + 0.01) + 1):
-        out.append(f'<path d="M{x(2 * lap):.1f} {top}v{height}" stroke="#eee"/>')
-        if lap % 2 == 0:
-            out.append(f'<text x="{x(2 * lap):.1f}" y="{top + height + 15}" text-anchor="middle">{2 * lap}</text>')
+    for before, after in zip(rows, rows[1:]):
+        if before["round"] != after["round"]:
+            out.append(f'<path d="M{x(float(before["frames"]) / 1000):.1f} {top}v{height}" stroke="#ddd"/>')
+    step = nice_step(max(thousands))
+    for k in range(int(max(thousands) / step) + 1):
+        out.append(f'<text x="{x(k * step):.1f}" y="{top + height + 15}" text-anchor="middle">{k * step:g}</text>')
     for i, (name, legend, colour) in enumerate(columns):
-        points = " ".join(f"{x(m):.1f},{y(float(r[name])):.1f}" for m, r in zip(minutes, rows))
+        points = " ".join(f"{x(t):.1f},{y(float(r[name])):.1f}" for t, r in zip(thousands, rows))
         out.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
         if legend:
-            at = left + width - 150 * (len(columns) - i)
-            out.append(f'<text x="{at + 150}" y="{top - 8}" text-anchor="end" fill="{colour}">{legend}</text>')
+            at = left + width - 130 * (len(columns) - 1 - i)
+            out.append(f'<text x="{at}" y="{top - 8}" text-anchor="end" fill="{colour}">{legend}</text>')
     return out
 
 
@@ -93,14 +95,21 @@ def plot(table, picture):
     with open(table, newline="") as file:
         rows = list(csv.DictReader(file))
     blue, orange = "#2563a8", "#c25a10"
-    out = ['<svg xmlns="http://www.w3.org/2000/svg" width="730" height="810" font-family="sans-serif" font-size="12">',
-           '<rect width="730" height="810" fill="white"/>']
-    out += panel(rows, [("keyframes", "", blue)], "Keyframes in the map", 30)
-    out += panel(rows, [("points", "", blue)], "Points in the map", 220)
-    out += panel(rows, [("rss_mb", "resident", orange), ("in_use_mb", "in use", blue)], "Memory [MB]", 410)
-    out += panel(rows, [("tracking_p95_ms", "by the clock", orange), ("cpu_p95_ms", "CPU of its thread", blue)],
-                 "95% of tracking time [ms]", 600)
-    out.append('<text x="380" y="798" text-anchor="middle">minutes (a line each time the path starts anew)</text></svg>')
+    panels = [
+        ("Keyframes", [("keyframes_inserted", "ever made", orange), ("keyframes", "in the map", blue)]),
+        ("Points in the map", [("points", "", blue)]),
+        ("Memory [MB]", [("rss_mb", "resident", orange), ("in_use_mb", "in use", blue)]),
+        ("Tracking, CPU [ms a frame]", [("cpu_p95_ms", "95%", orange), ("cpu_mean_ms", "mean", blue)]),
+        ("Mapping and loop search [ms a keyframe]", [("loop_ms", "loop search", orange), ("mapping_ms", "mapping", blue)]),
+        ("Longest global adjustment [ms]", [("global_ba_ms", "", blue)]),
+    ]
+    height = 190 * len(panels) + 40
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="730" height="{height}" font-family="sans-serif" font-size="12">',
+           f'<rect width="730" height="{height}" fill="white"/>']
+    for i, (title, columns) in enumerate(panels):
+        out += panel(rows, columns, title, 30 + 190 * i)
+    out.append(f'<text x="380" y="{height - 12}" text-anchor="middle">thousand frames '
+               '(a line each time the path starts anew)</text></svg>')
     pathlib.Path(picture).write_text("\n".join(out) + "\n")
 
 

@@ -2,6 +2,7 @@
 // The library as its users see it: public headers alone, on frames with a known answer.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -55,6 +56,40 @@ TEST_F(Library, EveryFrameSaysWhatItsTimeWentInto) {
     EXPECT_GT(features, 0);
     EXPECT_LT(features, tracking);
   }
+}
+
+// Frames a millisecond apart, which no machine tracks in time.
+std::vector<Frame> rush(const WallWorld& world) {
+  std::vector<Frame> frames;
+  for (const Frame& frame : world.walk(0, 60)) {
+    const int64_t stamp = int64_t{1'000'000'000} + 1'000'000 * static_cast<int64_t>(frames.size());
+    frames.push_back(Frame(frame.image(), stamp, stamp));
+  }
+  return frames;
+}
+
+TEST_F(Library, ARealTimeRunThatIsLateSaysWhatItLeavesOut) {
+  Options options;
+  options.realtime = true;
+  Slam slam = slam_with(nullptr, options);
+  size_t first = 0, last = 0;
+  for (const Frame& frame : rush(world)) {
+    const FrameResult r = slam.process(frame);
+    last = r.features.size();
+    if (r.frame == 0) first = last;
+  }
+  EXPECT_LT(last, 0.6 * static_cast<double>(first));
+  EXPECT_GT(slam.statistics().degraded_s.at("detection"), 0);
+  EXPECT_GT(slam.statistics().degraded_s.at("features"), 0);
+  const auto events = slam.take_events();
+  EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const Event& e) { return e.kind == Kind::warning; }), 1);
+}
+
+TEST_F(Library, ARunThatIsNotInRealTimeLeavesNothingOutHoweverLate) {
+  Slam slam = slam_with();
+  for (const Frame& frame : rush(world)) EXPECT_GT(slam.process(frame).features.size(), 900U);
+  EXPECT_TRUE(slam.statistics().degraded_s.empty());
+  for (const Event& event : slam.take_events()) EXPECT_NE(event.kind, Kind::warning);
 }
 
 // Motion priors.

@@ -97,6 +97,7 @@ TEST(RunCommand, WritesEveryFileOfTheContract) {
   EXPECT_GE(s.at("keyframe_tests").at("visibility"), s.at("keyframe_rules").at("adaptive"));
   EXPECT_TRUE(s.at("dynamic").contains("features_removed"));
   EXPECT_TRUE(s.at("detector").contains("kind"));
+  EXPECT_FALSE(s.contains("realtime")) << "a run of a dataset leaves nothing out";
 
   EXPECT_TRUE(read_text(run.out / "map.ply").starts_with("ply\n"));
   EXPECT_GT(fs::file_size(run.out / "map.dkb"), 1000U);
@@ -179,6 +180,9 @@ TEST(RunCommand, PacedByTheStampsEveryFrameIsAccountedFor) {
   const auto& s = run.stats;
   EXPECT_EQ(s.at("frames"), kSequenceFrames);
   EXPECT_EQ(s.at("tracked").get<int>() + s.at("lost").get<int>() + s.at("skipped").get<int>(), kSequenceFrames);
+  EXPECT_EQ(s.at("realtime").at("dropped"), s.at("skipped"));
+  for (const char* part : {"detection", "loop_search", "features"})
+    EXPECT_GE(s.at("realtime").at("degraded_s").at(part), 0) << part;
   EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.02);
 }
 

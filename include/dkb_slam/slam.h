@@ -67,6 +67,9 @@ struct Statistics {
   double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
   int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
   std::string detector_inference;              ///< Detectors::inference
+  /// Of a real-time run: how long [s] it was late and therefore did without half of "detection", "loop_search" and half
+  /// of the "features"; each includes those after it. Empty in any other run, which leaves nothing out.
+  std::map<std::string, double> degraded_s;
   std::map<std::string, StageSummary> stages;  ///< times by stage: "tracking", "mapping", "wait_mapper" ...
   /// By stage: how often it took how long. Element k counts durations from 2^(k/4 - 5) ms to those of element k + 1, the
   /// first and the 64th, which is the last that there may be, also what lies beyond.

@@ -39,6 +39,8 @@ class OrbExtractor {
   // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
   // image; these get half of the features at most where there are enough others. Empty: no such place.
   OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1);
+  // Features asked for from now on.
+  void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
   const ImagePyramid& pyramid() const { return pyramid_; }
   const OrbOptions& options() const { return options_; }

@@ -1,21 +1,64 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/loop/global_adjustment.h"
 
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
 #include "dkb/mapping/ba_window.h"
 #include "dkb/solver/geometric_weights.h"
 
 namespace dkb {
+namespace {
 
-MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local) {
-  MapCorrection correction;
-  const std::vector<KeyframeId> keyframes = map.live_keyframes();
-  if (keyframes.size() < 2) return correction;
+// The live keyframes nearest to the newest one by covisibility, increasing: as many as have that many neighbours
+// together.
+std::vector<KeyframeId> nearest_keyframes(const Map& map, size_t most_neighbours) {
+  std::vector<KeyframeId> nearest = map.live_keyframes();
+  const auto neighbours = [&map](KeyframeId k) { return map.keyframe(k)->covisible.size(); };
+  size_t sum = 0;
+  for (KeyframeId k : nearest) sum += neighbours(k);
+  if (sum <= most_neighbours) return nearest;
+  nearest.erase(nearest.begin(), nearest.end() - 1);
+  sum = neighbours(nearest[0]);
+  std::vector<uint8_t> seen(static_cast<size_t>(map.keyframe_count()), 0);
+  seen[static_cast<size_t>(nearest[0])] = 1;
+  for (size_t next = 0; next < nearest.size(); ++next)
+    for (const Covisible& c : map.keyframe(nearest[next])->covisible) {
+      if (seen[static_cast<size_t>(c.keyframe)] || sum + neighbours(c.keyframe) > most_neighbours) continue;
+      seen[static_cast<size_t>(c.keyframe)] = 1;
+      sum += neighbours(c.keyframe);
+      nearest.push_back(c.keyframe);
+    }
+  std::sort(nearest.begin(), nearest.end());
+  return nearest;
+}
+
+// The roots of maps, and what has neighbours that take no part.
+std::vector<uint8_t> those_that_stay(const Map& map, const std::vector<KeyframeId>& keyframes) {
+  const auto takes_part = [&](KeyframeId k) { return std::binary_search(keyframes.begin(), keyframes.end(), k); };
   std::vector<uint8_t> fixed;
-  for (KeyframeId k : keyframes) fixed.push_back(map.keyframe(k)->parent == kNoKeyframe);
+  for (KeyframeId id : keyframes) {
+    const Keyframe& k = *map.keyframe(id);
+    fixed.push_back(k.parent == kNoKeyframe ||
+                    !std::all_of(k.covisible.begin(), k.covisible.end(),
+                                 [&](const Covisible& c) { return takes_part(c.keyframe); }));
+  }
+  if (std::find(fixed.begin(), fixed.end(), 1) == fixed.end()) fixed.front() = 1;
+  return fixed;
+}
+
+}  // namespace
+
+MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
+                              size_t most_neighbours) {
+  MapCorrection correction;
+  const std::vector<KeyframeId> keyframes = nearest_keyframes(map, most_neighbours);
+  if (keyframes.size() < 2) return correction;
+  std::vector<uint8_t> fixed = those_that_stay(map, keyframes);
   // Points of one observation tie nothing together; they follow their keyframe.
-  std::vector<PointId> points;
-  for (PointId p : map.live_points())
-    if (map.point(p)->observations.size() >= 2) points.push_back(p);
+  std::vector<PointId> points = map.points_of(keyframes);
+  std::erase_if(points, [&](PointId p) { return map.point(p)->observations.size() < 2; });
   BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics.camera, optics.noise,
                                    optics.scale_factor);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);

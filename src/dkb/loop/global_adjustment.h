@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+
 #include "dkb/loop/place_verification.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
 
 namespace dkb {
 
-// Adjusts all keyframes and points of a snapshot; the first keyframe of each map stays. `local` tells how points are
-// weighted. Deterministic.
-MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local);
+// The time of an adjustment grows faster than the pairs of keyframes that share points, and is some seconds at this
+// number (docs/benchmarks.md); each pair counts twice. A path of 200 m that is walked once has fewer.
+inline constexpr size_t kMostNeighbours = 40000;
+
+// Adjusts all keyframes and points of a snapshot; the first keyframe of each map stays. Where these have more than
+// `most_neighbours` covisible neighbours together, it takes those around the newest one, and what borders on the rest
+// stays. `local` tells how points are weighted. Deterministic.
+MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
+                              size_t most_neighbours = kMostNeighbours);
 
 }  // namespace dkb

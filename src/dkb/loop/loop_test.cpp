@@ -78,6 +78,24 @@ TEST(LoopCorrection, ClosesTheRoundAndAdjustmentSharpensIt) {
   EXPECT_LT(worst_error(world, *view), 0.25 * before);
 }
 
+TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsBorder) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound - 4);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto whole = adjust_globally(world.map, world.optics(), {});
+  EXPECT_EQ(whole.poses.size(), static_cast<size_t>(world.map.live_keyframe_count()));
+  const auto part = adjust_globally(world.map, world.optics(), {}, 60);
+  ASSERT_GE(part.poses.size(), 5U);
+  EXPECT_LT(part.poses.size(), 20U);
+  EXPECT_EQ(part.poses.back().keyframe, last);
+  EXPECT_EQ(part.poses.front().keyframe, last + 1 - static_cast<KeyframeId>(part.poses.size()));
+  const auto moved = [](const MapCorrection::Pose& p) {
+    return (centre_in_world(p.before) - centre_in_world(p.after)).norm();
+  };
+  EXPECT_EQ(moved(part.poses.front()), 0);
+  EXPECT_GT(moved(part.poses.back()), 0);
+}
+
 TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
   RoundTrip world;
   world.go(RoundTrip::kRound + 2);

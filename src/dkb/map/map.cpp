@@ -34,25 +34,26 @@ const Keyframe* Map::live_keyframe(KeyframeId id) const {
   return k != nullptr && !k->culled ? k : nullptr;
 }
 
-const Map::PointSlot* Map::slot(PointId id) const {
-  if (id == kNoPoint) return nullptr;
+Map::Slot Map::slot(PointId id) const {
+  if (id == kNoPoint) return {};
   const auto birth = static_cast<size_t>(birth_keyframe(id));
-  if (birth >= blocks_.size() || !blocks_[birth].value) return nullptr;
+  if (birth >= blocks_.size() || !blocks_[birth].value) return {};
   const PointBlock& block = *blocks_[birth].value;
   const auto feature = static_cast<size_t>(birth_feature(id));
-  if (feature >= block.slot_of_feature.size() || block.slot_of_feature[feature] < 0) return nullptr;
-  return &block.slots[static_cast<size_t>(block.slot_of_feature[feature])];
+  const int place = feature < block.place_of_feature.size() ? block.place_of_feature[feature] : PointBlock::kNever;
+  if (place == PointBlock::kNever) return {};
+  if (place >= 0) return {&block.live[static_cast<size_t>(place)], nullptr};
+  return {nullptr, &block.replaced_by[static_cast<size_t>(~place)]};
 }
 
 const MapPoint* Map::point(PointId id) const {
-  const PointSlot* s = slot(id);
-  return s != nullptr && s->alive ? &s->point : nullptr;
+  return slot(id).live;
 }
 
 PointId Map::resolve(PointId id) const {
-  for (const PointSlot* s = slot(id); s != nullptr; s = slot(id)) {
-    if (s->alive) return id;
-    id = s->replaced_by;
+  for (Slot s = slot(id); s; s = slot(id)) {
+    if (s.live != nullptr) return id;
+    id = *s.replaced_by;
   }
   return kNoPoint;
 }
@@ -94,9 +95,8 @@ std::vector<PointId> Map::live_points() const {
   ids.reserve(point_count_);
   for (const auto& block : blocks_) {
     if (!block.value) continue;
-    for (int16_t s : block.value->slot_of_feature)
-      if (s >= 0 && block.value->slots[static_cast<size_t>(s)].alive)
-        ids.push_back(block.value->slots[static_cast<size_t>(s)].point.id);
+    for (const int place : block.value->place_of_feature)
+      if (place >= 0) ids.push_back(block.value->live[static_cast<size_t>(place)].id);
   }
   return ids;
 }
@@ -113,12 +113,14 @@ std::vector<PointId> Map::points_of(const std::vector<KeyframeId>& keyframes) co
 
 std::vector<RemovedPoint> Map::removed_points() const {
   std::vector<RemovedPoint> removed;
-  for (const auto& block : blocks_) {
-    if (!block.value) continue;
-    for (int16_t s : block.value->slot_of_feature) {
-      if (s < 0) continue;
-      const PointSlot& gone = block.value->slots[static_cast<size_t>(s)];
-      if (!gone.alive) removed.push_back({gone.point.id, gone.replaced_by});
+  for (size_t birth = 0; birth < blocks_.size(); ++birth) {
+    if (!blocks_[birth].value) continue;
+    const PointBlock& block = *blocks_[birth].value;
+    for (size_t feature = 0; feature < block.place_of_feature.size(); ++feature) {
+      const int place = block.place_of_feature[feature];
+      if (place < 0 && place != PointBlock::kNever)
+        removed.push_back({make_point_id(static_cast<KeyframeId>(birth), static_cast<int>(feature)),
+                           block.replaced_by[static_cast<size_t>(~place)]});
     }
   }
   return removed;
@@ -147,7 +149,7 @@ Map::PointBlock& Map::edit_block(KeyframeId birth) {
 MapPoint& Map::edit_point(PointId id) {
   if (point(id) == nullptr) throw std::logic_error("map: no point " + std::to_string(id));
   PointBlock& block = edit_block(birth_keyframe(id));
-  return block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(id))])].point;
+  return block.live[static_cast<size_t>(block.place_of_feature[static_cast<size_t>(birth_feature(id))])];
 }
 
 void Map::add_keyframe(Keyframe keyframe) {
@@ -167,17 +169,28 @@ void Map::add_keyframe(Keyframe keyframe) {
 void Map::add_point(MapPoint point) {
   const PointId id = point.id;
   if (id == kNoPoint) throw std::logic_error("map: a point without an id");
-  if (slot(id) != nullptr) throw std::logic_error("map: point " + std::to_string(id) + " was born before");
-  add_slot(id, {std::move(point), true, kNoPoint});
+  if (slot(id)) throw std::logic_error("map: point " + std::to_string(id) + " was born before");
+  add_live(std::move(point));
   ++point_count_;
 }
 
-void Map::add_slot(PointId id, PointSlot slot) {
+int16_t& Map::place_of(PointId id) {
   PointBlock& block = edit_block(birth_keyframe(id));
   const auto feature = static_cast<size_t>(birth_feature(id));
-  if (block.slot_of_feature.size() <= feature) block.slot_of_feature.resize(feature + 1, -1);
-  block.slot_of_feature[feature] = static_cast<int16_t>(block.slots.size());
-  block.slots.push_back(std::move(slot));
+  if (block.place_of_feature.size() <= feature) block.place_of_feature.resize(feature + 1, PointBlock::kNever);
+  return block.place_of_feature[feature];
+}
+
+void Map::add_live(MapPoint point) {
+  PointBlock& block = edit_block(birth_keyframe(point.id));
+  place_of(point.id) = static_cast<int16_t>(block.live.size());
+  block.live.push_back(std::move(point));
+}
+
+void Map::add_gone(RemovedPoint point) {
+  PointBlock& block = edit_block(birth_keyframe(point.id));
+  place_of(point.id) = static_cast<int16_t>(~block.replaced_by.size());
+  block.replaced_by.push_back(point.replaced_by);
 }
 
 void Map::observe(PointId point_id, KeyframeId keyframe_id, int feature) {
@@ -208,14 +221,19 @@ void Map::forget(PointId point_id, KeyframeId keyframe_id) {
   if (p.observations.empty()) remove_point(point_id);
 }
 
-void Map::remove_point(PointId id) {
+void Map::remove_point(PointId id, PointId replaced_by) {
   if (point(id) == nullptr) return;
   for (const Observation& o : point(id)->observations)
     edit(o.keyframe).points[static_cast<size_t>(o.feature)] = kNoPoint;
-  PointBlock& block = edit_block(birth_keyframe(id));
-  PointSlot& s = block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(id))])];
-  s.alive = false;
-  s.point.observations = std::vector<Observation>();  // {} would keep the memory
+  // The last of the block takes its place.
+  std::vector<MapPoint>& live = edit_block(birth_keyframe(id)).live;
+  const auto place = static_cast<size_t>(place_of(id));
+  if (place + 1 < live.size()) {
+    live[place] = std::move(live.back());
+    place_of(live[place].id) = static_cast<int16_t>(place);
+  }
+  live.pop_back();
+  add_gone({id, replaced_by});
   --point_count_;
 }
 
@@ -223,9 +241,7 @@ void Map::fuse(PointId from, PointId into) {
   if (from == into || point(from) == nullptr || point(into) == nullptr) return;
   const std::vector<Observation> moved = point(from)->observations;
   const int found = point(from)->found, visible = point(from)->visible;
-  remove_point(from);
-  PointBlock& block = edit_block(birth_keyframe(from));
-  block.slots[static_cast<size_t>(block.slot_of_feature[static_cast<size_t>(birth_feature(from))])].replaced_by = into;
+  remove_point(from, into);
   for (const Observation& o : moved) observe(into, o.keyframe, o.feature);
   MapPoint& survivor = edit_point(into);
   survivor.found += found;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -104,7 +105,7 @@ class Map {
   void add_point(MapPoint point);        // named by birth; observations must be empty, see observe()
   void observe(PointId point, KeyframeId keyframe, int feature);
   void forget(PointId point, KeyframeId keyframe);  // a point left with no observation is removed
-  void remove_point(PointId point);
+  void remove_point(PointId point) { remove_point(point, kNoPoint); }
   void fuse(PointId from, PointId into);  // observations move; `from` forwards to `into`
   void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
   MapPoint& edit_point(PointId id);  // must exist
@@ -122,14 +123,13 @@ class Map {
   void set_parent(KeyframeId id, KeyframeId parent);
 
  private:
-  struct PointSlot {
-    MapPoint point;
-    bool alive = false;
-    PointId replaced_by = kNoPoint;
-  };
-  struct PointBlock {                      // the points born at one keyframe
-    std::vector<int16_t> slot_of_feature;  // -1 = none
-    std::vector<PointSlot> slots;
+  // The points born at one keyframe. What is gone is told by the point that it was fused into, if any, and takes 6
+  // bytes: most points that are ever made do not last.
+  struct PointBlock {
+    static constexpr int16_t kNever = INT16_MIN;
+    std::vector<int16_t> place_of_feature;  // in `live`; ~place in `replaced_by` when it is gone; else kNever
+    std::vector<MapPoint> live;             // in no order
+    std::vector<PointId> replaced_by;       // of those that are gone; kNoPoint: by none
   };
   // Shared while its epoch is older than the map's, ours to write when equal.
   template <class T>
@@ -140,8 +140,16 @@ class Map {
 
   Keyframe& edit(KeyframeId id);
   PointBlock& edit_block(KeyframeId birth);
-  const PointSlot* slot(PointId id) const;
-  void add_slot(PointId id, PointSlot slot);
+  struct Slot {  // one of the two, or neither
+    const MapPoint* live = nullptr;
+    const PointId* replaced_by = nullptr;
+    explicit operator bool() const { return live != nullptr || replaced_by != nullptr; }
+  };
+  Slot slot(PointId id) const;
+  int16_t& place_of(PointId id);
+  void add_live(MapPoint point);
+  void add_gone(RemovedPoint point);
+  void remove_point(PointId point, PointId replaced_by);
   void check_keyframes() const;
   void check_forwarding() const;
 

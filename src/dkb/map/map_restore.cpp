@@ -85,17 +85,15 @@ Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, 
       contradiction(point_name(p.id) + " was made at a keyframe that is not there");
     p.observations.clear();
     const PointId id = p.id;
-    map.add_slot(id, {std::move(p), true, kNoPoint});
+    map.add_live(std::move(p));
     points[i].id = id;
   }
   map.point_count_ = points.size();
   for (size_t i = 0; i < removed.size(); ++i) {
     const RemovedPoint& r = removed[i];
     check_id(r.id, i > 0 ? removed[i - 1].id : 0, i == 0);
-    if (map.slot(r.id) != nullptr) contradiction(point_name(r.id) + " is both there and removed");
-    PointSlot gone{{}, false, r.replaced_by};
-    gone.point.id = r.id;
-    map.add_slot(r.id, std::move(gone));
+    if (map.slot(r.id)) contradiction(point_name(r.id) + " is both there and removed");
+    map.add_gone(r);
   }
 
   map.keyframes_.reserve(keyframes.size());
@@ -150,7 +148,7 @@ void Map::check_forwarding() const {
     return at != removed.end() && at->id == id ? at - removed.begin() : -1;
   };
   for (const RemovedPoint& r : removed)
-    if (r.replaced_by != kNoPoint && slot(r.replaced_by) == nullptr)
+    if (r.replaced_by != kNoPoint && !slot(r.replaced_by))
       contradiction(point_name(r.id) + " was replaced by " + point_name(r.replaced_by) + ", which never was");
   check_no_cycle(
       removed.size(),

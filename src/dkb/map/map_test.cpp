@@ -102,6 +102,30 @@ TEST(Map, APointWithNoObservationLeftIsRemoved) {
   EXPECT_EQ(broken_invariant(world.map), "");
 }
 
+TEST(Map, PointsOfAKeyframeOutliveEachOtherInAnyOrder) {
+  Map map;
+  Keyframe k;
+  k.id = 0;
+  auto features = std::make_shared<RgbdFeatures>();
+  features->keypoints.resize(5), features->descriptors.resize(5);
+  k.features = features;
+  map.add_keyframe(std::move(k));
+  for (const int f : {3, 0, 4, 1}) {
+    MapPoint p;
+    p.id = make_point_id(0, f);
+    p.position.x() = f;
+    map.add_point(std::move(p));
+    map.observe(make_point_id(0, f), 0, f);
+  }
+  map.remove_point(make_point_id(0, 0));
+  map.fuse(make_point_id(0, 3), make_point_id(0, 1));
+  EXPECT_EQ(map.live_points(), (std::vector<PointId>{make_point_id(0, 1), make_point_id(0, 4)}));
+  for (const int f : {1, 4}) EXPECT_EQ(map.point(make_point_id(0, f))->position.x(), f);
+  const std::vector<RemovedPoint> removed{{make_point_id(0, 0), kNoPoint}, {make_point_id(0, 3), make_point_id(0, 1)}};
+  EXPECT_EQ(map.removed_points(), removed);
+  EXPECT_EQ(map.resolve(make_point_id(0, 3)), make_point_id(0, 1));
+}
+
 TEST(Map, RemovedPointsLeaveNoTraceInKeyframes) {
   ThreeKeyframes world;
   world.map.remove_point(world.a);

@@ -18,6 +18,7 @@ constexpr int kRedundantObservers = 3;   // others at the same scale or finer th
 constexpr int kFusionKeyframes = 10;     // covisible keyframes whose points are fused with a new keyframe's
 constexpr double kFusionRadius = 3.0;    // [px] at the finest level
 constexpr double kSeamTolerance = 2.0;   // factor on radius and error limit of fusion where a loop was just closed
+constexpr size_t kCompared = 48;         // descriptors of a point that are compared, each with each
 
 }  // namespace
 
@@ -241,15 +242,18 @@ void LocalMapper::refresh(const std::vector<PointId>& points) {
 
 void refresh_point(Map& map, PointId id, double scale_factor) {
   const MapPoint& old = *map.point(id);
-  std::vector<const Descriptor*> descriptors;
+  if (old.observations.empty()) return;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Observation& o : old.observations) {
-    const Keyframe& k = *map.keyframe(o.keyframe);
-    descriptors.push_back(&k.features->descriptors[static_cast<size_t>(o.feature)]);
-    sum += (centre_in_world(k.cam_from_world) - old.position).normalized();
+  for (const Observation& o : old.observations)
+    sum += (centre_in_world(map.keyframe(o.keyframe)->cam_from_world) - old.position).normalized();
+  // The descriptor with the least median distance to the others stands for all; of many, some from all the time.
+  const size_t seen = old.observations.size(), compared = std::min(seen, kCompared);
+  const auto observation = [&](size_t i) -> const Observation& { return old.observations[i * seen / compared]; };
+  std::vector<const Descriptor*> descriptors;
+  for (size_t i = 0; i < compared; ++i) {
+    const Observation& o = observation(i);
+    descriptors.push_back(&map.keyframe(o.keyframe)->features->descriptors[static_cast<size_t>(o.feature)]);
   }
-  if (descriptors.empty()) return;
-  // The descriptor with the least median distance to the others stands for all.
   size_t chosen = 0;
   if (descriptors.size() > 2) {
     int min_median = 257;
@@ -263,7 +267,7 @@ void refresh_point(Map& map, PointId id, double scale_factor) {
       }
     }
   }
-  const Observation source = old.observations[chosen];
+  const Observation source = observation(chosen);
   const Keyframe& k = *map.keyframe(source.keyframe);
   const Descriptor descriptor = *descriptors[chosen];
   const float distance = static_cast<float>((centre_in_world(k.cam_from_world) - old.position).norm());

@@ -67,6 +67,7 @@ DetectionStage::Answer DetectionStage::detect(const Task& task) {
 void DetectionStage::offer(FrameIndex index, const Frame& frame) {
   if (index < next_) return;
   const bool first = next_ == 0;
+  if (rests_ && !first && (stage_.outstanding() > 0 || index < rest_until_)) return;
   next_ = index + schedule_.every;
   if (realtime_ && !first) dropped_ += stage_.drop_waiting();  // only the newest image is worth waiting
   stage_.push({index, frame}, first ? index : index + schedule_.latency);
@@ -95,6 +96,7 @@ std::vector<DueDetections> DetectionStage::exchange(FrameIndex index, const Fram
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;
       last_stamp_ = answer->due.stamp_ns;
     }
+    rest_until_ = index + (index - answer->due.frame);
     due.push_back(std::move(answer->due));
   }
   if (waits) times_.add("wait_detector", watch.ms());

@@ -34,6 +34,8 @@ class DetectionStage {
 
   // Offers the image of a frame, by increasing index, and takes what counts from this frame on, oldest first.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  // For real-time runs: while on, the detector rests as long as its last answer took, in frames.
+  void rest(bool on) { rests_ = on; }
   std::vector<std::string> take_warnings();
 
   double rate_hz() const;  // answers per second of the sequence
@@ -60,8 +62,10 @@ class DetectionStage {
   const int width_, height_;
   const DetectionSchedule schedule_;
   const bool realtime_;
-  FrameIndex next_ = 0;  // the earliest frame to be offered
-  bool threw_ = false;   // the stage's thread's
+  FrameIndex next_ = 0;        // the earliest frame to be offered
+  FrameIndex rest_until_ = 0;  // the earliest one while it rests
+  bool rests_ = false;
+  bool threw_ = false;  // the stage's thread's
   bool answered_ = false;
   size_t answers_ = 0, dropped_ = 0;
   int64_t first_stamp_ = 0, last_stamp_ = 0;  // [ns] of answers

@@ -131,6 +131,20 @@ TEST(DetectionStage, FramesThatWereSkippedDoNotStopTheRhythm) {
   EXPECT_TRUE(asked_at(12));
 }
 
+TEST(DetectionStage, ADetectorThatIsToRestDoesSoAsLongAsItsAnswerTook) {
+  ScriptedDetector detector;
+  const auto stage = stage_of(detector, {.every = 1, .latency = 2}, {.threaded = false, .realtime = true});
+  std::vector<FrameIndex> asked;
+  for (FrameIndex frame = 0; frame < 40; ++frame) {
+    stage->rest(frame >= 10);
+    const int before = detector.calls;
+    stage->exchange(frame, frame_at(frame));
+    if (detector.calls > before) asked.push_back(frame);
+  }
+  const std::vector<FrameIndex> expected{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 17, 21, 25, 29, 33, 37};
+  EXPECT_EQ(asked, expected);
+}
+
 TEST(DetectionStage, RealtimeNeverWaitsForOneThatHangsAndDropsWhatPilesUp) {
   ScriptedDetector detector;
   detector.slow = 1;

@@ -11,6 +11,7 @@ namespace dkb {
 FrameResult Pipeline::process(const Frame& frame) {
   last_stamp_ns_ = frame.stamp_ns();
   rate_.add(last_stamp_ns_);
+  if (load_) shed_load();
   FrameResult result;
   const Stopwatch waiting;
   take_due_map();
@@ -32,6 +33,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   result.tracking_ms = working.ms();
   record_.add_time("tracking", result.tracking_ms);
   result.stages = record_.take_news();
+  if (load_) load_->end(steady_ns());
   return result;
 }
 

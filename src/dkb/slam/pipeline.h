@@ -14,6 +14,7 @@
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/slam/frame_rate.h"
+#include "dkb/slam/load_shedding.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
 #include "dkb/slam/odometry_frame.h"
@@ -65,6 +66,7 @@ class Pipeline {
   FrameIndex mapping_due() {
     return mapping_due_ = std::max(mapping_due_, next_frame_ + rate_.frames(options_.pipeline.mapper_latency));
   }
+  void shed_load();
   void take_due_map();
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
@@ -93,6 +95,7 @@ class Pipeline {
   MoverTracker movers_;
   OdometryFrame odometry_;
   std::optional<DenseMapper> dense_;
+  std::optional<LoadShedding> load_;  // of a real-time run
 
   // What the next frame needs of the one before.
   FrameRate rate_;

@@ -11,6 +11,8 @@
 namespace dkb {
 namespace {
 
+constexpr int kFeatureShare = 2;  // by which the features are cut in a real-time run that is late
+
 std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
   if (context.policy) return std::make_unique<UserKeyframeDecider>(context.policy);
   if (context.options.keyframe_policy == KeyframePolicyKind::adaptive)
@@ -61,6 +63,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
     if (!options_.pipeline.threaded) dense.threads = 1;
     dense_.emplace(context.camera, options_.noise, dense);
   }
+  if (options_.pipeline.realtime) load_.emplace();
   record_.set_map(tracker_.map());
   collect_times();
 }
@@ -80,13 +83,23 @@ void Pipeline::check(const Frame& frame) const {
                      stamp_text(last_stamp_ns_) + "); call reset() or load_map() when the clock was set back");
 }
 
+void Pipeline::shed_load() {
+  load_->begin(last_stamp_ns_, steady_ns());
+  const LoadShedding::Level level = load_->level();
+  scenes_.rest_detector(level >= LoadShedding::kDetection);
+  const int count = options_.features.count;
+  extractor_.set_count(level >= LoadShedding::kFeatures ? (count + kFeatureShare - 1) / kFeatureShare : count);
+  if (std::string warning = load_->take_warning(); !warning.empty()) note(Event::Kind::warning, std::move(warning));
+}
+
 void Pipeline::take_due_map() {
   const Stopwatch watch;
   const bool wait = !options_.pipeline.realtime;
   const auto view = mapping_.take_due(next_frame_, wait);
   if (view) take_view(*view);
   if (!localize_only_) {
-    if (view && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, rate_, !wait);
+    const bool has_time = !load_ || load_->level() < LoadShedding::kLoops;
+    if (view && has_time && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, rate_, !wait);
     correct(loop_.take_due(next_frame_, wait), mapping_due());
   }
   record_.add_time("wait_mapper", watch.ms());
@@ -224,11 +237,13 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     c.last_relocalisation_frame = last_relocalisation_;
     c.last_keyframe = last_keyframe_.id;
     c.mapper_idle = mapping_.outstanding() == 0;
-    c.tracked_points = tracked.inliers;
+    // The rules' numbers are those of a frame with all its features.
+    const int share = load_ && load_->level() >= LoadShedding::kFeatures ? kFeatureShare : 1;
+    c.tracked_points = share * tracked.inliers;
     for (size_t f = 0; f < tracked.points.size(); ++f) {
       const float z = tracked.features->keypoints[f].depth;
       if (!(z > 0) || z > options_.tracking.close_depth) continue;
-      ++(tracked.points[f] != kNoPoint ? c.tracked_close_points : c.creatable_close_points);
+      (tracked.points[f] != kNoPoint ? c.tracked_close_points : c.creatable_close_points) += share;
     }
     c.reference_points = tracker_.reference_point_count(tracked.reference, next_keyframe_ > 2 ? 2 : 1);
     c.cam_from_world = tracked.cam_from_world;
@@ -357,6 +372,7 @@ void Pipeline::collect_times() {
     s.detector_rate_hz = scenes_.detector_rate_hz();
     s.detector_latency_frames = scenes_.detector_latency();
     s.detector_inference = scenes_.detector_inference();
+    if (load_) s.degraded_s = load_->seconds_by_name();
   };
   record_.add_stages(fill, times);
 }

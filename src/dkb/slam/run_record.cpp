@@ -107,14 +107,20 @@ std::vector<TrajectoryFrame> RunRecord::keyframes() const {
 }
 
 Statistics RunRecord::statistics() const {
-  const std::lock_guard lock(mutex_);
-  Statistics s = counts_;
-  s.keyframe_tests = tests_.by_name();
-  s.keyframes = map_.view().live_keyframe_count();
-  s.maps = static_cast<int>(map_.view().roots().size());
-  s.map_points = map_.view().point_count();
-  s.stages = times_.summaries();
-  s.stage_histograms = times_.histograms();
+  Statistics s;
+  StageTimes times;
+  {
+    const std::lock_guard lock(mutex_);
+    s = counts_;
+    s.keyframe_tests = tests_.by_name();
+    s.keyframes = map_.view().live_keyframe_count();
+    s.maps = static_cast<int>(map_.view().roots().size());
+    s.map_points = map_.view().point_count();
+    times = times_;
+  }
+  // Sorting the times of a long run takes long; tracking goes on meanwhile.
+  s.stages = times.summaries();
+  s.stage_histograms = times.histograms();
   return s;
 }
 

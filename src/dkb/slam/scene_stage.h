@@ -62,6 +62,10 @@ class SceneStage {
 
   // What the slow detector has due at this frame. It may wait.
   std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  // While on, the slow detector of a real-time run rests half of the time.
+  void rest_detector(bool on) {
+    if (slow_stage_) slow_stage_->rest(on);
+  }
   // Motion segmentation needs no corners: it starts, on a thread of its own, while they are extracted.
   void begin(FrameIndex index, const Frame& frame, const Expectation& expected,
              const std::optional<FrameOutcome>& before);
