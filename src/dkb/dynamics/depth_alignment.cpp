@@ -16,7 +16,6 @@ constexpr double kTukey = 4.685;  // [standard deviations]: 95 % efficiency with
 // no more than one.
 constexpr double kTogether = 25;
 constexpr size_t kEnoughCells = 100;
-constexpr float kMoves = 0.3f;                            // score from which a cell is left out
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
@@ -34,7 +33,7 @@ Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const M
   const Image<float>& depth = grid.depth;
   if (x < k || y < k || x + k >= rays.width() || y + k >= rays.height()) return Eigen::Vector3f::Zero();
   const float z = depth(x, y);
-  if (!(z > 0) || grid.score(x, y) >= kMoves) return Eigen::Vector3f::Zero();
+  if (!(z > 0) || grid.score(x, y) >= kMayMove) return Eigen::Vector3f::Zero();
   const auto& [least, most] = std::minmax({depth(x - k, y), depth(x + k, y), depth(x, y - k), depth(x, y + k)});
   const auto jump = static_cast<float>(noise_.max_depth_jump(z, k * rays.cell(), focal_));
   if (!(least > 0) || z - least > jump || most - z > jump) return Eigen::Vector3f::Zero();

@@ -79,13 +79,21 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
   r2_max_ *= 1.02f;  // far outside the image the distortion polynomial folds back
 }
 
+// By Brown's model, at depth 1; r2 = a^2 + b^2.
+DKB_KERNEL_BODY static inline void distort(float a, float b, float r2, float k1, float k2, float k3, float p1, float p2,
+                                           float* u, float* v) {
+  const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
+  *u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
+  *v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
+}
+
 bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
   if (!(point.z() > kMinDepth)) return false;
   const float a = point.x() / point.z(), b = point.y() / point.z(), r2 = a * a + b * b;
   if (!(r2 <= r2_max_)) return false;
-  const float radial = 1.0f + r2 * (k1_ + r2 * (k2_ + r2 * k3_));
-  const float u = fx_ * (a * radial + 2.0f * p1_ * a * b + p2_ * (r2 + 2.0f * a * a)) + cx_;
-  const float v = fy_ * (b * radial + p1_ * (r2 + 2.0f * b * b) + 2.0f * p2_ * a * b) + cy_;
+  float u = 0, v = 0;
+  distort(a, b, r2, k1_, k2_, k3_, p1_, p2_, &u, &v);
+  u = fx_ * u + cx_, v = fy_ * v + cy_;
   if (!(u >= 0 && v >= 0 && u < static_cast<float>(width_) && v < static_cast<float>(height_))) return false;
   *x = static_cast<int>(u), *y = static_cast<int>(v);
   return true;
@@ -116,9 +124,8 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
       const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
       const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
       const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
-      const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
-      const float u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
-      const float v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
+      float u, v;
+      distort(a, b, r2, k1, k2, k3, p1, p2, &u, &v);
       const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
       const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
       const bool seen = (pz > kMinDepth) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);

@@ -51,6 +51,9 @@ class MotionRays {
   std::vector<float> x_, y_;  // rays through the cells' middles, at depth 1
 };
 
+// Score from which a surface is no witness of what stands still: less than a frame says of a mover (1).
+inline constexpr float kMayMove = 0.3f;
+
 // A depth image on that grid, and where its camera stood.
 struct MotionDepthGrid {
   double time = 0;                 // [s] of the depth image

@@ -35,13 +35,12 @@ constexpr double kLoneHole =
 
 constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
-constexpr float kUnmarked = 0.3f;  // score in a view above which it does not testify that something stands still
-constexpr int kCarryRadius = 2;    // [cells] a mover is sought around where it would be, were it still
-constexpr int kAcross = 2;         // [cells] `farthest` is that of the cells beside
-constexpr int kSupport = 5;        // cells of 3 x 3 that must agree
-constexpr int kHoleRadius = 2;     // [cells] half the width up to which missing depth is a strip
-constexpr size_t kBlock = 640;     // [cells] worked at together
-constexpr int kLongRun = 300;      // [frames] over which missing depth is averaged
+constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
+constexpr int kAcross = 2;       // [cells] `farthest` is that of the cells beside
+constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
+constexpr int kHoleRadius = 2;   // [cells] half the width up to which missing depth is a strip
+constexpr size_t kBlock = 640;   // [cells] worked at together
+constexpr int kLongRun = 300;    // [frames] over which missing depth is averaged
 
 template <class T>
 std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
@@ -272,7 +271,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
     const float depth_there = projection_.depth[i];
     if (verdict == same) {
       seen.score += kRevision * (scores[i] - seen.score);
-      if (seen.score >= kUnmarked) continue;
+      if (seen.score >= kMayMove) continue;
       agreements[i] += trust;
       if (outlines[i] == 0)
         still[i] += interior_weight;

@@ -55,20 +55,20 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   const auto relative = [&](KeyframeId a, KeyframeId b) {
     return map.keyframe(b)->cam_from_world * map.keyframe(a)->cam_from_world.inverse();
   };
-  const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared) {
+  // `covariance` in the axes of b, where something else than shared points tells of the motion.
+  const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared,
+                       const Matrix6d* covariance = nullptr) {
     const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
-    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
+    if (from < 0 || to < 0) return;
+    graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
+    if (covariance == nullptr || shared > 0) return;
+    const Matrix6d a_from_b = adjoint(b_from_a.inverse());
+    graph.edges.back().information = (a_from_b * *covariance * a_from_b.transpose()).inverse();
   };
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
-    if (k.parent != kNoKeyframe) {
-      add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent));
-      if (k.motion_covariance && shared_points(k, k.parent) == 0) {
-        PoseGraphEdge& edge = graph.edges.back();
-        const Matrix6d in_parent = adjoint(edge.b_from_a.inverse());
-        edge.information = (in_parent * *k.motion_covariance * in_parent.transpose()).inverse();
-      }
-    }
+    if (k.parent != kNoKeyframe)
+      add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent), k.motion_covariance.get());
     for (const Covisible& c : k.covisible)
       if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
           map.keyframe(c.keyframe)->parent != id)

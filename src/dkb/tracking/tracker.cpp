@@ -418,7 +418,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
       frame.outlier.assign(frame.outlier.size(), 0);
       frame.odometry.assign(frame.odometry.size(), std::nullopt);
       odometry_.clear();  // they belong to the last frame, which the sighting will replace
-      go_on_unseen(predicted, input, frame);
+      go_on_unseen(predicted, input.step, frame);
       return frame;
     }
   }
@@ -426,7 +426,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     odometry_.clear();
     frame.starts_map = input.may_start_map && start_map(frame, predicted ? &*predicted : nullptr);
     if (!frame.starts_map) {
-      go_on_unseen(predicted, input, frame);
+      go_on_unseen(predicted, input.step, frame);
       return frame;
     }
     frame.state = state_ = TrackingState::tracking;

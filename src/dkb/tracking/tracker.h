@@ -103,8 +103,7 @@ class Tracker {
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
-  void go_on_unseen(const std::optional<PosePrediction>& prediction, const TrackingInput& input, TrackedFrame& frame);
-  void go_on_by(const PosePrediction& prediction, const Matrix6d& step_covariance, TrackedFrame& frame);
+  void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
   void forget_velocity();
   double search_radius(double radius) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features,

@@ -64,17 +64,25 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
   return delta.dot(sum.ldlt().solve(delta)) <= kChi2Pose;
 }
 
-// The frame has no pose by its images: the prior's stands in, and the next frame goes on from it.
-void Tracker::go_on_by(const PosePrediction& prediction, const Matrix6d& step_covariance, TrackedFrame& frame) {
+// The frame has no pose by its images: the predicted one stands in where there is one, and the next frame goes on from
+// it.
+void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told,
+                           TrackedFrame& frame) {
+  if (!prediction) {
+    forget_velocity();
+    if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
+    frame.state = state_;
+    return;
+  }
   frame.state = state_ = TrackingState::predicted;
-  frame.cam_from_world = prediction.cam_from_world;
-  frame.covariance = prediction.covariance;
+  frame.cam_from_world = prediction->cam_from_world;
+  frame.covariance = prediction->covariance;
   frame.reference = last_->reference;
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
   velocity_ = velocity_to(frame);
   const double seconds = frame.timestamp - last_->timestamp;
-  filter_.set(*velocity_, step_covariance / (seconds * seconds));
+  filter_.set(*velocity_, told->covariance / (seconds * seconds));
   // What was seen last is still what the camera may see next.
   last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;
@@ -83,14 +91,6 @@ void Tracker::go_on_by(const PosePrediction& prediction, const Matrix6d& step_co
   last_->cam_from_reference = frame.cam_from_reference;
   last_->covariance = frame.covariance;
   last_->state = frame.state;
-}
-
-void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, const TrackingInput& input,
-                           TrackedFrame& frame) {
-  if (prediction) return go_on_by(*prediction, input.step->covariance, frame);
-  forget_velocity();
-  if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
-  frame.state = state_;
 }
 
 // [px] around where a point is expected, three standard deviations beyond what tracking takes: of a point 1 m away,
