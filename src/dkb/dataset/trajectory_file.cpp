@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -36,7 +37,8 @@ Trajectory parse_trajectory(const std::string& text, const std::string& name) {
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
     const double norm = q.norm();
     if (!(norm > 1e-9) || norm > 1e9) throw InputError(place + ": the quaternion is not of length 1");
-    const Eigen::Quaterniond unit(q.w() / norm, q.x() / norm, q.y() / norm, q.z() / norm);
+    // Nine decimals leave a norm of 1 +- 1e-9: such a quaternion stays as it is written, to be written the same again.
+    const Eigen::Quaterniond unit = std::abs(norm - 1) <= 1e-9 ? q : Eigen::Quaterniond(q.coeffs() / norm);
     trajectory.push_back({v[0], std::string(columns[0]), Rigid3(unit, {v[1], v[2], v[3]})});
   });
   std::stable_sort(trajectory.begin(), trajectory.end(),

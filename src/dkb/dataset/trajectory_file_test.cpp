@@ -62,6 +62,13 @@ TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
   EXPECT_THROW(write_trajectory("/proc/none/t.txt", t), OutputError);
 }
 
+TEST(TrajectoryFile, NineDecimalsAreWrittenAsTheyWereRead) {
+  const std::string text =
+      "# timestamp tx ty tz qx qy qz qw\n"
+      "1700000001.033333 0.334790170 -0.150210960 -0.003578506 -0.036434337 -0.117017850 -0.076910178 0.989476723\n";
+  EXPECT_EQ(trajectory_to_text(parse_trajectory(text, "t.txt")), text);
+}
+
 TEST(TrajectoryFile, OfTheTruthLiesInTheRecordingsFolder) {
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_truth");
