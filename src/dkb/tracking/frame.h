@@ -16,7 +16,7 @@ namespace dkb {
 // Along it a feature was seen. The direction is in front of the camera at a depth of 1.
 struct SightRay {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(), direction = Eigen::Vector3d::UnitZ();  // [m]
-  double pixel_sigma = 0;
+  double variance = 0;  // [px^2] of the corner, and of the pose that it was seen from
 };
 
 // A visual-odometry point that a feature shows (see OdometryPoints).

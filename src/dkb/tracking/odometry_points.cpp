@@ -12,7 +12,7 @@ constexpr float kSurroundings = 40;  // [px] within which features lend their de
 constexpr double kNearest = 0.3;     // [m] that anything is taken to be from the camera
 
 SightRay transformed(const Rigid3& pose, const SightRay& ray) {
-  return {pose * ray.origin, pose.rotation * ray.direction, ray.pixel_sigma};
+  return {pose * ray.origin, pose.rotation * ray.direction, ray.variance};
 }
 
 }  // namespace
@@ -35,8 +35,22 @@ OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
   return {world_from_cam * p.point_in_cam, p.guessed, transformed(world_from_cam, p.first_in_cam), p.moves};
 }
 
-bool OdometryPoints::has_moved(const SightRay& first, const Keypoint& keypoint, const Rigid3& cam_from_world) const {
-  const SightRay ray = transformed(cam_from_world, first);
+// [px^2] mean over both directions in the image, of a corner and of where a pose puts its point.
+double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
+                                      const Matrix6d& covariance) const {
+  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_), z = point_in_cam.z();
+  Eigen::Matrix<double, 2, 3> pixel_by_point;
+  pixel_by_point << camera_.fx / z, 0, -camera_.fx * point_in_cam.x() / (z * z), 0, camera_.fy / z,
+      -camera_.fy * point_in_cam.y() / (z * z);
+  Eigen::Matrix<double, 3, 6> point_by_pose;
+  point_by_pose << -Eigen::Matrix3d::Identity(), skew(point_in_cam);
+  const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_point * point_by_pose;
+  return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
+}
+
+bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
+                               const Matrix6d& covariance) const {
+  const SightRay ray = transformed(cam_from_world, match.first);
   if (!(ray.direction.z() > 0)) return false;
   // It is seen from where it is near to either camera up to infinity.
   const double nearest = std::max(kNearest, (kNearest - ray.origin.z()) / ray.direction.z());
@@ -45,8 +59,7 @@ bool OdometryPoints::has_moved(const SightRay& first, const Keypoint& keypoint, 
   const Eigen::Vector2d seen = keypoint.pixel.cast<double>();
   const double length = along.squaredNorm();
   const double t = length > 0 ? std::clamp((seen - from).dot(along) / length, 0.0, 1.0) : 0.0;
-  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_);
-  const double variance = sigma * sigma + ray.pixel_sigma * ray.pixel_sigma;
+  const double variance = ray.variance + sight_variance(keypoint, cam_from_world * match.point_in_world, covariance);
   return (seen - from - t * along).squaredNorm() > PoseOptions().chi2_pixel * variance;
 }
 
@@ -81,7 +94,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
       p.moves = before && before->moves;
       p.first_in_cam = before ? transformed(frame.cam_from_world, before->first)
                               : SightRay{Eigen::Vector3d::Zero(), p.point_in_cam / p.point_in_cam.z(),
-                                         noise_.corner_sigma(k.octave, scale_factor_)};
+                                         sight_variance(k, p.point_in_cam, frame.covariance)};
     }
     points_.push_back(p);
   }

@@ -27,9 +27,10 @@ class OdometryPoints {
   std::vector<Candidate> candidates(const TrackedFrame& frame) const;
   // Candidate `i`, shown by a feature of the frame after.
   OdometryMatch match(size_t i, const TrackedFrame& frame) const;
-  // Whether a point without depth that was seen along `first` has moved when `keypoint` shows it: no place on that ray
-  // is seen there.
-  bool has_moved(const SightRay& first, const Keypoint& keypoint, const Rigid3& cam_from_world) const;
+  // Whether a guessed point has moved when `keypoint` shows it from a pose of that covariance (as TrackedFrame has it):
+  // no place on the ray of its first sighting is seen there.
+  bool has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
+                 const Matrix6d& covariance) const;
   // Takes the features of `frame`, which has a pose: inliers of points known before keep their place in the world, but
   // for guessed ones; the others start at their depth.
   void remember(const TrackedFrame& frame);
@@ -45,6 +46,8 @@ class OdometryPoints {
     SightRay first_in_cam;         // of guessed ones, in that frame's camera
     bool moves = false;            // it has left that ray
   };
+  double sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
+                        const Matrix6d& covariance) const;
   static float depth_around(const TrackedFrame& frame, const Keypoint& keypoint);
 
   CameraModel camera_;

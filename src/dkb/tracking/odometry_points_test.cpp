@@ -85,9 +85,14 @@ struct SeenWithoutDepth : testing::Test {
   OdometryPoints points{camera, SensorNoise(), 1.2, 4.0};
   TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 2}});
 
-  SightRay first() {
+  SeenWithoutDepth() { frame.covariance.setZero(); }
+  OdometryMatch first() {
     points.remember(frame);
-    return points.match(0, frame).first;
+    return points.match(0, frame);
+  }
+  bool moved(const OdometryMatch& match, const Eigen::Vector2d& pixel, const Rigid3& cam_from_world,
+             const Matrix6d& covariance = Matrix6d::Zero()) const {
+    return points.has_moved(match, keypoint_at(pixel), cam_from_world, covariance);
   }
   static Keypoint keypoint_at(const Eigen::Vector2d& pixel) {
     Keypoint k;
@@ -97,39 +102,52 @@ struct SeenWithoutDepth : testing::Test {
 };
 
 TEST_F(SeenWithoutDepth, HasNotMovedWhereAnyDepthOnItsRayIsSeen) {
-  const SightRay ray = first();
+  const OdometryMatch match = first();
   const Rigid3 cam_from_world(Eigen::Quaterniond(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY())), {0.2, -0.1, 0.3});
   for (const double depth : {0.31, 0.7, 2.0, 9.0, 1e4}) {
     const Eigen::Vector3d point = camera.unproject({100, 80}, depth);
-    EXPECT_FALSE(points.has_moved(ray, keypoint_at(camera.project(cam_from_world * point)), cam_from_world)) << depth;
+    EXPECT_FALSE(moved(match, camera.project(cam_from_world * point), cam_from_world)) << depth;
   }
 }
 
 TEST_F(SeenWithoutDepth, HasMovedBesideItsRayAndBeyondItsEnds) {
-  const SightRay ray = first();
+  const OdometryMatch match = first();
   // Both sightings are off by 1 px: 95 % lie within sqrt(2 * 5.991) = 3.46 px.
-  EXPECT_FALSE(points.has_moved(ray, keypoint_at({103.4, 80}), {}));
-  EXPECT_TRUE(points.has_moved(ray, keypoint_at({103.5, 80}), {}));
+  EXPECT_FALSE(moved(match, {103.4, 80}, {}));
+  EXPECT_TRUE(moved(match, {103.5, 80}, {}));
   const Rigid3 beside(Eigen::Quaterniond::Identity(), {-0.1, 0, 0});  // the camera went to the right: points go left
   const double nearest = camera.fx * 0.1 / 0.3;                       // [px] that a point 0.3 m away goes
-  EXPECT_FALSE(points.has_moved(ray, keypoint_at({100 - nearest - 3.4, 80}), beside));
-  EXPECT_TRUE(points.has_moved(ray, keypoint_at({100 - nearest - 3.5, 80}), beside));
-  EXPECT_FALSE(points.has_moved(ray, keypoint_at({103.4, 80}), beside));  // infinitely far
-  EXPECT_TRUE(points.has_moved(ray, keypoint_at({103.5, 80}), beside));
-  EXPECT_TRUE(points.has_moved(ray, keypoint_at({90, 83.5}), beside));
+  EXPECT_FALSE(moved(match, {100 - nearest - 3.4, 80}, beside));
+  EXPECT_TRUE(moved(match, {100 - nearest - 3.5, 80}, beside));
+  EXPECT_FALSE(moved(match, {103.4, 80}, beside));  // infinitely far
+  EXPECT_TRUE(moved(match, {103.5, 80}, beside));
+  EXPECT_TRUE(moved(match, {90, 83.5}, beside));
+}
+
+TEST_F(SeenWithoutDepth, HasNotMovedWhereThePoseMayBeOffByAsMuch) {
+  const OdometryMatch match = first();
+  Matrix6d covariance = Matrix6d::Zero();
+  // 2 px along x, by a turn about y. At x, a turn moves the image by fx (1 + x^2).
+  const double x = match.first.direction.x(), sd = 2 / (camera.fx * (1 + x * x));
+  covariance(4, 4) = sd * sd;
+  const double y = match.first.direction.y(), across = sd * camera.fy * x * y;
+  const double limit = std::sqrt(5.991 * (1 + 1 + (4 + across * across) / 2));
+  EXPECT_FALSE(moved(match, {100 + limit - 0.01, 80}, {}, covariance));
+  EXPECT_TRUE(moved(match, {100 + limit + 0.01, 80}, {}, covariance));
 }
 
 TEST_F(SeenWithoutDepth, IsFollowedOnWhenItMovesAndKeepsItsFirstRay) {
-  const SightRay ray = first();
+  const OdometryMatch match = first();
   TrackedFrame next = frame_of({{104, 80, 0}, {110, 80, 2}});
   next.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {0, 0, 0.2});
   next.odometry[0] = points.match(0, frame);
   next.odometry[0]->moves = true;
   next.outlier[0] = 1;
   points.remember(next);
-  const OdometryMatch match = points.match(0, next);
-  EXPECT_TRUE(match.moves);
-  EXPECT_LT((match.first.origin - ray.origin).norm() + (match.first.direction - ray.direction).norm(), 1e-12);
+  const OdometryMatch then = points.match(0, next);
+  EXPECT_TRUE(then.moves);
+  EXPECT_LT((then.first.origin - match.first.origin).norm() + (then.first.direction - match.first.direction).norm(),
+            1e-12);
 }
 
 }  // namespace

@@ -258,7 +258,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     auto& shown = frame.odometry[f];
     if (followed[f] && followed[f]->moves) shown = followed[f];
     if (!shown || !shown->guessed) continue;
-    shown->moves = shown->moves || odometry_.has_moved(shown->first, features.keypoints[f], pose.cam_from_world);
+    shown->moves =
+        shown->moves || odometry_.has_moved(*shown, features.keypoints[f], pose.cam_from_world, pose.covariance);
     frame.outlier[f] = shown->moves;
   }
   visibility_.add_found(std::move(found));
