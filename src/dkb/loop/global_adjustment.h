@@ -9,9 +9,9 @@
 
 namespace dkb {
 
-// The time of an adjustment grows faster than the pairs of keyframes that share points, and is some seconds at this
-// number (docs/benchmarks.md); each pair counts twice. A path of 200 m that is walked once has fewer.
-inline constexpr size_t kMostNeighbours = 40000;
+// The time of an adjustment grows faster than the pairs of keyframes that share points; each pair counts twice. At a
+// quarter of this number it is some seconds, and a path of 200 m already misses keyframes (docs/benchmarks.md).
+inline constexpr size_t kMostNeighbours = 160000;
 
 // Adjusts all keyframes and points of a snapshot; the first keyframe of each map stays. Where these have more than
 // `most_neighbours` covisible neighbours together, it takes those around the newest one, and what borders on the rest
