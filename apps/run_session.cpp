@@ -234,7 +234,7 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   std::vector<Event> events = slam_->take_events();
   for (const Event& event : events) {
     log_->event(event);
-    if (event.kind == Event::Kind::warning)
+    if (event.kind == Event::Kind::warning)  // of one kind when they begin alike
       warnings_.warn(event.text.substr(0, event.text.find(':')),
                      "frame " + std::to_string(next.index) + ": " + event.text);
   }
@@ -299,12 +299,10 @@ int RunSession::tell_the_end() {
 
 // No frame is lost in silence.
 void RunSession::warn_of_dropped(size_t next_index) {
+  const std::string why = "the machine is too slow for this pace";
   const auto* paced = dynamic_cast<const PacedSource*>(source_);
   for (; paced != nullptr && dropped_ < paced->dropped(); ++dropped_)
-    warnings_.warn("frame dropped, the machine is too slow for this pace",
-                   "frame " + std::to_string(next_index) +
-                       ": one before it was dropped, the machine is too slow for "
-                       "this pace");
+    warnings_.warn("frame dropped, " + why, fmt::format("frame {}: one before it was dropped, {}", next_index, why));
 }
 
 void RunSession::warn_of_source() {

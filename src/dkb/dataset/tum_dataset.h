@@ -21,9 +21,6 @@ struct DatasetPair {
   std::filesystem::path depth_path;
 };
 
-// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
-inline constexpr double kStampRounding = 5e-7;
-
 struct AssociationOptions {
   double max_difference = 0.02;  // [s] between the stamps of a pair, > 0
   void check() const;            // throws InvalidOption

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {

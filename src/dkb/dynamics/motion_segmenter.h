@@ -11,7 +11,6 @@
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/geometry/camera.h"
-#include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/rgbd_image.h"
@@ -40,11 +39,9 @@ class MotionSegmenter {
   // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
   // Throws InputError when the depth image is not of the camera's size.
   // `step_covariance`: how far the motion since the frame before may be from what is expected (as MotionPrior's).
-  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected,
-                    const Matrix6d& step_covariance = kFrameStepCovariance);
+  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
   // The same for those who want score() alone.
-  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
-               const Matrix6d& step_covariance = kFrameStepCovariance);
+  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
   // The colour camera's motion since the frame committed last as depth shows it beside what was expected, of the image
   // last given; nothing when there was no view to hold it against.
   const std::optional<MotionPrior>& aligned_step() const { return aligned_step_; }
@@ -58,10 +55,6 @@ class MotionSegmenter {
   const Image<float>& score() const { return current_ ? current_->score : previous_ ? previous_->score : nothing_; }
 
  private:
-  // Of a camera whose velocity was known a thirtieth of a second ago.
-  inline static const Matrix6d kFrameStepCovariance =
-      axis_covariance(kAccelerationSd / (30 * 30), kAngularAccelerationSd / (30 * 30));
-
   struct Stamped {
     double time = 0;
     Rigid3 cam_from_world;

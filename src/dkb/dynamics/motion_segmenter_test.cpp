@@ -6,11 +6,15 @@
 #include <cmath>
 #include <functional>
 
+#include "dkb/geometry/motion_model.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
 namespace {
+
+// What is known of the motion since a frame a thirtieth of a second ago, by the velocity.
+const Matrix6d kStepCovariance = axis_covariance(kAccelerationSd / (30 * 30), kAngularAccelerationSd / (30 * 30));
 
 // An upright rectangle parallel to the wall [m, world: x right, y down, z away from the camera's start].
 struct Panel {
@@ -112,7 +116,7 @@ void run(const World& world, int frames, const std::function<std::vector<Panel>(
     const Picture p = world.render(f, movers(f));
     Vector6d error;
     for (int i = 0; i < 6; ++i) error[i] = (i < 3 ? 0.002 : 0.0017) * random.normal();
-    const MoverMask mask = segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f));
+    const MoverMask mask = segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f), kStepCovariance);
     look(f, mask, judge(mask, p.truth));
     segmenter.commit(world.cam_from_world(f));
   }
@@ -211,7 +215,7 @@ TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
       for (int y = 60; y < 180; ++y)
         for (int x = 100; x < 220; ++x)
           if (p.truth(x, y) != 0) p.image.depth(x, y) = 0;
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
     if (f > 36) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
       EXPECT_LT(judge(mask, p.truth).wrong, 0.02) << f;
@@ -235,7 +239,7 @@ TEST(MotionSegmenter, MissingDepthAloneIsNoMover) {
       for (int x = 20; x < 44; ++x)
         for (int y = 20; y < 44; ++y) p.image.depth(x, y) = 0;
     }
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
     if (f > 28) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
       EXPECT_LT(judge(mask, p.truth).wrong, 0.002) << f;
@@ -257,7 +261,7 @@ TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
   MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 25; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.05 * f)});
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f));
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
     if (f == 24) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9);
     }
@@ -265,7 +269,7 @@ TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
   }
   EXPECT_TRUE(segmenter.score().empty());
   const Picture p = world.render(25, {box_at(-0.2)});
-  EXPECT_EQ(judge(segmenter.segment(p.image, Rigid3()), p.truth).covered, 0);
+  EXPECT_EQ(judge(segmenter.segment(p.image, Rigid3(), kStepCovariance), p.truth).covered, 0);
 }
 
 TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
@@ -275,7 +279,7 @@ TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
   for (int f = 0; f < 40; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.04 * f)});
     const Rigid3 cam_from_world = f < 30 ? world.cam_from_world(f) : world.cam_from_world(f) * new_from_old.inverse();
-    const Figures figures = judge(segmenter.segment(p.image, cam_from_world), p.truth);
+    const Figures figures = judge(segmenter.segment(p.image, cam_from_world, kStepCovariance), p.truth);
     if (f >= 30) {
       EXPECT_GT(figures.covered, 0.9) << f;
       EXPECT_LT(figures.wrong, 0.01) << f;
@@ -298,7 +302,7 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   MotionSegmenter segmenter(World().camera, {});
   RgbdImage image;
   image.depth = DepthImage(64, 48);
-  EXPECT_THROW(segmenter.segment(image, Rigid3()), InputError);
+  EXPECT_THROW(segmenter.segment(image, Rigid3(), kStepCovariance), InputError);
 }
 
 TEST(MotionSegmenter, FindsTheSameScoresWithEveryInstructionSet) {
@@ -313,7 +317,7 @@ TEST(MotionSegmenter, FindsTheSameScoresWithEveryInstructionSet) {
     const Picture p = world.render(f, {box_at(-0.5 + 0.03 * f), box_at(0.4, 0.5)});
     std::vector<MoverMask> masks;
     for (MotionSegmenter& s : segmenters) {
-      masks.push_back(s.segment(p.image, world.cam_from_world(f)));
+      masks.push_back(s.segment(p.image, world.cam_from_world(f), kStepCovariance));
       ASSERT_EQ(masks.back().cells, masks.front().cells) << f;
       ASSERT_EQ(s.score(), segmenters.front().score()) << f;
       s.commit(world.cam_from_world(f));

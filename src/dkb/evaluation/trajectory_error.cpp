@@ -9,6 +9,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -46,7 +47,6 @@ std::vector<std::pair<size_t, size_t>> relative_pairs(const Evaluation& e) {
       path = 0;
     }
   } else {
-    constexpr double kStampRounding = 5e-7;  // [s] stamps of today carry that much, and 1 s must be reached after 1 s
     for (size_t i = 0; i < n; ++i)
       if (cuts.empty() || e.timestamps[i] - e.timestamps[cuts.back()] >= delta.value - kStampRounding)
         cuts.push_back(i);

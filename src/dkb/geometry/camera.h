@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "dkb/geometry/rigid3.h"
 #include "dkb_slam/geometry.h"
 
 namespace dkb {
@@ -13,5 +14,16 @@ using CameraModel = Camera;
 // Cameras known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names. The readout of
 // TUM's Kinects is ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);
+
+// [px per m, px per rad] How the image of `point` [m, in the camera] moves with a small motion [v, w] of the point
+// under the camera: by v + w x point.
+inline Eigen::Matrix<double, 2, 6> pixel_by_motion(const CameraModel& camera, const Eigen::Vector3d& point) {
+  const double x = point.x(), y = point.y(), z = point.z();
+  Eigen::Matrix<double, 2, 3> pixel_by_point;
+  pixel_by_point << camera.fx / z, 0, -camera.fx * x / (z * z), 0, camera.fy / z, -camera.fy * y / (z * z);
+  Eigen::Matrix<double, 2, 6> jacobian;
+  jacobian << pixel_by_point, -pixel_by_point * skew(point);
+  return jacobian;
+}
 
 }  // namespace dkb

@@ -24,6 +24,20 @@ TEST(Rigid3, InverseUndoesTheMotion) {
   }
 }
 
+TEST(Camera, TellsHowAnImagePointMovesAsTheNumericDerivativeDoes) {
+  const Camera camera = *builtin_camera("fr1");
+  const Eigen::Vector3d point(0.4, -0.3, 1.7);
+  const double h = 1e-6;
+  for (int i = 0; i < 6; ++i) {
+    const auto moved = [&](double by) {
+      const Vector6d d = by * Vector6d::Unit(i);
+      return camera.project(point + d.head<3>() + d.tail<3>().cross(point));
+    };
+    const Eigen::Vector2d numeric = (moved(h) - moved(-h)) / (2 * h);
+    EXPECT_LT((pixel_by_motion(camera, point).col(i) - numeric).norm(), 1e-6 * camera.fx) << i;
+  }
+}
+
 TEST(VelocityFilter, WeighsWhatIsMeasuredByItsNoise) {
   VelocityFilter filter;
   const Matrix6d exact = axis_covariance(1e-6, 1e-6), noisy = axis_covariance(0.5, 0.5);

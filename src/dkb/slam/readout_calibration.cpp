@@ -33,12 +33,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     const Eigen::Vector3d p = frame.cam_from_world * *position;
     if (p.z() < 0.1) continue;
     const Keypoint& k = frame.features->keypoints[f];
-    Eigen::Matrix<double, 2, 3> projection;
-    projection << camera_.fx / p.z(), 0, -camera_.fx * p.x() / (p.z() * p.z()), 0, camera_.fy / p.z(),
-        -camera_.fy * p.y() / (p.z() * p.z());
-    Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian.leftCols<3>() = projection;
-    jacobian.rightCols<3>() = -projection * skew(p);
+    const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(camera_, p);
     const Eigen::Vector2d flow = jacobian * velocity;
     const Eigen::Vector2d late = flow * (k.image_pixel.y() / camera_.height - 0.5);
     const Eigen::Vector2d error = k.pixel.cast<double>() - camera_.project(p);

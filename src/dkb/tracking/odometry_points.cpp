@@ -38,13 +38,8 @@ OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
 // [px^2] mean over both directions in the image, of a corner and of where a pose puts its point.
 double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
                                       const Matrix6d& covariance) const {
-  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_), z = point_in_cam.z();
-  Eigen::Matrix<double, 2, 3> pixel_by_point;
-  pixel_by_point << camera_.fx / z, 0, -camera_.fx * point_in_cam.x() / (z * z), 0, camera_.fy / z,
-      -camera_.fy * point_in_cam.y() / (z * z);
-  Eigen::Matrix<double, 3, 6> point_by_pose;
-  point_by_pose << -Eigen::Matrix3d::Identity(), skew(point_in_cam);
-  const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_point * point_by_pose;
+  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_);
+  const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(camera_, point_in_cam);
   return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
 }
 

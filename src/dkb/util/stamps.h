@@ -36,6 +36,9 @@ std::optional<int64_t> parse_stamp_ns(std::string_view text);
 // The stamp as decimal seconds, with six digits or, where these do not suffice, nine.
 std::string stamp_text(int64_t ns);
 
+// Stamps of today in seconds carry a rounding error of 1e-7 s; limits that are met exactly must count as met.
+inline constexpr double kStampRounding = 5e-7;  // [s]
+
 // Timed observations about one image may differ from its stamp by the digits that were kept of it.
 inline constexpr double kSameStamp = 0.002;  // [s]
 
