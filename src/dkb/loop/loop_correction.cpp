@@ -17,8 +17,8 @@ constexpr double kEdgeRotationSd = 0.002;      // [rad]
 constexpr double kEdgeRotationGrowth = 0.004;  // [rad/m]
 constexpr double kEdgeRotationShare = 0.02;    // of the edge's rotation
 
-PoseGraphEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
-  PoseGraphEdge e;
+PoseEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
+  PoseEdge e;
   e.a = a;
   e.b = b;
   e.b_from_a = b_from_a;
@@ -55,20 +55,20 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   const auto relative = [&](KeyframeId a, KeyframeId b) {
     return map.keyframe(b)->cam_from_world * map.keyframe(a)->cam_from_world.inverse();
   };
-  // `covariance` in the axes of b, where something else than shared points tells of the motion.
-  const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared,
-                       const Matrix6d* covariance = nullptr) {
+  const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared) {
     const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
-    if (from < 0 || to < 0) return;
-    graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
-    if (covariance == nullptr || shared > 0) return;
-    const Matrix6d a_from_b = adjoint(b_from_a.inverse());
-    graph.edges.back().information = (a_from_b * *covariance * a_from_b.transpose()).inverse();
+    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
   };
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
-    if (k.parent != kNoKeyframe)
-      add(k.parent, id, relative(k.parent, id), shared_points(k, k.parent), k.motion_covariance.get());
+    const int previous = k.motion ? node[static_cast<size_t>(k.motion->previous)] : -1;
+    // Where no point ties two keyframes, what the camera did between them is all that does: their pose in the map holds
+    // as firmly as that motion was known.
+    if (previous >= 0)
+      graph.edges.push_back({node[static_cast<size_t>(id)], previous, relative(id, k.motion->previous),
+                             k.motion->since.covariance.inverse()});
+    const int shared = k.parent != kNoKeyframe ? shared_points(k, k.parent) : 0;
+    if (k.parent != kNoKeyframe && (shared > 0 || previous < 0)) add(k.parent, id, relative(k.parent, id), shared);
     for (const Covisible& c : k.covisible)
       if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
           map.keyframe(c.keyframe)->parent != id)

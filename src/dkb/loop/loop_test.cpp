@@ -123,6 +123,41 @@ TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
   EXPECT_EQ(moved.cam_from_world(0).translation, world.map.cam_from_world(0).translation) << "the first one stays";
 }
 
+TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst) {
+  // Ten keyframes, half a metre apart, that share no point. The motion to the sixth is known to 10 cm, to others to 3
+  // mm.
+  Map map;
+  for (KeyframeId id = 0; id < 10; ++id) {
+    Keyframe k;
+    k.id = id;
+    k.parent = id - 1;
+    k.features = std::make_shared<const RgbdFeatures>();
+    k.cam_from_world.translation = {0.5 * id, 0, 0};
+    const double sd = id == 6 ? 0.1 : 0.003;
+    if (id > 0)
+      k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{
+          id - 1, {Rigid3(Eigen::Quaterniond::Identity(), {-0.5, 0, 0}), false, sd * sd * Matrix6d::Identity()}});
+    map.add_keyframe(std::move(k));
+  }
+  const Eigen::Vector3d drift(0.05, 0.2, 0);
+  LoopFinding finding;
+  finding.far_area = {0};
+  Rigid3 found = map.keyframe(9)->cam_from_world;
+  found.translation += drift;
+  finding.support.emplace_back().keyframe = 9;
+  finding.support.back().fit.cam_from_world = found;
+  // As firm as a place seen again by 400 points.
+  const LoopEdge firm{0, 9, found * map.keyframe(0)->cam_from_world.inverse(), 400};
+  const MapCorrection correction = correct_loop(map, finding, {firm});
+  ASSERT_EQ(correction.poses.size(), 10U);
+  const auto moved = [&](size_t k) -> Eigen::Vector3d {
+    return centre_in_world(correction.poses[k].after) - centre_in_world(correction.poses[k].before);
+  };
+  EXPECT_LT(moved(5).norm(), 0.01);
+  EXPECT_GT(moved(6).norm(), 0.8 * moved(9).norm());
+  EXPECT_GT(moved(9).norm(), 0.5 * drift.norm());
+}
+
 // Two rooms with the same pictures, and a corridor with others between them.
 struct Twins : OdometryWorld {
   static constexpr double kPitch = 7;

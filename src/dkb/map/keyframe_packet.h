@@ -8,6 +8,7 @@
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
+#include "dkb/map/keyframe_motion.h"
 
 namespace dkb {
 
@@ -36,9 +37,7 @@ struct KeyframePacket {
   std::shared_ptr<const RgbdFeatures> features;
   KeyframeId reference = kNoKeyframe;  // none for the first keyframe of a map
   Rigid3 cam_from_reference;           // cam_from_world for the first keyframe of a map
-  // Of cam_from_reference where it rests on the motion alone and no point ties the two: right perturbation of
-  // reference_from_cam, [m, rad]; null otherwise.
-  std::shared_ptr<const Matrix6d> motion_covariance;
+  std::shared_ptr<const KeyframeMotion> motion;
   std::vector<PointId> points;  // per feature
   std::vector<ProvisionalPoint> new_points;
   std::vector<PointVisibility> visibility;  // by increasing point id

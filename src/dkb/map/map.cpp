@@ -301,6 +301,23 @@ void Map::set_parent(KeyframeId id, KeyframeId parent) {
   edit(id).parent = parent;
 }
 
+KeyframeId Map::moved_on_from(KeyframeId id) const {
+  KeyframeId next = id + 1;
+  while (next < keyframe_count() && keyframe(next)->culled) ++next;
+  if (next >= keyframe_count() || !keyframe(next)->motion) return kNoKeyframe;
+  return keyframe(next)->motion->previous == id ? next : kNoKeyframe;
+}
+
+// What told of the way to this keyframe and from it tells of the way past it.
+void Map::hand_on_motion(KeyframeId id) {
+  const KeyframeId next = moved_on_from(id);
+  if (next == kNoKeyframe) return;
+  const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion, after = keyframe(next)->motion;
+  edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
+                                   KeyframeMotion{before->previous, joined(before->since, after->since)})
+                             : nullptr;
+}
+
 void Map::cull_keyframe(KeyframeId id) {
   const Keyframe* k = live_keyframe(id);
   if (k == nullptr || k->parent == kNoKeyframe) return;  // the root stays
@@ -312,12 +329,14 @@ void Map::cull_keyframe(KeyframeId id) {
   for (const Covisible& c : keyframe(id)->covisible) drop_covisible(edit(c.keyframe).covisible, id);
   for (const auto& other : keyframes_)
     if (!other.value->culled && other.value->parent == id) edit(other.value->id).parent = parent;
+  hand_on_motion(id);
   Keyframe& me = edit(id);
   me.culled = true;
   me.cam_from_parent = cam_from_parent;
   me.features.reset();
   me.points = std::vector<PointId>();  // {} would keep the memory
   me.covisible = std::vector<Covisible>();
+  me.motion.reset();
   --live_keyframe_count_;
   places_.remove(id);
 }

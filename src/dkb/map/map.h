@@ -10,6 +10,7 @@
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
+#include "dkb/map/keyframe_motion.h"
 #include "dkb/place/copy_epoch.h"
 #include "dkb/place/place_index.h"
 
@@ -51,8 +52,8 @@ struct Keyframe {
   KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
   Rigid3 cam_from_parent;            // frozen when culled: the pose then follows the parent
   bool culled = false;
-  // Of cam_from_parent as it was when nothing but the motion told it; null otherwise. Map files leave it out.
-  std::shared_ptr<const Matrix6d> motion_covariance;
+  // Since the live keyframe made just before it; null where nothing tells of it. Map files leave it out.
+  std::shared_ptr<const KeyframeMotion> motion;
 };
 
 // A point that is no more.
@@ -88,6 +89,8 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
+  // The live keyframe whose motion is told since this one; kNoKeyframe if there is none.
+  KeyframeId moved_on_from(KeyframeId id) const;
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
@@ -150,6 +153,7 @@ class Map {
   void add_live(MapPoint point);
   void add_gone(RemovedPoint point);
   void remove_point(PointId point, PointId replaced_by);
+  void hand_on_motion(KeyframeId id);
   void check_keyframes() const;
   void check_forwarding() const;
 

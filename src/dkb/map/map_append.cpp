@@ -25,6 +25,8 @@ void Map::append(const Map& other) {
     k.id += shift;
     k.frame += newest + 1 - oldest;
     if (k.parent != kNoKeyframe) k.parent += shift;
+    if (k.motion)
+      k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{k.motion->previous + shift, k.motion->since});
     for (PointId& p : k.points) p = renamed(p);
     for (Covisible& c : k.covisible) c.keyframe += shift;
     keyframes.push_back(std::move(k));

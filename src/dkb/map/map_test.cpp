@@ -234,6 +234,46 @@ TEST(Map, ChainsOfCulledKeyframesKeepTheirRelativePoses) {
   EXPECT_EQ(broken_invariant(map), "");
 }
 
+// The motion of a keyframe 1 m to the side since the one before.
+Keyframe moved(KeyframeId id, KeyframeId previous) {
+  Keyframe k = keyframe_at(id, id);
+  const Rigid3 previous_from_current(Eigen::Quaterniond::Identity(), {-1, 0, 0});
+  k.motion = std::make_shared<const KeyframeMotion>(
+      KeyframeMotion{previous, {previous_from_current, false, 0.01 * Matrix6d::Identity()}});
+  return k;
+}
+
+TEST(Map, TheMotionOfACulledKeyframeJoinsThatOfTheNext) {
+  Map map;
+  map.add_keyframe(keyframe_at(0, 0));
+  for (KeyframeId id = 1; id < 5; ++id) map.add_keyframe(moved(id, id - 1));
+  EXPECT_EQ(map.moved_on_from(1), 2);
+  EXPECT_EQ(map.moved_on_from(4), kNoKeyframe);
+  map.cull_keyframe(2);
+  map.cull_keyframe(1);
+  ASSERT_TRUE(map.keyframe(3)->motion);
+  EXPECT_EQ(map.keyframe(3)->motion->previous, 0);
+  EXPECT_TRUE(map.keyframe(3)->motion->since.previous_from_current.translation.isApprox(Eigen::Vector3d(-3, 0, 0)));
+  // What turned in the first of three steps is 2 m to the side at the end, what turned in the second 1 m.
+  EXPECT_NEAR(map.keyframe(3)->motion->since.covariance(5, 5), 0.03, 1e-12);
+  EXPECT_NEAR(map.keyframe(3)->motion->since.covariance(1, 1), 0.03 + 0.01 * (4 + 1), 1e-12);
+  EXPECT_EQ(map.moved_on_from(0), 3);
+  EXPECT_EQ(map.keyframe(4)->motion->previous, 3);
+  EXPECT_FALSE(map.keyframe(1)->motion);
+}
+
+TEST(Map, AGapInTheMotionStaysAGapWhenAKeyframeBesideItIsCulled) {
+  Map map;
+  map.add_keyframe(keyframe_at(0, 0));
+  map.add_keyframe(moved(1, 0));
+  map.add_keyframe(keyframe_at(2, 2));  // nothing tells how the camera came here
+  map.add_keyframe(moved(3, 2));
+  map.cull_keyframe(1);
+  EXPECT_FALSE(map.keyframe(2)->motion);
+  map.cull_keyframe(2);
+  EXPECT_FALSE(map.keyframe(3)->motion);
+}
+
 TEST(Map, TheRootIsNotCulled) {
   ThreeKeyframes world;
   world.map.cull_keyframe(0);

@@ -17,6 +17,14 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
     problem.cam_from_world.push_back(map.keyframe(window.keyframes[c])->cam_from_world);
   }
 
+  for (size_t c = 0; c < window.keyframes.size(); ++c) {
+    const auto& motion = map.keyframe(window.keyframes[c])->motion;
+    const int previous = motion ? camera_of[static_cast<size_t>(motion->previous)] : -1;
+    if (previous >= 0 && !(problem.fixed[c] && problem.fixed[static_cast<size_t>(previous)]))
+      problem.motions.push_back({static_cast<int>(c), previous, motion->since.previous_from_current,
+                                 motion->since.covariance.inverse(), true});
+  }
+
   std::vector<double> inv_sigma = noise.corner_sigmas(scale_factor);
   for (double& s : inv_sigma) s = 1.0 / s;
   window.points = std::move(points);

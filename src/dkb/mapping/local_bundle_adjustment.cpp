@@ -31,6 +31,15 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
       around.resize(static_cast<size_t>(options.fixed_keyframes));
   }
 
+  // A keyframe that a motion joins to the window holds it too, though they may share no point.
+  for (KeyframeId k : keyframes) {
+    const auto& motion = map.keyframe(k)->motion;
+    for (const KeyframeId other : {motion ? motion->previous : kNoKeyframe, map.moved_on_from(k)})
+      if (other != kNoKeyframe && !std::binary_search(keyframes.begin(), keyframes.end(), other) &&
+          std::none_of(around.begin(), around.end(), [other](const Covisible& c) { return c.keyframe == other; }))
+        around.push_back({other, 0});
+  }
+
   std::vector<uint8_t> fixed;
   for (KeyframeId k : keyframes) fixed.push_back(map.keyframe(k)->parent == kNoKeyframe);
   for (const Covisible& c : around) {

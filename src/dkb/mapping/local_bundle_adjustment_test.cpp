@@ -107,6 +107,44 @@ TEST_F(LocalBa, KeyframesOutsideTheWindowHoldItInPlace) {
   EXPECT_NE(map.keyframe(7)->cam_from_world.translation, before[7].translation);
 }
 
+TEST_F(LocalBa, AMotionHoldsAKeyframeThatSharesNoPointWithTheRest) {
+  build(4, {}, 0.01, 0.01);
+  const Map rest = map;
+  const Rigid3 truth_of_last = TestScene::camera_at({0.3, 0, 0}, {0, 0.1, 0});
+  const View view = scene.look(truth_of_last, {});
+  const Rigid3 true_step = truth_of_last * map.keyframe(3)->cam_from_world.inverse();
+  Vector6d error;
+  error << 0.1, 0, 0, 0, 0.05, 0;
+  // How far off the step to a last keyframe is after adjustment, which sees five points that nobody else does.
+  const auto error_of_step = [&](std::shared_ptr<const KeyframeMotion> motion) {
+    map = rest;
+    Keyframe k;
+    k.id = 4;
+    k.features = view.features;
+    k.points.assign(view.features->size(), kNoPoint);
+    k.cam_from_world = rigid3_from_tangent(error) * truth_of_last;
+    k.parent = 3;
+    k.motion = std::move(motion);
+    const Rigid3 world_from_cam = k.cam_from_world.inverse();
+    map.add_keyframe(std::move(k));
+    for (int f = 0; f < 5; ++f) {
+      MapPoint p;
+      p.id = make_point_id(4, f);
+      const Keypoint& seen = view.features->keypoints[static_cast<size_t>(f)];
+      p.position = world_from_cam * scene.camera.unproject(seen.pixel.cast<double>(), seen.depth);
+      p.born_at = 4;
+      map.add_point(std::move(p));
+      map.observe(make_point_id(4, f), 4, f);
+    }
+    const LocalBaReport report = adjust(4);
+    EXPECT_EQ(report.points, 5);
+    return distance_between(map.keyframe(4)->cam_from_world * map.keyframe(3)->cam_from_world.inverse(), true_step);
+  };
+  EXPECT_GT(error_of_step(nullptr), 0.09);
+  const KeyframeMotion known{3, {true_step.inverse(), false, 1e-6 * Matrix6d::Identity()}};
+  EXPECT_LT(error_of_step(std::make_shared<const KeyframeMotion>(known)), 1e-4);
+}
+
 TEST_F(LocalBa, NoMoreFixedKeyframesThanAskedFor) {
   build(8, {}, 0.005, 0.02);
   LocalBaOptions options;

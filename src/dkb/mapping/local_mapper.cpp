@@ -106,7 +106,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   k.cam_from_world = packet.reference == kNoKeyframe
                          ? packet.cam_from_reference
                          : packet.cam_from_reference * map_.cam_from_world(packet.reference);
-  k.motion_covariance = packet.motion_covariance;
+  if (packet.motion && map_.live_keyframe(packet.motion->previous) != nullptr) k.motion = packet.motion;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();
   map_.add_keyframe(std::move(k));

@@ -22,6 +22,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   const Expectation expected = expect(frame);
   scenes_.begin(next_frame_, frame, expected, outcome_);
   const Scene scene = scenes_.look(extract(frame), undistort_, detections, expected);  // DKB 3.1
+  follow_motion(scene);
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene);
   TrackedFrame tracked = track(scene, usable);

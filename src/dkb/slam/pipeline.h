@@ -67,6 +67,7 @@ class Pipeline {
     return mapping_due_ = std::max(mapping_due_, next_frame_ + rate_.frames(options_.pipeline.mapper_latency));
   }
   void shed_load();
+  void follow_motion(const Scene& scene);  // since the last keyframe
   void take_due_map();
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
@@ -114,6 +115,7 @@ class Pipeline {
   };
   KeyframeId next_keyframe_ = 0;
   LastKeyframe last_keyframe_;
+  std::optional<KeyframeMotion> since_keyframe_;  // nothing where a frame since then had no motion
   FrameIndex last_relocalisation_ = -1000000;
   struct RecentKeyframe {
     FrameIndex frame;

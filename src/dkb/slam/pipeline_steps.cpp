@@ -195,6 +195,14 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   return tracked;
 }
 
+void Pipeline::follow_motion(const Scene& scene) {
+  if (!since_keyframe_) return;
+  if (scene.step)
+    since_keyframe_->since = joined(since_keyframe_->since, *scene.step);
+  else
+    since_keyframe_.reset();
+}
+
 // Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
 void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   if (!tracked.tracked() || scene.mask.empty()) return;
@@ -271,6 +279,8 @@ void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
   const KeyframeId id = next_keyframe_++;
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);
+  if (since_keyframe_) packet.motion = std::make_shared<const KeyframeMotion>(*since_keyframe_);
+  since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
   for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;
   recent_keyframes_.push_back({tracked.index, id, tracked.features});

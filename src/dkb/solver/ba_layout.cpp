@@ -18,16 +18,18 @@ void require_index(int index, int count, const char* what) {
 
 }  // namespace
 
-BaLayout::BaLayout(const BaProblem& problem)
+BaLayout::BaLayout(const BaProblem& problem, double huber_chi2)
     : cameras(static_cast<int>(problem.cam_from_world.size())), points(static_cast<int>(problem.points.size())) {
   check(problem);
   for (int c = 0; c < cameras; ++c) {
     free_of_camera.push_back(problem.fixed[c] ? -1 : static_cast<int>(camera_of_free.size()));
     if (!problem.fixed[c]) camera_of_free.push_back(c);
   }
+  motions.emplace(problem.motions, free_of_camera, huber_chi2, "bundle adjustment");
   sort_observations(problem);
   number_pairs();
   find_blocks();
+  motions->find_blocks(pattern);
 }
 
 void BaLayout::check(const BaProblem& problem) const {
@@ -95,6 +97,7 @@ void BaLayout::find_blocks() {
   }
   block.resize(block_first.back());
   const int n = free_cameras();
+  const std::vector<std::vector<int>> joined = motions->later_neighbours();
 
   pattern.first.assign(1, 0);
   std::vector<int> seen(n, -1), block_of(n), rows;
@@ -106,6 +109,7 @@ void BaLayout::find_blocks() {
       seen[j] = i;
       rows.push_back(j);
     };
+    for (const int j : joined[static_cast<size_t>(i)]) take(j);
     // Pairs of this camera, once each, with the pairs behind them of the same point.
     const int c = camera_of_free[i];
     const auto for_each_pair = [&](auto&& visit) {

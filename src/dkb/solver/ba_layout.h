@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "dkb/solver/block_cholesky.h"
 #include "dkb/solver/bundle_adjustment.h"
+#include "dkb/solver/pose_edges.h"
 
 namespace dkb::solver {
 
@@ -14,7 +16,8 @@ namespace dkb::solver {
 // entries of no weight that belong to an extra point and an extra pair. (point, free camera) pairs stand point by
 // point, cameras ascending.
 struct BaLayout {
-  explicit BaLayout(const BaProblem& problem);  // throws InputError for indices that do not fit
+  // Throws InputError for indices that do not fit. `huber_chi2`: corner of the kernel of robust motions.
+  BaLayout(const BaProblem& problem, double huber_chi2);
 
   int cameras, points;
   std::vector<int> free_of_camera;  // -1 = fixed
@@ -29,6 +32,7 @@ struct BaLayout {
   BlockPattern pattern;
   std::vector<long long> block_first;  // per point, points + 1 entries
   std::vector<int> block;
+  std::optional<PoseEdges> motions;  // of the problem
 
   int pairs() const { return static_cast<int>(pair_camera.size()); }
   int free_cameras() const { return static_cast<int>(camera_of_free.size()); }

@@ -27,7 +27,10 @@ struct State {
 class BundleAdjuster {
  public:
   BundleAdjuster(BaProblem& problem, const BaOptions& options)
-      : problem_(problem), options_(options), layout_(problem), cholesky_(layout_.pattern, kernels_) {
+      : problem_(problem),
+        options_(options),
+        layout_(problem, options.chi2_motion),
+        cholesky_(layout_.pattern, kernels_) {
     const size_t entries = layout_.observation_of_entry.size();
     values_.assign(entries * kArrays, 0.0);
     for (size_t e = 0; e < entries; ++e) {
@@ -68,6 +71,7 @@ class BundleAdjuster {
       result.final_cost = descend(start, options_.rounds[round], result.iterations);
       judge(result);
       use(result, true);
+      layout_.motions->judge(state_.poses);
     }
     problem_.cam_from_world = state_.poses;
     for (size_t p = 0; p < problem_.points.size(); ++p) {
@@ -114,7 +118,7 @@ class BundleAdjuster {
     }
   }
 
-  // Observations that take part from now on: those in front of their cameras, and no outliers if asked.
+  // What takes part from now on: observations in front of their cameras, and no outliers if asked.
   void use(const BaResult& result, bool without_outliers) {
     for (size_t e = 0; e < layout_.observation_of_entry.size(); ++e) {
       const int o = layout_.observation_of_entry[e];
@@ -126,7 +130,7 @@ class BundleAdjuster {
   }
 
   double cost(const State& state) {
-    double total = 0;
+    double total = layout_.motions->cost(state.poses);
     for (int c = 0; c < layout_.cameras; ++c) total += kernels_.ba_cost(input(c, state));
     return total;
   }
@@ -150,6 +154,7 @@ class BundleAdjuster {
       }
       std::copy_n(h, 6, gradient_of(free).data());
     }
+    layout_.motions->add(state_.poses, camera_blocks_, gradient_);
   }
 
   // Step of all cameras and points for a damping, and the cost that the quadratic model saves. False: not solvable.
@@ -252,7 +257,7 @@ class BundleAdjuster {
   BaProblem& problem_;
   const BaOptions& options_;
   const solver::SolverKernels& kernels_ = solver::solver_kernels();
-  const solver::BaLayout layout_;
+  solver::BaLayout layout_;
   solver::BlockCholesky cholesky_;
   bool robust_ = true;
   State state_, candidate_;
@@ -271,6 +276,7 @@ void BaOptions::check() const {
   for (const int iterations : rounds) require_option(iterations >= 1, "rounds", iterations, ">= 1");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
   require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
+  require_option(chi2_motion > 0, "chi2_motion", chi2_motion, "> 0");
   require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
   require_option(initial_damping > 0, "initial_damping", initial_damping, "> 0");
   require_option(relative_tolerance >= 0, "relative_tolerance", relative_tolerance, ">= 0");

@@ -7,6 +7,7 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/solver/pose_edges.h"
 
 namespace dkb {
 
@@ -26,6 +27,7 @@ struct BaProblem {
   std::vector<uint8_t> fixed;               // per camera: 1 = stays where it is. Fix one at least.
   std::vector<Eigen::Vector3d> points;      // [m] in the world
   std::vector<BaObservation> observations;  // any order; of one (camera, point) pair there may be several
+  std::vector<PoseEdge> motions;            // between cameras, by what is not in the observations
 };
 
 struct BaOptions {
@@ -35,6 +37,7 @@ struct BaOptions {
   bool robust_last_round = true;      // Huber kernel also in the last of several rounds
   double chi2_pixel = 5.991;          // outlier limit and Huber corner of the unweighted error without depth, > 0
   double chi2_depth = 7.815;          // the same with depth, > 0
+  double chi2_motion = 16.81;         // the same of robust motions (6 d.o.f., 99 %), > 0
   double depth_in_front = 0.01;       // [m] points nearer than this along the optical axis are outliers, > 0
   double initial_damping = 1e-5;      // Marquardt's factor on the diagonal at the start, > 0
   double relative_tolerance = 1e-5;   // a step that lowers the cost by less than this part ends the round, >= 0
@@ -52,13 +55,13 @@ struct BaResult {
 
 // Bundle adjustment (DKB eqs. 42-48): refines the free cameras and all points of `problem` in place.
 //
-// Minimises sum w rho(e^T Sigma^-1 e) by Levenberg-Marquardt; points are eliminated (Schur complement), the cameras'
-// system is solved by a block-sparse Cholesky factorisation, so local windows and whole maps take the same way.
-// rho: Huber on the unweighted error. Where w differs from 1 and depth is present, the part min(w, 1) has one kernel
-// over pixel and depth; what the heavier of the two has beyond that has a kernel of its own (kernels.inl).
-// Points that the observations do not determine move only where they are determined, and points without a usable
-// observation stay. Observations behind their camera are outliers. The result holds no NaN if the input holds none.
-// Deterministic. Throws InputError for indices or sizes that do not fit.
+// Minimises sum w rho(e^T Sigma^-1 e) of the observations, and of the motions with w = 1, by Levenberg-Marquardt;
+// points are eliminated (Schur complement), the cameras' system is solved by a block-sparse Cholesky factorisation, so
+// local windows and whole maps take the same way. rho: Huber on the unweighted error. Where w differs from 1 and depth
+// is present, the part min(w, 1) has one kernel over pixel and depth; what the heavier of the two has beyond that has a
+// kernel of its own (kernels.inl). Points that the observations do not determine move only where they are determined,
+// and points without a usable observation stay. Observations behind their camera are outliers. The result holds no NaN
+// if the input holds none. Deterministic. Throws InputError for indices or sizes that do not fit.
 BaResult bundle_adjust(BaProblem& problem, const BaOptions& options = {});
 
 }  // namespace dkb

@@ -57,6 +57,70 @@ TEST(BundleAdjustment, WeightsCountAsCeresScalesTheLoss) {  // DKB eq. 48, witho
   EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-4);
 }
 
+// From each camera to the one before it, as true as `sigma` [m, rad]; every fifth is 0.3 m off.
+std::vector<PoseEdge> motions_of(const TestWorld& world, double sigma, bool robust) {
+  Random random(5);
+  std::vector<PoseEdge> motions;
+  for (int c = 1; c < static_cast<int>(world.cam_from_world.size()); ++c) {
+    Vector6d error;
+    for (int k = 0; k < 6; ++k) error[k] = sigma * random.normal();
+    if (c % 5 == 0) error[1] += 0.3;
+    const Rigid3 previous_from_this = world.cam_from_world[c - 1] * world.cam_from_world[c].inverse();
+    Vector6d weight;
+    weight << 1, 2, 0.5, 3, 1, 2;
+    Matrix6d information = weight.asDiagonal();
+    information(0, 4) = information(4, 0) = 0.6;
+    motions.push_back(
+        {c, c - 1, previous_from_this * rigid3_from_tangent(error), information / (sigma * sigma), robust});
+  }
+  return motions;
+}
+
+TEST(BundleAdjustment, WithMotionsReachesTheMinimumThatCeresReaches) {
+  for (const bool robust : {false, true}) {
+    TestWorld world({.cameras = 12, .points = 60, .outlier_share = 0.02, .seed = 11});
+    world.problem.motions = motions_of(world, 0.002, robust);
+    BaProblem ours = world.problem, theirs = world.problem;
+    const BaResult result = bundle_adjust(ours, to_convergence());
+    const CeresBa oracle = ceres_bundle_adjust(theirs, {});
+    EXPECT_NEAR(result.final_cost, oracle.final_cost, 1e-6 * oracle.final_cost);
+    EXPECT_LT(max_pose_difference(ours.cam_from_world, theirs.cam_from_world), 1e-5);
+  }
+}
+
+TEST(BundleAdjustment, MotionsAloneCarryCamerasThatShareNoPoint) {
+  TestWorld world({.cameras = 6, .fixed = 1, .points = 200, .seed = 12});
+  // The last three see nothing.
+  std::erase_if(world.problem.observations, [](const BaObservation& o) { return o.camera > 2; });
+  world.problem.motions = motions_of(world, 1e-6, true);
+  std::erase_if(world.problem.motions, [](const PoseEdge& e) { return e.a % 5 == 0; });
+  world.problem.motions.push_back(
+      {5, 4, world.cam_from_world[4] * world.cam_from_world[5].inverse(), 1e12 * Matrix6d::Identity(), true});
+  bundle_adjust(world.problem, to_convergence());
+  const auto step = [](const std::vector<Rigid3>& poses, int c) { return poses[c] * poses[c - 1].inverse(); };
+  for (int c = 3; c < 6; ++c)
+    EXPECT_LT(max_pose_difference({step(world.problem.cam_from_world, c)}, {step(world.cam_from_world, c)}), 1e-5) << c;
+}
+
+TEST(BundleAdjustment, AMotionThatThePointsContradictIsLeftOutInTheEnd) {
+  TestWorld world({.seed = 13});
+  BaProblem plain = world.problem, wrong = world.problem;
+  wrong.motions.push_back({8, 7,
+                           rigid3_from_tangent((Vector6d() << 0.06, 0, 0, 0, 0, 0).finished()) *
+                               (world.cam_from_world[7] * world.cam_from_world[8].inverse()),
+                           1e5 * Matrix6d::Identity(), true});
+  const auto pull = [&](std::vector<int> rounds) {
+    BaProblem without = plain, with = wrong;
+    BaOptions options;
+    options.rounds = std::move(rounds);
+    bundle_adjust(without, options);
+    bundle_adjust(with, options);
+    return max_pose_difference(without.cam_from_world, with.cam_from_world);
+  };
+  EXPECT_GT(pull({40}), 0.002) << "it pulls as long as it takes part";
+  EXPECT_LT(pull({20, 20, 20}), 0.001) << "but for points near their limit";
+}
+
 TEST(BundleAdjustment, ManyCamerasTakeTheSparseWayToTheSameMinimum) {
   TestWorld world({.cameras = 45, .fixed = 1, .points = 600, .step = 0.2, .visibility = 0.5, .seed = 12});
   BaProblem ours = world.problem, theirs = world.problem;
@@ -231,6 +295,9 @@ TEST(BundleAdjustment, RefusesIndicesThatDoNotFit) {
   EXPECT_THROW(bundle_adjust(problem), InputError);
   problem = world.problem;
   problem.fixed.pop_back();
+  EXPECT_THROW(bundle_adjust(problem), InputError);
+  problem = world.problem;
+  problem.motions.push_back({0, 2, {}, Matrix6d::Identity(), true});
   EXPECT_THROW(bundle_adjust(problem), InputError);
   BaOptions options;
   options.rounds = {};

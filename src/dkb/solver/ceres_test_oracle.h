@@ -43,6 +43,37 @@ struct CeresPixel {
   }
 };
 
+struct CeresMotion {
+  const PoseEdge& edge;
+
+  template <class T>
+  bool operator()(const T* a, const T* b, T* residual) const {
+    // a_from_b of the edge, composed with b_from_a of the poses, is T(d) in the axes of a.
+    T of_a[4], of_b[4], a_inverse[4], turn[4], moved[3], error_turn[4];
+    ceres::AngleAxisToQuaternion(a, of_a);
+    ceres::AngleAxisToQuaternion(b, of_b);
+    a_inverse[0] = of_a[0];
+    for (int k = 1; k < 4; ++k) a_inverse[k] = -of_a[k];
+    ceres::QuaternionProduct(of_b, a_inverse, turn);
+    ceres::QuaternionRotatePoint(turn, a + 3, moved);
+    const Rigid3 inverse = edge.b_from_a.inverse();
+    const T from_edge[4] = {T(inverse.rotation.w()), T(inverse.rotation.x()), T(inverse.rotation.y()),
+                            T(inverse.rotation.z())};
+    for (int k = 0; k < 3; ++k) moved[k] = b[3 + k] - moved[k];
+    T error[6];
+    ceres::QuaternionRotatePoint(from_edge, moved, error);
+    for (int k = 0; k < 3; ++k) error[k] += T(inverse.translation[k]);
+    ceres::QuaternionProduct(from_edge, turn, error_turn);
+    ceres::QuaternionToAngleAxis(error_turn, error + 3);
+    const Matrix6d root = edge.information.llt().matrixU();
+    for (int i = 0; i < 6; ++i) {
+      residual[i] = T(0);
+      for (int k = i; k < 6; ++k) residual[i] += root(i, k) * error[k];
+    }
+    return true;
+  }
+};
+
 struct CeresBa {
   double final_cost = 0;  // in the convention of BaResult
   int iterations = 0;
@@ -54,7 +85,7 @@ struct CeresBaOptions {
   double relative_tolerance = 1e-12;
   bool robust = true;
   bool fixed_points = false;
-  double chi2_pixel = 5.991, chi2_depth = 7.815;
+  double chi2_pixel = 5.991, chi2_depth = 7.815, chi2_motion = 16.81;
   ceres::LinearSolverType solver = ceres::DENSE_SCHUR;
 };
 
@@ -87,6 +118,14 @@ inline CeresBa ceres_bundle_adjust(BaProblem& problem, const CeresBaOptions& opt
     ceres_problem.AddResidualBlock(cost, loss, poses[o.camera].data(), problem.points[o.point].data());
     ordering->AddElementToGroup(problem.points[o.point].data(), 0);
     ordering->AddElementToGroup(poses[o.camera].data(), 1);
+  }
+  for (const PoseEdge& e : problem.motions) {
+    ceres_problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<CeresMotion, 6, 6, 6>(new CeresMotion{e}),
+        e.robust && options.robust ? new ceres::HuberLoss(std::sqrt(options.chi2_motion)) : nullptr, poses[e.a].data(),
+        poses[e.b].data());
+    ordering->AddElementToGroup(poses[e.a].data(), 1);
+    ordering->AddElementToGroup(poses[e.b].data(), 1);
   }
   for (size_t c = 0; c < poses.size(); ++c) {
     if (problem.fixed[c] && ceres_problem.HasParameterBlock(poses[c].data())) {

@@ -5,22 +5,14 @@
 #include <vector>
 
 #include "dkb/geometry/rigid3.h"
+#include "dkb/solver/pose_edges.h"
 
 namespace dkb {
-
-// Measured motion between two keyframes: cam_b_from_world * world_from_cam_a = b_from_a * T(d), with
-// d = [translation m, rotation rad] in the axes of a, of this information (inverse covariance).
-struct PoseGraphEdge {
-  int a = 0, b = 0;  // indices into PoseGraph::cam_from_world, a != b
-  Rigid3 b_from_a;
-  Matrix6d information = Matrix6d::Identity();
-  bool robust = false;  // Huber kernel on d^T information d (loop edges)
-};
 
 struct PoseGraph {
   std::vector<Rigid3> cam_from_world;
   std::vector<uint8_t> fixed;  // per keyframe; at least one of each connected part ought to be fixed
-  std::vector<PoseGraphEdge> edges;
+  std::vector<PoseEdge> edges;
 };
 
 struct PoseGraphOptions {

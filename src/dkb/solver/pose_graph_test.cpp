@@ -32,7 +32,7 @@ struct Circle {
       truth.push_back(world_from_cam.inverse());
     }
     const auto join = [&](int a, int b) {
-      PoseGraphEdge e;
+      PoseEdge e;
       e.a = a, e.b = b;
       e.b_from_a = truth[b] * truth[a].inverse() * rigid3_from_tangent(noise(random, sigma));
       Vector6d weight;
@@ -67,7 +67,7 @@ double max_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b
 
 // The same residual for automatic derivatives; poses as quaternion (x y z w) and translation of cam_from_world.
 struct CeresEdge {
-  const PoseGraphEdge& edge;
+  const PoseEdge& edge;
   Matrix6d root;
 
   template <class T>
@@ -101,7 +101,7 @@ double ceres_pose_graph(PoseGraph& graph, double huber_chi2) {
     problem.AddParameterBlock(poses[k].data(), 7, manifold);
     if (graph.fixed[k]) problem.SetParameterBlockConstant(poses[k].data());
   }
-  for (const PoseGraphEdge& e : graph.edges) {
+  for (const PoseEdge& e : graph.edges) {
     const Matrix6d root = e.information.llt().matrixU();
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<CeresEdge, 6, 7, 7>(new CeresEdge{e, root}),
                              e.robust ? new ceres::HuberLoss(std::sqrt(huber_chi2)) : nullptr, poses[e.a].data(),
@@ -132,8 +132,8 @@ TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
   for (const bool robust : {false, true}) {
     Circle circle(80, 0.01, 2);
     if (robust) {
-      for (PoseGraphEdge& e : circle.graph.edges) e.robust = std::abs(e.a - e.b) > 3;
-      PoseGraphEdge wrong = circle.graph.edges.back();
+      for (PoseEdge& e : circle.graph.edges) e.robust = std::abs(e.a - e.b) > 3;
+      PoseEdge wrong = circle.graph.edges.back();
       wrong.a = 20, wrong.b = 60, wrong.robust = true;
       circle.graph.edges.push_back(wrong);
     }
@@ -150,7 +150,7 @@ TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
 
 TEST(PoseGraph, AWrongRobustEdgeBendsLittle) {
   Circle circle(80, 0.002, 3);
-  PoseGraphEdge wrong = circle.graph.edges.back();
+  PoseEdge wrong = circle.graph.edges.back();
   wrong.a = 20, wrong.b = 60;
   PoseGraph plain = circle.graph, robust = circle.graph;
   plain.edges.push_back(wrong);

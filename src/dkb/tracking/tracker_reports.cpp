@@ -66,8 +66,6 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   packet.features = frame.features;
   packet.reference = frame.reference;
   packet.cam_from_reference = frame.reference == kNoKeyframe ? frame.cam_from_world : frame.cam_from_reference;
-  if (frame.starts_map && frame.predicted)
-    packet.motion_covariance = std::make_shared<const Matrix6d>(frame.predicted->covariance);
   packet.points = frame.points;
 
   std::vector<std::pair<float, int>> by_depth;
