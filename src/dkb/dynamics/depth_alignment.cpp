@@ -2,6 +2,7 @@
 #include "dkb/dynamics/depth_alignment.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +10,7 @@ namespace dkb {
 namespace {
 
 constexpr int kStride = 3;        // [cells] between those that are asked
-constexpr int kReach = 2;         // [cells] to both sides, over which a normal is taken
+constexpr int kReach = 3;         // [cells] to both sides, over which a normal is taken
 constexpr int kIterations = 6;    // at most
 constexpr double kTukey = 4.685;  // [standard deviations]: 95 % efficiency with Gaussian noise
 // The noise of depth hangs together over some ten pixels, and the sensor's calibration over far more: so many cells say
@@ -20,6 +21,52 @@ constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
 
+// What the noise of the normals adds to the information. A normal n is off across itself, so that the row [n, p x n] of
+// a cell at p is off by A (I - n n^T) A^T times the variance of the slope, with A = [I, [p]x].
+class NormalNoise {
+ public:
+  void add(double weighted_variance, const Eigen::Vector3d& p, const Vector6d& row) {
+    sum_ += weighted_variance;
+    point_ += weighted_variance * p;
+    square_.noalias() += weighted_variance * p * p.transpose();
+    along_.noalias() += weighted_variance * row * row.transpose();
+  }
+  Matrix6d information() const {
+    Matrix6d all;
+    all.topLeftCorner<3, 3>() = sum_ * Eigen::Matrix3d::Identity();
+    all.bottomLeftCorner<3, 3>() = skew(point_);
+    all.topRightCorner<3, 3>() = -skew(point_);
+    all.bottomRightCorner<3, 3>() = square_.trace() * Eigen::Matrix3d::Identity() - square_;
+    return all - along_;
+  }
+
+ private:
+  double sum_ = 0;
+  Eigen::Vector3d point_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d square_ = Eigen::Matrix3d::Zero();
+  Matrix6d along_ = Matrix6d::Zero();
+};
+
+// Takes the part of noise out of the information. A direction of which more than half is noise is left to the
+// expectation: along a corridor the noise of a thousand normals would hold the camera where it was. Directions are
+// those of the information in units of the expectation's standard deviations.
+void keep_what_is_known(const Matrix6d& expected_covariance, const Matrix6d& noise, Matrix6d* information,
+                        Vector6d* gradient) {
+  const Matrix6d unit = expected_covariance.llt().matrixL(), whitened = unit.inverse();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.transpose() * *information * unit);
+  Matrix6d kept = Matrix6d::Zero();
+  Vector6d pull = Vector6d::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const Vector6d axis = eigen.eigenvectors().col(i), direction = unit * axis;
+    const double known = eigen.eigenvalues()[i] - direction.dot(noise * direction);
+    if (known < eigen.eigenvalues()[i] / 2) continue;
+    kept += known * axis * axis.transpose();
+    pull += direction.dot(*gradient) * axis;
+  }
+  *information = whitened.transpose() * kept * whitened;
+  *gradient = whitened.transpose() * pull;
+}
+
 }  // namespace
 
 DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays)
@@ -28,17 +75,24 @@ DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const Mot
       normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()),
       asked_(rays.width(), rays.height()) {}
 
+// By least squares over 3 x 3 cells, kReach apart.
 Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const {
   constexpr int k = kReach;
   const Image<float>& depth = grid.depth;
   if (x < k || y < k || x + k >= rays.width() || y + k >= rays.height()) return Eigen::Vector3f::Zero();
   const float z = depth(x, y);
   if (!(z > 0) || grid.score(x, y) >= kMayMove) return Eigen::Vector3f::Zero();
-  const auto& [least, most] = std::minmax({depth(x - k, y), depth(x + k, y), depth(x, y - k), depth(x, y + k)});
   const auto jump = static_cast<float>(noise_.max_depth_jump(z, k * rays.cell(), focal_));
-  if (!(least > 0) || z - least > jump || most - z > jump) return Eigen::Vector3f::Zero();
-  const auto place = [&](int u, int v) -> Eigen::Vector3f { return depth(u, v) * rays.ray(u, v); };
-  return (place(x + k, y) - place(x - k, y)).cross(place(x, y + k) - place(x, y - k)).normalized();
+  Eigen::Vector3f across = Eigen::Vector3f::Zero(), down = Eigen::Vector3f::Zero();
+  for (int v = -1; v <= 1; ++v)
+    for (int u = -1; u <= 1; ++u) {
+      const float there = depth(x + k * u, y + k * v);
+      if (!(there > 0) || std::abs(there - z) > jump) return Eigen::Vector3f::Zero();
+      const Eigen::Vector3f place = there * rays.ray(x + k * u, y + k * v);
+      across += static_cast<float>(u) * place;
+      down += static_cast<float>(v) * place;
+    }
+  return across.cross(down).normalized();
 }
 
 std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, const MotionDepthGrid& there,
@@ -61,6 +115,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
     information.setZero();
     Vector6d gradient = Vector6d::Zero();
     size_t cells = 0;
+    NormalNoise noise;
     for (int y = kStride / 2; y < rays.height(); y += kStride)
       for (int x = kStride / 2; x < rays.width(); x += kStride) {
         const float depth = here.depth(x, y);
@@ -89,8 +144,12 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
         information.noalias() += static_cast<double>(weight) * row * row.transpose();
         gradient += static_cast<double>(weight * distance) * row;
         ++cells;
+        // The slope of a plane through nine depths, three each at -1, 0 and 1 spacings: of six squares in all.
+        const double slope = sigma / (z * kReach * rays.cell() / focal_);
+        noise.add(static_cast<double>(weight) * slope * slope / 6, point.cast<double>(), row);
       }
     if (cells < kEnoughCells) return std::nullopt;
+    keep_what_is_known(covariance, noise.information(), &information, &gradient);
     information += prior;
     gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
     const Vector6d step = -information.ldlt().solve(gradient);

@@ -113,8 +113,8 @@ TEST_F(DepthAlignmentTest, TheCovarianceTellsWhatTheSurfacesDoNot) {
       sum += error.dot(found->covariance.ldlt().solve(error));
       const Vector6d sd = found->covariance.diagonal().cwiseSqrt();
       if (planes.size() == 1) {
-        EXPECT_NEAR(sd[0], kPositionSd, 0.25 * kPositionSd);  // normals are noisy
-        EXPECT_NEAR(sd[5], kRotationSd, 0.25 * kRotationSd);
+        EXPECT_NEAR(sd[0], kPositionSd, 0.02 * kPositionSd);
+        EXPECT_NEAR(sd[5], kRotationSd, 0.02 * kRotationSd);
         EXPECT_LT(sd[2], 0.2 * kPositionSd);
         EXPECT_LT(sd[3], 0.2 * kRotationSd);
       } else {
@@ -125,6 +125,34 @@ TEST_F(DepthAlignmentTest, TheCovarianceTellsWhatTheSurfacesDoNot) {
     EXPECT_LT(mean, 1.5);
     EXPECT_GT(mean, 0.05);
   }
+}
+
+// Walls, floor and ceiling tell nothing of the way along them, though the noise of each normal points somewhere.
+TEST_F(DepthAlignmentTest, AlongACorridorTheExpectationHolds) {
+  const std::vector<Plane> corridor{{Eigen::Vector3d(1, 0, 0), 1.2},
+                                    {Eigen::Vector3d(-1, 0, 0), 1.2},
+                                    {Eigen::Vector3d(0, 1, 0), 1.3},
+                                    {Eigen::Vector3d(0, -1, 0), 1.2}};
+  const auto view = [&](int n) {
+    DepthImage depth = view_of(corridor, Rigid3(Eigen::Quaterniond::Identity(), {0, 0, -0.04 * n}), 50 + n);
+    for (size_t i = 0; i < depth.size(); ++i)
+      if (depth.data()[i] > 5) depth.data()[i] = 0;
+    return grid_of(depth, rays_);
+  };
+  double way = 0;
+  MotionDepthGrid there = view(0);
+  for (int n = 1; n <= 20; ++n) {
+    MotionDepthGrid here = view(n);
+    const auto found = step(here, there, Rigid3(Eigen::Quaterniond::Identity(), {0, 0, 0.04}));
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(std::sqrt(found->covariance(2, 2)), kPositionSd, 0.02 * kPositionSd) << n;
+    Vector6d sideways;  // of what lies 3.5 m ahead
+    sideways << 1, 0, 0, 0, 3.5, 0;
+    EXPECT_LT(std::sqrt(sideways.dot(found->covariance * sideways)), 0.5 * kPositionSd) << n;  // expected to 0.11 m
+    way += found->previous_from_current.translation.z();
+    there = std::move(here);
+  }
+  EXPECT_NEAR(way, 0.8, 0.02);
 }
 
 TEST_F(DepthAlignmentTest, SomebodyBeforeAThirdOfTheImageDoesNotPullThePoseAlong) {
