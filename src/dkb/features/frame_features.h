@@ -38,21 +38,23 @@ class FrameFeatures {
 class ExtractedFeatures final : public FrameFeatures {
  public:
   ExtractedFeatures(const OrbFeatures& orb, const RgbdImage& image, const Camera& camera,
-                    const UndistortionTable& undistort, const DepthOptions& options)
+                    const UndistortionTable& undistort, const SensorNoise& noise, const DepthOptions& options)
       : orb_(orb),
         image_(image),
         camera_(camera),
+        noise_(noise),
         options_(options),
-        as_seen_(keypoints_as_seen(orb, image, undistort, options)) {}
+        as_seen_(keypoints_as_seen(orb, image, undistort, camera, noise)) {}
   std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
     return std::make_shared<const RgbdFeatures>(
-        make_rgbd_features(orb_, as_seen_, image_, camera_, velocity, options_));
+        make_rgbd_features(orb_, as_seen_, image_, camera_, noise_, velocity, options_));
   }
 
  private:
   const OrbFeatures& orb_;
   const RgbdImage& image_;
   const Camera& camera_;
+  const SensorNoise& noise_;
   const DepthOptions& options_;
   const std::vector<Keypoint> as_seen_;
 };

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "dkb/util/errors.h"
+#include <limits>
 
 namespace dkb {
 namespace {
@@ -23,16 +22,11 @@ inline Triple sorted(const float* p) {
   return {std::min(low, c), std::max(low, std::min(high, c)), std::max(high, c)};
 }
 
-// Depth at a pixel: the median of the valid 3 x 3 neighbours around a valid centre; 0 where the surface is torn.
-float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
-  const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
-  if (cx < 1 || cy < 1 || cx >= depth.width() - 1 || cy >= depth.height() - 1) return 0;
-  const float centre = depth(cx, cy);
-  if (!(centre > 0)) return 0;
-  const Triple a = sorted(&depth(cx - 1, cy - 1)), b = sorted(&depth(cx - 1, cy)), c = sorted(&depth(cx - 1, cy + 1));
-  const float torn = edge_fraction * centre;
+// The median of the valid 3 x 3 neighbours of a pixel; 0 where one of them is farther than `limit`.
+float median_around(const DepthImage& depth, int x, int y, float limit) {
+  const Triple a = sorted(&depth(x - 1, y - 1)), b = sorted(&depth(x - 1, y)), c = sorted(&depth(x - 1, y + 1));
+  if (std::max({a.high, b.high, c.high}) > limit) return 0;
   if ((a.low > 0) & (b.low > 0) & (c.low > 0)) {
-    if (std::max({a.high, b.high, c.high}) - std::min({a.low, b.low, c.low}) > torn) return 0;
     // The median of nine: of the greatest low, the middle mid and the least high.
     const float low = std::max({a.low, b.low, c.low}), high = std::min({a.high, b.high, c.high});
     const float mid = std::max(std::min(a.mid, b.mid), std::min(std::max(a.mid, b.mid), c.mid));
@@ -46,15 +40,72 @@ float depth_at(const DepthImage& depth, float x, float y, float edge_fraction) {
     for (; at > 0 && values[at - 1] > d; --at) values[at] = values[at - 1];  // insertion keeps them sorted
     values[at] = d;
   }
-  if (values[n - 1] - values[0] > torn) return 0;
   return n % 2 == 1 ? values[n / 2] : 0.5f * (values[n / 2 - 1] + values[n / 2]);
 }
 
-}  // namespace
+// Reads the depth of corners.
+class CornerDepths {
+ public:
+  CornerDepths(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise)
+      : depth_(depth), focal_(camera.fx), noise_(noise) {}
 
-void DepthOptions::check() const {
-  require_option(edge_fraction > 0, "edge_fraction", edge_fraction, "greater than 0");
-}
+  struct Depth {
+    float own = 0, lent = 0;  // [m] one of the two at most
+  };
+  Depth at(float x, float y) const {
+    const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
+    if (cx < kReach || cy < kReach || cx >= depth_.width() - kReach || cy >= depth_.height() - kReach) return {};
+    const float nearest = nearest_around(cx, cy);
+    if (nearest == kFar) return {};
+    const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
+    const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
+    if (centre > 0 && centre <= limit)
+      if (const float median = median_around(depth_, cx, cy, limit + jump(1)); median > 0) return {median, 0};
+    return {0, nearest_pixel(cx, cy, limit)};
+  }
+
+ private:
+  // [px] FAST looks at a circle of 3, and the outlines of a structured-light sensor wander by about one.
+  static constexpr int kReach = 4;
+  static constexpr int kAcross = 2 * kReach + 1;
+  static constexpr int kSurface = 4;  // [px] fewer are no surface but noise
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+
+  float nearest_around(int cx, int cy) const {
+    float nearest[kAcross];  // by column, so that a row is taken at once
+    std::fill_n(nearest, kAcross, kFar);
+    for (int y = cy - kReach; y <= cy + kReach; ++y) {
+      const float* row = &depth_(cx - kReach, y);
+      for (int k = 0; k < kAcross; ++k) {
+        const float d = row[k] > 0 ? row[k] : kFar;
+        nearest[k] = d < nearest[k] ? d : nearest[k];
+      }
+    }
+    return *std::min_element(nearest, nearest + kAcross);
+  }
+
+  // The depth, up to `limit`, that lies nearest in the image.
+  float nearest_pixel(int cx, int cy, float limit) const {
+    int least = std::numeric_limits<int>::max(), count = 0;
+    float found = 0;
+    for (int v = -kReach; v <= kReach; ++v)
+      for (int u = -kReach; u <= kReach; ++u) {
+        const float d = depth_(cx + u, cy + v);
+        if (!(d > 0) || d > limit) continue;
+        ++count;
+        if (u * u + v * v >= least) continue;
+        least = u * u + v * v;
+        found = d;
+      }
+    return count >= kSurface ? found : 0;
+  }
+
+  const DepthImage& depth_;
+  const double focal_;
+  const SensorNoise& noise_;
+};
+
+}  // namespace
 
 UndistortionTable::UndistortionTable(const CameraModel& camera) {
   if (!camera.distorted()) return;
@@ -81,13 +132,15 @@ Eigen::Vector2f UndistortionTable::operator()(float x, float y) const {
 }
 
 std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
-                                        const UndistortionTable& undistort, const DepthOptions& options) {
+                                        const UndistortionTable& undistort, const CameraModel& camera,
+                                        const SensorNoise& noise) {
   std::vector<Keypoint> keypoints(orb.corners.size());
+  const CornerDepths depths(image.depth, camera, noise);
   // The images have mostly left the cache by now, and corners lie all over them.
   const auto ask_early = [&image](const Corner& c) {
     const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
-    if (!image.depth.contains(x, y - 1) || !image.depth.contains(x, y + 1)) return;
-    for (int row = y - 1; row <= y + 1; ++row) __builtin_prefetch(&image.depth(x, row));
+    for (int row = std::max(0, y - 4); row <= std::min(y + 4, image.depth.height() - 1); ++row)
+      __builtin_prefetch(&image.depth(x, row));
     if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
   };
   constexpr size_t kAhead = 12;  // [corners] as measured, docs/decisions.md
@@ -100,7 +153,9 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
     k.angle = c.angle;
     k.response = c.response;
     k.octave = c.octave;
-    k.depth = depth_at(image.depth, c.x, c.y, options.edge_fraction);
+    const CornerDepths::Depth depth = depths.at(c.x, c.y);
+    k.depth = depth.own;
+    k.lent_depth = depth.lent;
     const int ix = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.grey.width() - 1);
     const int iy = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.grey.height() - 1);
     if (!image.colour.empty()) {
@@ -114,8 +169,10 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
 }
 
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
-                                const CameraModel& camera, const Vector6d& velocity, const DepthOptions& options) {
+                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
+                                const DepthOptions& options) {
   RgbdFeatures result;
+  const CornerDepths depths(image.depth, camera, noise);
   result.descriptors = orb.descriptors;
   result.keypoints = std::move(as_seen);
   const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
@@ -135,8 +192,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
       const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
       if (then.z() > 0.05) {
         const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
-        const float z_then = depth_at(image.depth, c.x + static_cast<float>(shift.x()),
-                                      c.y + static_cast<float>(shift.y()), options.edge_fraction);
+        const float z_then = depths.at(c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y())).own;
         z = z_then > 0 ? static_cast<float>(
                              (rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
                        : 0.0f;
@@ -153,7 +209,11 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
         if (z > 0) z = static_cast<float>(turned.z());
       }
     }
-    k.depth = z >= static_cast<float>(camera.depth_min) && z <= static_cast<float>(camera.depth_max) ? z : 0.0f;
+    const auto in_range = [&camera](float d) {
+      return d >= static_cast<float>(camera.depth_min) && d <= static_cast<float>(camera.depth_max);
+    };
+    k.depth = in_range(z) ? z : 0.0f;
+    if (!in_range(k.lent_depth)) k.lent_depth = 0;
   }
   result.width = camera.width;
   result.height = camera.height;

@@ -8,6 +8,7 @@
 #include "dkb/features/keypoint_grid.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/geometry/sensor_noise.h"
 #include "dkb/image/rgbd_image.h"
 
 namespace dkb {
@@ -16,7 +17,8 @@ struct Keypoint {
   Eigen::Vector2f pixel;        // [px] ideal (undistorted)
   Eigen::Vector2f image_pixel;  // [px] where it lies in the image as read
   float depth = 0;              // [m] along the optical axis at the colour image's time, 0 = unknown
-  float angle = 0;              // [rad]
+  float lent_depth = 0;  // [m] of the nearest surface around one of unknown depth, 0 = none; map files leave it out
+  float angle = 0;       // [rad]
   float response = 0;
   uint8_t octave = 0;
   Rgb colour;
@@ -32,11 +34,8 @@ struct RgbdFeatures {
 };
 
 struct DepthOptions {
-  float edge_fraction =
-      0.05f;  // [1] a depth is dropped when its 3 x 3 neighbourhood differs by more than this share, > 0
   bool model_time_offset = true;      // move depths to the colour image's time with the camera's motion
   bool model_rolling_shutter = true;  // move features to where they would lie had the whole image been exposed at once
-  void check() const;
 };
 
 // Ideal-pixel lookup for every image pixel of a distorted camera, tabulated once (bilinear between nodes 8 px apart).
@@ -55,13 +54,18 @@ class UndistortionTable {
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
 };
 
-// Corners with depth and colour, as a camera that stands still has them.
+// Corners with depth and colour, as a camera that stands still has them. A corner beside a depth step has no depth of
+// its own: the step lies a pixel or two from where the image shows it, so that half of the corners on a plant had the
+// depth of the wall behind. The nearer surface lends it one, since the outline that made the corner is most likely its
+// own.
 std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
-                                        const UndistortionTable& undistort, const DepthOptions& options);
+                                        const UndistortionTable& undistort, const CameraModel& camera,
+                                        const SensorNoise& noise);
 // Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen: hand-held
 // Kinects move millimetres between the stamps of colour and depth.
 RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
-                                const CameraModel& camera, const Vector6d& velocity, const DepthOptions& options);
+                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
+                                const DepthOptions& options);
 
 // The features of these indices, in this order, with a grid of their own.
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices);

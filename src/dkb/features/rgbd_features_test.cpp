@@ -36,8 +36,8 @@ OrbFeatures corners_at(const std::vector<Eigen::Vector2f>& pixels) {
 
 RgbdFeatures make(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                   const Vector6d& velocity = Vector6d::Zero(), const DepthOptions& options = {}) {
-  return make_rgbd_features(orb, keypoints_as_seen(orb, image, UndistortionTable(camera), options), image, camera,
-                            velocity, options);
+  return make_rgbd_features(orb, keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
+                            camera, SensorNoise(), velocity, options);
 }
 
 // Depth image of the plane normal * point = distance, given in the camera's axes.
@@ -77,7 +77,7 @@ TEST(RgbdFeatures, GreyCamerasGiveGreyPoints) {
 TEST(RgbdFeatures, DepthIsTheMedianOfTheNeighbours) {
   const CameraModel camera = plain_camera();
   RgbdImage image = image_of(camera, 2.0F);
-  image.depth(100, 100) = 2.05F;  // noise within the edge limit of 5 %
+  image.depth(100, 100) = 2.05F;  // 0.08 m may be on one surface
   image.depth(101, 100) = 1.99F;
   EXPECT_EQ(make(corners_at({{100, 100}}), image, camera).keypoints[0].depth, 2.0F);
   for (int dx : {-1, 0, 1})
@@ -90,8 +90,9 @@ TEST(RgbdFeatures, DepthIsTheMedianOfTheNeighbours) {
 TEST(RgbdFeatures, NoDepthAtEdgesInHolesAtTheRimAndBeyondTheLimits) {
   const CameraModel camera = plain_camera();
   RgbdImage image = image_of(camera, 2.0F);
-  image.depth(101, 101) = 2.11F;  // a step of 5.5 %
-  image.depth(200, 200) = 0;
+  image.depth(101, 101) = 2.11F;
+  for (int y = 196; y <= 204; ++y)
+    for (int x = 196; x <= 204; ++x) image.depth(x, y) = 0;
   const RgbdFeatures f = make(corners_at({{100, 100}, {200, 200}, {0, 100}, {639, 479}, {300, 300}}), image, camera);
   for (size_t i = 0; i < 4; ++i) EXPECT_EQ(f.keypoints[i].depth, 0) << i;
   EXPECT_EQ(f.keypoints[4].depth, 2);
@@ -101,6 +102,40 @@ TEST(RgbdFeatures, NoDepthAtEdgesInHolesAtTheRimAndBeyondTheLimits) {
   short_sighted.depth_max = 10;
   short_sighted.depth_min = 2.1;
   EXPECT_EQ(make(corners_at({{300, 300}}), image, short_sighted).keypoints[0].depth, 0);
+}
+
+// A plant's leaf: 2 m away, before a wall at 2.4 m; the depth image shows its left rim at x = 300.
+TEST(RgbdFeatures, BesideAStepTheNearerSurfaceLendsItsDepth) {
+  const CameraModel camera = plain_camera();
+  RgbdImage image = image_of(camera, 2.4F);
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 300; x < camera.width; ++x) image.depth(x, y) = 2.0F;
+  for (int y = 150; y < 170; ++y)
+    for (int x = 296; x < 300; ++x) image.depth(x, y) = 0;  // the projector's shadow
+  const RgbdFeatures f = make(
+      corners_at({{298, 100}, {297, 160}, {300, 100}, {302, 100}, {295, 100}, {320, 100}, {290, 160}}), image, camera);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(f.keypoints[i].depth, 0) << i;
+    EXPECT_EQ(f.keypoints[i].lent_depth, 2.0F) << i;
+  }
+  for (size_t i = 3; i < 7; ++i) {
+    EXPECT_EQ(f.keypoints[i].depth, i == 3 || i == 5 ? 2.0F : 2.4F) << i;
+    EXPECT_EQ(f.keypoints[i].lent_depth, 0) << i;
+  }
+  image.depth = DepthImage(camera.width, camera.height, 2.4F);
+  image.depth(300, 100) = image.depth(301, 100) = 2.0F;  // two pixels are no surface
+  EXPECT_EQ(make(corners_at({{298, 100}}), image, camera).keypoints[0].lent_depth, 0);
+}
+
+// A floor that the camera looks along falls away fast, but is one surface.
+TEST(RgbdFeatures, AFloorSeenAtAFlatAngleIsOneSurface) {
+  const CameraModel camera = plain_camera();
+  RgbdImage image = image_of(camera, 2);
+  image.depth = plane_depth(camera, {0, 1, 0}, 1.0);
+  for (int y = 400; y < 470; y += 10)  // 2.0 to 3.1 m
+    EXPECT_NEAR(make(corners_at({{200, static_cast<float>(y)}}), image, camera).keypoints[0].depth, 500.0 / (y - 240),
+                0.001)
+        << y;
 }
 
 TEST(RgbdFeatures, UndistortionByTableIsThatOfTheCamera) {
@@ -236,12 +271,6 @@ TEST(RgbdFeatures, NothingFoundIsNoError) {
   const RgbdFeatures f = make({}, image_of(camera, 2), camera);
   EXPECT_EQ(f.size(), 0U);
   f.grid.for_each_near(100, 100, 50, [](int) { FAIL(); });
-}
-
-TEST(DepthOptions, AreChecked) {
-  DepthOptions options;
-  options.edge_fraction = 0;
-  EXPECT_THROW(options.check(), InvalidOption);
 }
 
 }  // namespace

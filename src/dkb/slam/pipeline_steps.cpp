@@ -180,7 +180,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   const Frame& frame = scene.extracted.frame;
   const RgbdImage& image = *frame.image();
   camera_at_readout_.readout = readout_.readout();
-  ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.depth);
+  ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
   ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
   TrackedFrame tracked = tracker_.track({.index = next_frame_,

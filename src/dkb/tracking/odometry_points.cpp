@@ -43,6 +43,13 @@ double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vec
   return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
 }
 
+double OdometryPoints::parallax_sigma(const OdometryMatch& guessed, const Rigid3& last_cam_from_world,
+                                      const Rigid3& cam_from_world) const {
+  const double depth = (last_cam_from_world * guessed.point_in_world).z();
+  const double step = (centre_in_world(cam_from_world) - centre_in_world(last_cam_from_world)).norm();
+  return camera_.fx * step / (std::sqrt(3.0) * depth);
+}
+
 bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
                                const Matrix6d& covariance) const {
   const SightRay ray = transformed(cam_from_world, match.first);
@@ -81,7 +88,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
     Point p;
     p.feature = static_cast<int>(f);
     p.guessed = !(k.depth > 0) && (!before || before->guessed);
-    const float depth = k.depth > 0 ? k.depth : depth_around(frame, k);
+    const float depth = k.depth > 0 ? k.depth : k.lent_depth > 0 ? k.lent_depth : depth_around(frame, k);
     if (!(depth > 0) || depth > max_depth_) continue;
     p.point_in_cam = before && !before->guessed ? frame.cam_from_world * before->point_in_world
                                                 : camera_.unproject(k.pixel.cast<double>(), depth);

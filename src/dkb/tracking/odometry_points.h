@@ -27,6 +27,11 @@ class OdometryPoints {
   std::vector<Candidate> candidates(const TrackedFrame& frame) const;
   // Candidate `i`, shown by a feature of the frame after.
   OdometryMatch match(size_t i, const TrackedFrame& frame) const;
+  // [px] standard deviation of where a guessed point lies in an image, since its depth is one: from the last frame's
+  // pose, in which the guess was made, to that of the image. It may as well be twice as near or far away; an inverse
+  // depth that is even from 0 to twice the guess has a standard deviation of the guess over sqrt(3).
+  double parallax_sigma(const OdometryMatch& guessed, const Rigid3& last_cam_from_world,
+                        const Rigid3& cam_from_world) const;
   // Whether a guessed point has moved when `keypoint` shows it from a pose of that covariance (as TrackedFrame has it):
   // no place on the ray of its first sighting is seen there.
   bool has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,

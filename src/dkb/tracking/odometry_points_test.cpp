@@ -51,6 +51,31 @@ TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
   EXPECT_NEAR(candidates[0].position.z(), 1.5, 1e-6);  // 2 / (1/1 + 1/3)
 }
 
+TEST(OdometryPoints, ASurfaceBesideLendsItsDepthBeforeTheSurroundingsDo) {
+  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
+  TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 3}});
+  RgbdFeatures lent = *frame.features;
+  lent.keypoints[0].lent_depth = 2;
+  frame.features = std::make_shared<const RgbdFeatures>(std::move(lent));
+  points.remember(frame);
+  const auto candidates = points.candidates(frame);
+  ASSERT_EQ(candidates.size(), 2u);
+  EXPECT_TRUE(points.match(0, frame).guessed);
+  EXPECT_NEAR(candidates[0].position.z(), 2, 1e-6);
+}
+
+TEST(OdometryPoints, AGuessedDepthIsWorthTheLessTheFartherTheCameraWent) {
+  CameraModel camera;
+  camera.fx = 500;
+  OdometryPoints points(camera, SensorNoise(), 1.2, 4.0);
+  const Rigid3 last(Eigen::Quaterniond::Identity(), {0, 0, 1});  // the world's origin lies 1 m before it
+  const Rigid3 now(rotation_from_vector({0, 0.1, 0}) * last.rotation,
+                   rotation_from_vector({0, 0.1, 0}) * Eigen::Vector3d(0.03, 0.04, 1));
+  const OdometryMatch guessed{{0.2, 0, 1}, true};
+  EXPECT_NEAR(points.parallax_sigma(guessed, last, now), 500 * 0.05 / (std::sqrt(3.0) * 2), 1e-9);
+  EXPECT_EQ(points.parallax_sigma(guessed, last, last), 0);
+}
+
 TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
   OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 1}, {200, 80, 1}, {300, 80, 1}, {400, 80, 5}, {500, 80, 1}});

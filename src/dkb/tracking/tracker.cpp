@@ -14,7 +14,7 @@ constexpr double kEstablishedAfter = 0.65;   // [s] since its birth that a point
 constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map points is renewed at least so often
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
-constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth
+constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth, which err together
 constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, which is exact by definition
 constexpr double kGoOnAfter = 0.1;           // [s] without a pose by the images: more than a blurred one or two
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
@@ -113,8 +113,12 @@ void Tracker::reset_motion() {
   state_ = map_.view().keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
 }
 
-Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match) const {
-  return {feature, match.point_in_world, kOdometryFactor * (match.guessed ? kGuessFactor : 1.0), !match.guessed};
+Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const {
+  Pair pair{feature, match.point_in_world, kOdometryFactor, !match.guessed};
+  if (!match.guessed) return pair;
+  pair.sigma_factor *= kGuessFactor;
+  pair.parallax_sigma = odometry_.parallax_sigma(match, last_->cam_from_world, cam_from_world);
+  return pair;
 }
 
 PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
@@ -124,7 +128,7 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   for (const Pair& pair : pairs) {
     PoseObservation o = pose_observation(features.keypoints[static_cast<size_t>(pair.feature)], pair.point_in_world,
                                          noise_, scale_factor_);
-    o.pixel_sigma *= pair.sigma_factor;
+    o.pixel_sigma = std::hypot(o.pixel_sigma * pair.sigma_factor, pair.parallax_sigma);
     o.depth_sigma *= pair.sigma_factor;
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
@@ -224,7 +228,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
                                              &taken, nullptr)) {
       auto& shown = followed[static_cast<size_t>(m.feature)];
       shown = odometry_.match(static_cast<size_t>(m.candidate), *last_);
-      if (!shown->moves) pairs.push_back(odometry_pair(m.feature, *shown));
+      if (!shown->moves) pairs.push_back(odometry_pair(m.feature, *shown, initial));
     }
   }
   const PoseEstimate pose = refine(initial, pairs, features, frame.predicted);
@@ -307,7 +311,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
     }
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (frame.odometry[f] && !frame.odometry[f]->moves)
-      pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f]));
+      pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f], frame.cam_from_world));
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
   if (!pose.ok) return;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});

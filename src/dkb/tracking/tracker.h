@@ -92,8 +92,9 @@ class Tracker {
     Eigen::Vector3d point_in_world;
     double sigma_factor = 1;
     bool use_depth = true;
+    double parallax_sigma = 0;  // [px] by not knowing the depth
   };
-  Pair odometry_pair(int feature, const OdometryMatch& match) const;
+  Pair odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
                       const std::optional<PosePrediction>& expected = {}) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
