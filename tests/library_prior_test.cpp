@@ -78,6 +78,26 @@ TEST_F(LibraryPriors, WhatAPriorWasOffByIsTheMapsBusinessAndNotOdometrys) {
   EXPECT_LT(largest_step, 2 * world.camera_x(1));
 }
 
+// Many a driver leaves its covariance at zero.
+TEST_F(LibraryPriors, ACovarianceOfZeroIsNoTrouble) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 60; ++i) {
+    Frame frame = world.frame(i, {.shift = i});
+    if (i > 0) {
+      MotionPrior prior;
+      prior.previous_from_current.translation.x() = world.camera_x(1);
+      prior.covariance.setZero();
+      frame.set_prior(prior);
+    }
+    const FrameResult r = slam.process(frame);
+    ASSERT_TRUE(r.tracked()) << i;
+    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), world.camera_x(1)) << i;
+  }
+  slam.finish();
+  ASSERT_EQ(slam.trajectory().size(), 60U);
+  EXPECT_NEAR(slam.trajectory().back().world_from_cam.translation.x(), world.camera_x(59), world.camera_x(1));
+}
+
 TEST_F(LibraryPriors, WhereTheMapWasLeftInTheDarkItGoesOnFromThere) {
   Slam slam(world.camera(), Options(), Detectors::none());
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(slam.process(driven(i, {.shift = i}, i > 0)).tracked());

@@ -203,6 +203,8 @@ TEST_F(FrameTest, PriorsThatAreNoMotionAreRefused) {
   refused([&](auto& p) { p.previous_from_current.translation.x() = infinity; }, "motion prior: one of its numbers");
   refused([&](auto& p) { p.covariance(2, 3) = nan; }, "motion prior: one of its numbers");
   refused([&](auto& p) { p.previous_from_current.rotation.coeffs() *= 1.1; }, "motion prior: its rotation");
+  refused([&](auto& p) { p.covariance(1, 1) = -0.1; }, "motion prior: its covariance");
+  refused([&](auto& p) { p.covariance(0, 3) = p.covariance(3, 0) = 1.5; }, "motion prior: its covariance");
   Frame frame(camera, input());
   frame.set_prior(MotionPrior());
   EXPECT_TRUE(frame.prior());

@@ -65,8 +65,8 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
     // Where no point ties two keyframes, what the camera did between them is all that does: their pose in the map holds
     // as firmly as that motion was known.
     if (previous >= 0)
-      graph.edges.push_back({node[static_cast<size_t>(id)], previous, relative(id, k.motion->previous),
-                             k.motion->since.covariance.inverse()});
+      graph.edges.push_back(
+          {node[static_cast<size_t>(id)], previous, relative(id, k.motion->previous), k.motion->information()});
     const int shared = k.parent != kNoKeyframe ? shared_points(k, k.parent) : 0;
     if (k.parent != kNoKeyframe && (shared > 0 || previous < 0)) add(k.parent, id, relative(k.parent, id), shared);
     for (const Covisible& c : k.covisible)

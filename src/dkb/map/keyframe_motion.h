@@ -11,6 +11,13 @@ namespace dkb {
 struct KeyframeMotion {
   KeyframeId previous = kNoKeyframe;
   MotionPrior since;
+
+  // The inverse covariance. Nobody knows a motion better than to a micrometre and a microradian, whatever is claimed.
+  Matrix6d information() const {
+    Matrix6d covariance = since.covariance;
+    covariance.diagonal().array() += 1e-12 + 1e-11 * covariance.trace();
+    return covariance.inverse();
+  }
 };
 
 }  // namespace dkb

@@ -21,8 +21,8 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
     const auto& motion = map.keyframe(window.keyframes[c])->motion;
     const int previous = motion ? camera_of[static_cast<size_t>(motion->previous)] : -1;
     if (previous >= 0 && !(problem.fixed[c] && problem.fixed[static_cast<size_t>(previous)]))
-      problem.motions.push_back({static_cast<int>(c), previous, motion->since.previous_from_current,
-                                 motion->since.covariance.inverse(), true});
+      problem.motions.push_back(
+          {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), true});
   }
 
   std::vector<double> inv_sigma = noise.corner_sigmas(scale_factor);
