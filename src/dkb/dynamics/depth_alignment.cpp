@@ -21,30 +21,45 @@ constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
 
-// What the noise of the normals adds to the information. A normal n is off across itself, so that the row [n, p x n] of
-// a cell at p is off by A (I - n n^T) A^T times the variance of the slope, with A = [I, [p]x].
-class NormalNoise {
+// What the cells say: each a row [n, p x n] of the Jacobian and its distance. Summed in rows of eight floats, which are
+// whole registers.
+class PlaneSums {
  public:
-  void add(double weighted_variance, const Eigen::Vector3d& p, const Vector6d& row) {
-    sum_ += weighted_variance;
-    point_ += weighted_variance * p;
-    square_.noalias() += weighted_variance * p * p.transpose();
-    along_.noalias() += weighted_variance * row * row.transpose();
+  // `weighted_slope`: the cell's weight times the variance of its normal's slope.
+  void add(const Eigen::Vector3f& normal, const Eigen::Vector3f& point, float distance, float weight,
+           float weighted_slope) {
+    const Eigen::Vector3f lever = point.cross(normal);
+    Row row;
+    row << normal[0], normal[1], normal[2], lever[0], lever[1], lever[2], distance, 0;
+    const Eigen::Vector4f place(point[0], point[1], point[2], 1);
+    squares_.noalias() += weight * row * row.transpose();
+    along_.noalias() += weighted_slope * row * row.transpose();
+    places_.noalias() += weighted_slope * place * place.transpose();
+    ++cells_;
   }
-  Matrix6d information() const {
+  size_t cells() const { return cells_; }
+  Matrix6d information() const { return squares_.topLeftCorner<6, 6>().cast<double>(); }
+  Vector6d gradient() const { return squares_.col(6).head<6>().cast<double>(); }
+  // What the noise of the normals adds to the information. A normal n is off across itself, so that the row of a cell
+  // at p is off by A (I - n n^T) A^T times the variance of the slope, with A = [I, [p]x].
+  Matrix6d noise() const {
+    const Eigen::Matrix4d places = places_.cast<double>();
+    const Eigen::Matrix3d point = skew(places.col(3).head<3>()), square = places.topLeftCorner<3, 3>();
     Matrix6d all;
-    all.topLeftCorner<3, 3>() = sum_ * Eigen::Matrix3d::Identity();
-    all.bottomLeftCorner<3, 3>() = skew(point_);
-    all.topRightCorner<3, 3>() = -skew(point_);
-    all.bottomRightCorner<3, 3>() = square_.trace() * Eigen::Matrix3d::Identity() - square_;
-    return all - along_;
+    all.topLeftCorner<3, 3>() = places(3, 3) * Eigen::Matrix3d::Identity();
+    all.bottomLeftCorner<3, 3>() = point;
+    all.topRightCorner<3, 3>() = -point;
+    all.bottomRightCorner<3, 3>() = square.trace() * Eigen::Matrix3d::Identity() - square;
+    return all - along_.topLeftCorner<6, 6>().cast<double>();
   }
 
  private:
-  double sum_ = 0;
-  Eigen::Vector3d point_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d square_ = Eigen::Matrix3d::Zero();
-  Matrix6d along_ = Matrix6d::Zero();
+  using Row = Eigen::Matrix<float, 8, 1>;
+
+  size_t cells_ = 0;
+  Eigen::Matrix<float, 8, 8> squares_ = Eigen::Matrix<float, 8, 8>::Zero();
+  Eigen::Matrix<float, 8, 8> along_ = Eigen::Matrix<float, 8, 8>::Zero();
+  Eigen::Matrix4f places_ = Eigen::Matrix4f::Zero();
 };
 
 // Takes the part of noise out of the information. A direction of which more than half is noise is left to the
@@ -106,16 +121,14 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
   covariance.diagonal().array() += kExact * kExact;
   const Matrix6d prior = covariance.inverse();
   const Rigid3 here_from_there_expected = expected.previous_from_current.inverse();
+  const auto spacings_per_unit = static_cast<float>(focal_ / (kReach * rays.cell()));  // of a plane one unit away
   Rigid3 pose = expected.previous_from_current;
   Matrix6d information;
   double doubt = 1;  // share of the expectation's variance that the robust cost still allows for
   for (int iteration = 0; iteration < kIterations; ++iteration, doubt *= kDoubtLeft) {
     const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
     const Eigen::Vector3f translation = pose.translation.cast<float>();
-    information.setZero();
-    Vector6d gradient = Vector6d::Zero();
-    size_t cells = 0;
-    NormalNoise noise;
+    PlaneSums sums;
     for (int y = kStride / 2; y < rays.height(); y += kStride)
       for (int x = kStride / 2; x < rays.width(); x += kStride) {
         const float depth = here.depth(x, y);
@@ -131,25 +144,21 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
         if (normal.isZero()) continue;
         const float z = there.depth(u, v);
         const float distance = normal.dot(point - z * rays.ray(u, v));
-        Eigen::Matrix<float, 6, 1> jacobian;
-        jacobian << normal, point.cross(normal);
         const auto sigma = static_cast<float>(noise_.flat_depth_sigma(z));
         const float variance = 2 * sigma * sigma;
         const float allowed = variance + static_cast<float>(doubt) *
-                                             (position_variance + rotation_variance * jacobian.tail<3>().squaredNorm());
+                                             (position_variance + rotation_variance * point.cross(normal).squaredNorm());
         const float share = distance * distance / (static_cast<float>(kTukey * kTukey) * allowed);
         if (share >= 1) continue;
         const float weight = (1 - share) * (1 - share) / (static_cast<float>(kTogether) * variance);
-        const Vector6d row = jacobian.cast<double>();
-        information.noalias() += static_cast<double>(weight) * row * row.transpose();
-        gradient += static_cast<double>(weight * distance) * row;
-        ++cells;
         // The slope of a plane through nine depths, three each at -1, 0 and 1 spacings: of six squares in all.
-        const double slope = sigma / (z * kReach * rays.cell() / focal_);
-        noise.add(static_cast<double>(weight) * slope * slope / 6, point.cast<double>(), row);
+        const float slope = sigma / z * spacings_per_unit;
+        sums.add(normal, point, distance, weight, weight * slope * slope / 6);
       }
-    if (cells < kEnoughCells) return std::nullopt;
-    keep_what_is_known(covariance, noise.information(), &information, &gradient);
+    if (sums.cells() < kEnoughCells) return std::nullopt;
+    information = sums.information();
+    Vector6d gradient = sums.gradient();
+    keep_what_is_known(covariance, sums.noise(), &information, &gradient);
     information += prior;
     gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
     const Vector6d step = -information.ldlt().solve(gradient);
