@@ -55,4 +55,15 @@ void erode(MoverMask& mask, int radius) {
   invert();
 }
 
+bool is_on(const MoverMask& mask, const Eigen::Vector2f& corner, const CornerDepths& depths) {
+  if (mask.at(corner.x(), corner.y())) return true;
+  constexpr auto reach = static_cast<float>(CornerDepths::kReach);
+  bool beside = false;
+  for (const float v : {-reach, 0.0f, reach})
+    for (const float u : {-reach, 0.0f, reach}) beside = beside || mask.at(corner.x() + u, corner.y() + v);
+  if (!beside) return false;
+  const CornerDepths::Depth depth = depths.at(corner.x(), corner.y());
+  return depth.lent > 0 && mask.at(static_cast<float>(depth.lender.x()), static_cast<float>(depth.lender.y()));
+}
+
 }  // namespace dkb

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "dkb/features/rgbd_features.h"
 #include "dkb/image/image.h"
 
 namespace dkb {
@@ -12,5 +13,9 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height);
 void dilate(MoverMask& mask, int radius);
 // Shrinks it likewise; what lies outside the image counts as marked.
 void erode(MoverMask& mask, int radius);
+
+// Whether a corner [px] is on what is marked. One without a depth of its own is where the surface is that lends it one:
+// the outline of a mover shows in the colour image a pixel or two beside its depth.
+bool is_on(const MoverMask& mask, const Eigen::Vector2f& corner, const CornerDepths& depths);
 
 }  // namespace dkb

@@ -95,5 +95,33 @@ TEST(MoverMask, ErosionUndoesDilationAndTakesWhatIsOutsideForMarked) {
   EXPECT_EQ(marked(corner), 1);
 }
 
+// Somebody at 2 m before a wall at 3 m, whose depth begins at x = 100 and whose outline shows at 98.
+TEST(MoverMask, ACornerWithoutDepthOfItsOwnIsOnTheSurfaceThatLendsItOne) {
+  CameraModel camera;
+  camera.fx = camera.fy = 525;
+  camera.cx = 79.5;
+  camera.cy = 59.5;
+  camera.width = 160;
+  camera.height = 120;
+  DepthImage depth(camera.width, camera.height, 3.0f);
+  MoverMask mask{4, Image<uint8_t>(40, 30)};
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 100; x < camera.width; ++x) {
+      depth(x, y) = 2;
+      mask.cells(x / 4, y / 4) = 255;
+    }
+  const SensorNoise noise;
+  const CornerDepths depths(depth, camera, noise);
+  EXPECT_TRUE(is_on(mask, {102, 60}, depths));
+  EXPECT_TRUE(is_on(mask, {98, 60}, depths));
+  EXPECT_FALSE(is_on(mask, {94, 60}, depths));  // the wall's own
+  // Where the wall is what is marked, somebody's outline is not.
+  for (size_t i = 0; i < mask.cells.size(); ++i) mask.cells.data()[i] = mask.cells.data()[i] != 0 ? 0 : 255;
+  EXPECT_FALSE(is_on(mask, {101, 60}, depths));
+  for (int y = 0; y < camera.height; ++y) depth(101, y) = depth(100, y) = 0;  // his rim
+  EXPECT_FALSE(is_on(mask, {101, 60}, depths));
+  EXPECT_FALSE(is_on(MoverMask(), {101, 60}, depths));
+}
+
 }  // namespace
 }  // namespace dkb

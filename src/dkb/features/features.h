@@ -42,10 +42,11 @@ inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
 
 // A corner as the extractor finds it, in pixels of the full-resolution image (as read, distorted).
 struct Corner {
-  float x = 0, y = 0;  // [px] sub-pixel position
-  float angle = 0;     // [rad] orientation in [0, 2 pi)
-  float response = 0;  // corner strength, larger is better
-  uint8_t octave = 0;  // pyramid level it was found on; its noise grows with the level's scale
+  float x = 0, y = 0;     // [px] sub-pixel position
+  float angle = 0;        // [rad] orientation in [0, 2 pi)
+  float response = 0;     // corner strength, larger is better
+  uint8_t octave = 0;     // pyramid level it was found on; its noise grows with the level's scale
+  float place_sigma = 0;  // [px] standard deviation along the direction in which the image tells its place least
 };
 
 struct OrbFeatures {

@@ -121,6 +121,7 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
           options_.subpixel ? refine_corner(pixels, pixel.x, pixel.y, simd_) : SubpixelOffset{};
       corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x + offset.x));
       corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y + offset.y));
+      corner.place_sigma = offset.sigma * static_cast<float>(pyramid_.scale_x(level));
       corner.response = pixel.score;
       corner.octave = static_cast<uint8_t>(level);
       features.corners.push_back(corner);

@@ -43,69 +43,52 @@ float median_around(const DepthImage& depth, int x, int y, float limit) {
   return n % 2 == 1 ? values[n / 2] : 0.5f * (values[n / 2 - 1] + values[n / 2]);
 }
 
-// Reads the depth of corners.
-class CornerDepths {
- public:
-  CornerDepths(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise)
-      : depth_(depth), focal_(camera.fx), noise_(noise) {}
-
-  struct Depth {
-    float own = 0, lent = 0;  // [m] one of the two at most
-  };
-  Depth at(float x, float y) const {
-    const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
-    if (cx < kReach || cy < kReach || cx >= depth_.width() - kReach || cy >= depth_.height() - kReach) return {};
-    const float nearest = nearest_around(cx, cy);
-    if (nearest == kFar) return {};
-    const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
-    const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
-    if (centre > 0 && centre <= limit)
-      if (const float median = median_around(depth_, cx, cy, limit + jump(1)); median > 0) return {median, 0};
-    return {0, nearest_pixel(cx, cy, limit)};
-  }
-
- private:
-  // [px] FAST looks at a circle of 3, and the outlines of a structured-light sensor wander by about one.
-  static constexpr int kReach = 4;
-  static constexpr int kAcross = 2 * kReach + 1;
-  static constexpr int kSurface = 4;  // [px] fewer are no surface but noise
-  static constexpr float kFar = std::numeric_limits<float>::infinity();
-
-  float nearest_around(int cx, int cy) const {
-    float nearest[kAcross];  // by column, so that a row is taken at once
-    std::fill_n(nearest, kAcross, kFar);
-    for (int y = cy - kReach; y <= cy + kReach; ++y) {
-      const float* row = &depth_(cx - kReach, y);
-      for (int k = 0; k < kAcross; ++k) {
-        const float d = row[k] > 0 ? row[k] : kFar;
-        nearest[k] = d < nearest[k] ? d : nearest[k];
-      }
-    }
-    return *std::min_element(nearest, nearest + kAcross);
-  }
-
-  // The depth, up to `limit`, that lies nearest in the image.
-  float nearest_pixel(int cx, int cy, float limit) const {
-    int least = std::numeric_limits<int>::max(), count = 0;
-    float found = 0;
-    for (int v = -kReach; v <= kReach; ++v)
-      for (int u = -kReach; u <= kReach; ++u) {
-        const float d = depth_(cx + u, cy + v);
-        if (!(d > 0) || d > limit) continue;
-        ++count;
-        if (u * u + v * v >= least) continue;
-        least = u * u + v * v;
-        found = d;
-      }
-    return count >= kSurface ? found : 0;
-  }
-
-  const DepthImage& depth_;
-  const double focal_;
-  const SensorNoise& noise_;
-};
+constexpr int kAcross = 2 * CornerDepths::kReach + 1;
+constexpr int kSurface = 4;  // [px] fewer are no surface but noise
+constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
+
+CornerDepths::Depth CornerDepths::at(float x, float y) const {
+  const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
+  if (cx < kReach || cy < kReach || cx >= depth_.width() - kReach || cy >= depth_.height() - kReach) return {};
+  const float nearest = nearest_around(cx, cy);
+  if (nearest == kFar) return {};
+  const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
+  const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
+  if (centre > 0 && centre <= limit)
+    if (const float median = median_around(depth_, cx, cy, limit + jump(1)); median > 0) return {median, 0, {}};
+  return nearest_pixel(cx, cy, limit);
+}
+
+float CornerDepths::nearest_around(int cx, int cy) const {
+  float nearest[kAcross];  // by column, so that a row is taken at once
+  std::fill_n(nearest, kAcross, kFar);
+  for (int y = cy - kReach; y <= cy + kReach; ++y) {
+    const float* row = &depth_(cx - kReach, y);
+    for (int k = 0; k < kAcross; ++k) {
+      const float d = row[k] > 0 ? row[k] : kFar;
+      nearest[k] = d < nearest[k] ? d : nearest[k];
+    }
+  }
+  return *std::min_element(nearest, nearest + kAcross);
+}
+
+// The depth, up to `limit`, that lies nearest in the image.
+CornerDepths::Depth CornerDepths::nearest_pixel(int cx, int cy, float limit) const {
+  int least = std::numeric_limits<int>::max(), count = 0;
+  Depth found;
+  for (int v = -kReach; v <= kReach; ++v)
+    for (int u = -kReach; u <= kReach; ++u) {
+      const float d = depth_(cx + u, cy + v);
+      if (!(d > 0) || d > limit) continue;
+      ++count;
+      if (u * u + v * v >= least) continue;
+      least = u * u + v * v;
+      found = {0, d, {cx + u, cy + v}};
+    }
+  return count >= kSurface ? found : Depth();
+}
 
 UndistortionTable::UndistortionTable(const CameraModel& camera) {
   if (!camera.distorted()) return;
@@ -152,6 +135,7 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
     k.pixel = undistort(c.x, c.y);
     k.angle = c.angle;
     k.response = c.response;
+    k.place_sigma = c.place_sigma;
     k.octave = c.octave;
     const CornerDepths::Depth depth = depths.at(c.x, c.y);
     k.depth = depth.own;

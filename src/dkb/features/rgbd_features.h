@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "dkb/features/features.h"
@@ -20,6 +21,7 @@ struct Keypoint {
   float lent_depth = 0;  // [m] of the nearest surface around one of unknown depth, 0 = none; map files leave it out
   float angle = 0;       // [rad]
   float response = 0;
+  float place_sigma = 0;  // [px] see Corner; map files leave it out
   uint8_t octave = 0;
   Rgb colour;
 };
@@ -32,6 +34,16 @@ struct RgbdFeatures {
   int width = 0, height = 0;            // [px] of the image
   size_t size() const { return keypoints.size(); }
 };
+
+// Standard deviation [px, full resolution] of where a feature lies: what corners of its level vary by, and what the
+// image's noise leaves of its own.
+inline double corner_sigma(const Keypoint& keypoint, const SensorNoise& noise, double scale_factor) {
+  return std::hypot(noise.corner_sigma(keypoint.octave, scale_factor), static_cast<double>(keypoint.place_sigma));
+}
+// The same with SensorNoise::corner_sigmas(), for many.
+inline double corner_sigma(const Keypoint& keypoint, const std::vector<double>& by_octave) {
+  return std::hypot(by_octave[keypoint.octave], static_cast<double>(keypoint.place_sigma));
+}
 
 struct DepthOptions {
   bool model_time_offset = true;      // move depths to the colour image's time with the camera's motion
@@ -54,10 +66,34 @@ class UndistortionTable {
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node
 };
 
-// Corners with depth and colour, as a camera that stands still has them. A corner beside a depth step has no depth of
-// its own: the step lies a pixel or two from where the image shows it, so that half of the corners on a plant had the
-// depth of the wall behind. The nearer surface lends it one, since the outline that made the corner is most likely its
-// own.
+// Reads the depth of corners. A corner beside a depth step has no depth of its own: the step lies a pixel or two from
+// where the image shows it, so that half of the corners on a plant had the depth of the wall behind. The nearer surface
+// lends it one, since the outline that made the corner is most likely its own.
+class CornerDepths {
+ public:
+  // `depth` must outlive it.
+  CornerDepths(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise)
+      : depth_(depth), focal_(camera.fx), noise_(noise) {}
+
+  struct Depth {
+    float own = 0, lent = 0;                           // [m] one of the two at most
+    Eigen::Vector2i lender = Eigen::Vector2i::Zero();  // [px] where it was lent from
+  };
+  Depth at(float x, float y) const;
+
+  // [px] FAST looks at a circle of 3, and the outlines of a structured-light sensor wander by about one.
+  static constexpr int kReach = 4;
+
+ private:
+  float nearest_around(int cx, int cy) const;
+  Depth nearest_pixel(int cx, int cy, float limit) const;
+
+  const DepthImage& depth_;
+  const double focal_;
+  const SensorNoise& noise_;
+};
+
+// Corners with depth and colour, as a camera that stands still has them.
 std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
                                         const UndistortionTable& undistort, const CameraModel& camera,
                                         const SensorNoise& noise);

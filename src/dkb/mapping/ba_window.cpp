@@ -25,8 +25,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
           {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), true});
   }
 
-  std::vector<double> inv_sigma = noise.corner_sigmas(scale_factor);
-  for (double& s : inv_sigma) s = 1.0 / s;
+  const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
   window.points = std::move(points);
   for (size_t p = 0; p < window.points.size(); ++p) {
     const MapPoint& point = *map.point(window.points[p]);
@@ -40,7 +39,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
       observation.point = static_cast<int>(p);
       observation.u = k.pixel.x();
       observation.v = k.pixel.y();
-      observation.inv_sigma = inv_sigma[k.octave];
+      observation.inv_sigma = 1 / corner_sigma(k, sigmas);
       observation.depth = k.depth;
       if (k.depth > 0) observation.inv_depth_sigma = 1.0 / noise.depth_sigma(k.depth);
       problem.observations.push_back(observation);

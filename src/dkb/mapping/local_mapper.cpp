@@ -184,7 +184,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     const Keypoint& kp = features->keypoints[static_cast<size_t>(m.feature)];
     const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
     const Eigen::Vector3d in_cam = cam_from_world * p->position;
-    const double sigma = noise_.corner_sigma(kp.octave, scale_factor_);
+    const double sigma = corner_sigma(kp, noise_, scale_factor_);
     if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
         5.991 * tolerance * tolerance * sigma * sigma)
       continue;

@@ -38,7 +38,7 @@ std::vector<FreeFeature> free_features(const Keyframe& keyframe, double chi2, co
   for (size_t f = 0; f < keyframe.points.size(); ++f) {
     if (keyframe.points[f] != kNoPoint) continue;
     const Keypoint& k = keyframe.features->keypoints[f];
-    const double sigma = sigmas[static_cast<size_t>(k.octave)];
+    const double sigma = corner_sigma(k, sigmas);
     free.push_back({static_cast<int>(f), k.pixel.x(), k.pixel.y(), chi2 * sigma * sigma});
   }
   return free;
@@ -107,7 +107,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
-        const double sigma = sigmas[static_cast<size_t>(k.octave)];
+        const double sigma = corner_sigma(k, sigmas);
         if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * sigma * sigma) return false;
         return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < noise.point_tolerance(k.depth);
       };

@@ -37,7 +37,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     const Eigen::Vector2d flow = jacobian * velocity;
     const Eigen::Vector2d late = flow * (k.image_pixel.y() / camera_.height - 0.5);
     const Eigen::Vector2d error = k.pixel.cast<double>() - camera_.project(p);
-    const double sigma = noise_.corner_sigma(k.octave, scale_factor_), weight = 1 / (sigma * sigma);
+    const double sigma = corner_sigma(k, noise_, scale_factor_), weight = 1 / (sigma * sigma);
     pose_pose += weight * jacobian.transpose() * jacobian;
     pose_readout += weight * jacobian.transpose() * late;
     pose_gradient += weight * jacobian.transpose() * error;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dkb/detection/mask_folder.h"
+#include "dkb/dynamics/mover_mask.h"
 #include "dkb/util/thrown.h"
 
 namespace dkb {
@@ -176,8 +177,9 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
     scene.mask = mask_of(image, unmasked, given, moving);
+    const CornerDepths depths(image.depth, camera_, noise_);
     for (size_t i = 0; i < corners.size(); ++i)
-      if (scene.mask.at(corners[i].x, corners[i].y)) scene.rejected[i] = FeatureReason::on_mover;
+      if (is_on(scene.mask, {corners[i].x, corners[i].y}, depths)) scene.rejected[i] = FeatureReason::on_mover;
   }
   times_.add("filter", watch.ms());
   if (pyramid) remember(scene.extracted, std::move(pyramid));

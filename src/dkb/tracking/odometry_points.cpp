@@ -38,7 +38,7 @@ OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
 // [px^2] mean over both directions in the image, of a corner and of where a pose puts its point.
 double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
                                       const Matrix6d& covariance) const {
-  const double sigma = noise_.corner_sigma(keypoint.octave, scale_factor_);
+  const double sigma = corner_sigma(keypoint, noise_, scale_factor_);
   const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(camera_, point_in_cam);
   return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
 }

@@ -84,12 +84,32 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
   if (!coarse) return std::nullopt;
   proposal.cam_from_world = *coarse;
-  std::vector<Candidate> nearby = local_map_candidates(proposal.points, map);
-  std::erase_if(nearby, [&](const Candidate& c) { return ignores(c.id); });
+  const std::vector<Candidate> nearby = map_around(map, proposal.points, ignores);
   if (!search(nearby, kRadius, features, proposal)) return std::nullopt;
   if (!search(nearby, kRadiusFine, features, proposal)) return std::nullopt;
   verify(map, nearby, features, appearance, proposal);
   return proposal;
+}
+
+std::optional<PoseProposal> Relocaliser::propose_at(const Map& map, KeyframeId keyframe,
+                                                    const Rigid3& expected_cam_from_world, double radius,
+                                                    const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                                    PointAppearance* appearance) const {
+  PoseProposal proposal;
+  proposal.keyframe = keyframe;
+  proposal.cam_from_world = expected_cam_from_world;
+  const std::vector<Candidate> nearby = map_around(map, map.keyframe(keyframe)->points, ignores);
+  for (const float r : {static_cast<float>(radius), kRadius, kRadiusFine})
+    if (r <= radius && !search(nearby, r, features, proposal)) return std::nullopt;
+  verify(map, nearby, features, appearance, proposal);
+  return proposal;
+}
+
+std::vector<Candidate> Relocaliser::map_around(const Map& map, const std::vector<PointId>& points,
+                                               const IgnoresPoint& ignores) const {
+  std::vector<Candidate> nearby = local_map_candidates(points, map);
+  std::erase_if(nearby, [&](const Candidate& c) { return ignores(c.id); });
+  return nearby;
 }
 
 // By descriptors alone.

@@ -51,7 +51,15 @@ class Relocaliser {
   std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                            const IgnoresPoint& ignores, PointAppearance* appearance) const;
 
+  // The pose near an expected one, among what this keyframe and those around it see, verified or not: points are sought
+  // within `radius` [px] of where they are expected.
+  std::optional<PoseProposal> propose_at(const Map& map, KeyframeId keyframe, const Rigid3& expected_cam_from_world,
+                                         double radius, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                         PointAppearance* appearance) const;
+
  private:
+  std::vector<Candidate> map_around(const Map& map, const std::vector<PointId>& points,
+                                    const IgnoresPoint& ignores) const;
   std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                     const IgnoresPoint& ignores, std::vector<PointId>& points) const;
   bool search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,

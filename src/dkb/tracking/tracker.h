@@ -106,6 +106,7 @@ class Tracker {
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
   void forget_velocity();
+  double spread_px(const Matrix6d& covariance) const;
   double search_radius(double radius) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features,
                                         PointAppearance* appearance) const;

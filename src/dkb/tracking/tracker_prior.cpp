@@ -93,13 +93,16 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, cons
   last_->state = frame.state;
 }
 
-// [px] around where a point is expected, three standard deviations beyond what tracking takes: of a point 1 m away,
-// nearer than most.
+// [px] around where a point is expected.
 double Tracker::search_radius(double radius) const {
   if (!last_ || last_->state != TrackingState::predicted) return radius;
-  const auto sd = last_->covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const double pixels = camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
-  return std::min(kMaxSearchRadius, radius + 3 * pixels);
+  return std::min(kMaxSearchRadius, radius + spread_px(last_->covariance));
+}
+
+// [px] three standard deviations of where a pose of that covariance puts a point 1 m away, nearer than most.
+double Tracker::spread_px(const Matrix6d& covariance) const {
+  const auto sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  return 3 * camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.
@@ -118,10 +121,20 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected, c
   }
   std::sort(nearby.begin(), nearby.end());
   if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
+  const auto ignores = [this](PointId point) { return is_retracted(point); };
+  const auto right = [&](const std::optional<PoseProposal>& found) {
+    return found && found->verified && expected.agrees(found->cam_from_world);
+  };
+  // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
+  const double reach_px = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
+  for (double radius = kRadiusLocalMap; radius < 2 * reach_px && !nearby.empty(); radius *= 2) {
+    auto found = relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world,
+                                         std::min(radius, reach_px), features, ignores, appearance);
+    if (right(found)) return found;
+  }
   for (const auto& [off, id] : nearby) {
-    auto found = relocaliser_.propose_from(
-        map_.view(), id, features, [this](PointId point) { return is_retracted(point); }, appearance);
-    if (found && found->verified && expected.agrees(found->cam_from_world)) return found;
+    auto found = relocaliser_.propose_from(map_.view(), id, features, ignores, appearance);
+    if (right(found)) return found;
   }
   return std::nullopt;
 }
