@@ -6,19 +6,19 @@ Writes OUT_FOLDER/odom.txt, the odometry in TUM format, and OUT_FOLDER/figures.t
 """
 import json
 import os
-import signal
-import subprocess
 import sys
 import threading
 import time
 import urllib.request
 
+import rosbag
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from dkb_slam_ros.msg import Movers
 from dkb_slam_ros.srv import MapFile
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
+from roslib.message import get_message_class
 from sensor_msgs.msg import Image, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
@@ -68,21 +68,20 @@ def call(name, kind, *arguments):
     return answer.success
 
 
-def play(bag):
-    """rosbag's player now and then begins as if it were paused; nothing has been published then."""
-    for _ in range(3):
-        # In a session of its own: what it starts must end with it.
-        player = subprocess.Popen(["rosbag", "play", "--quiet", "--delay=1", bag], stdin=subprocess.DEVNULL,
-                                  stdout=subprocess.DEVNULL, start_new_session=True)
-        try:
-            if player.wait(timeout=30):
-                sys.exit("FAILED: rosbag play")
-            return
-        except subprocess.TimeoutExpired:
-            print("rosbag play stood still: once more")
-            os.killpg(player.pid, signal.SIGKILL)
-            player.wait()
-    sys.exit("FAILED: rosbag play stood still three times")
+def play(path):
+    """As `rosbag play --delay=1` does, whose own player now and then begins as if it were paused."""
+    with rosbag.Bag(path) as bag:
+        topics = bag.get_type_and_topic_info().topics
+        publishers = {topic: rospy.Publisher(topic, get_message_class(info.msg_type), queue_size=100)
+                      for topic, info in topics.items()}
+        time.sleep(1)  # until the node has found them
+        begin, first = time.monotonic(), bag.get_start_time()
+        for topic, message, stamp in bag.read_messages():
+            time.sleep(max(0, stamp.to_sec() - first - (time.monotonic() - begin)))
+            publishers[topic].publish(message)
+        time.sleep(1)  # until the last is sent
+        for publisher in publishers.values():
+            publisher.unregister()
 
 
 def main():

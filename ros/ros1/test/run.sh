@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # The ROS 1 package for real: built against the installed library, then as a node and as a nodelet on a roscore of its
-# own, fed by `rosbag play` over the loopback.
+# own, fed with a bag over the loopback.
 #   run.sh BUILD WORK REAL SIMULATED     BUILD: of the project; REAL: TUM fr1_xyz, whose place SIMULATED takes when it
 #                                        is not there
 set -euo pipefail

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace dkb {
 namespace {
@@ -13,9 +14,13 @@ constexpr int kStride = 3;        // [cells] between those that are asked
 constexpr int kReach = 3;         // [cells] to both sides, over which a normal is taken
 constexpr int kIterations = 6;    // at most
 constexpr double kTukey = 4.685;  // [standard deviations]: 95 % efficiency with Gaussian noise
-// The noise of depth hangs together over some ten pixels, and the sensor's calibration over far more: so many cells say
-// no more than one.
-constexpr double kTogether = 25;
+constexpr int kBlock = 24;        // [cells] over which distances that hang together are looked for
+constexpr size_t kEnoughBlocks = 4;
+// What the sensor's calibration is off by hangs together over more than a block: so many blocks say no more than one.
+// Chosen by measurement between 2, with which somebody who starts to walk takes the camera along, and 15, with which
+// points on a map that is bent turn it away from walls (docs/decisions.md).
+constexpr double kTogether = 8;
+constexpr double kFrameShare = 0.1;  // of a frame in what is known of how much hangs together
 constexpr size_t kEnoughCells = 100;
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
@@ -60,6 +65,43 @@ class PlaneSums {
   Eigen::Matrix<float, 8, 8> squares_ = Eigen::Matrix<float, 8, 8>::Zero();
   Eigen::Matrix<float, 8, 8> along_ = Eigen::Matrix<float, 8, 8>::Zero();
   Eigen::Matrix4f places_ = Eigen::Matrix4f::Zero();
+};
+
+// How much more the distances of a block's cells vary together than they would if each had the sensor's noise of its
+// own: 1 for such noise, more where the surfaces differ by more than that, where the noise hangs together and where
+// somebody moves (the design effect of cluster samples; Kish, Survey Sampling, 1965, section 5.4).
+class HangingTogether {
+ public:
+  HangingTogether(int width, int height)
+      : columns_((width + kBlock - 1) / kBlock),
+        blocks_(static_cast<size_t>(columns_ * ((height + kBlock - 1) / kBlock))) {}
+
+  // `distance`: in standard deviations; `weight`: 0 ... 1, of its square.
+  void add(int x, int y, float distance, float weight) {
+    Block& b = blocks_[static_cast<size_t>(y / kBlock * columns_ + x / kBlock)];
+    b.distance += std::sqrt(weight) * distance;
+    b.weight += weight;
+  }
+  // Nothing where too few blocks are half full.
+  std::optional<double> factor() const {
+    constexpr float kHalf = 0.5f * (kBlock / kStride) * (kBlock / kStride);
+    double sum = 1;  // a block of nothing but the sensor's noise is expected: depths without any do not tell everything
+    size_t count = 1;
+    for (const Block& b : blocks_) {
+      if (b.weight < kHalf) continue;
+      sum += static_cast<double>(b.distance) * b.distance / b.weight;
+      ++count;
+    }
+    if (count <= kEnoughBlocks) return std::nullopt;
+    return sum / static_cast<double>(count);
+  }
+
+ private:
+  struct Block {
+    float distance = 0, weight = 0;
+  };
+  int columns_;
+  std::vector<Block> blocks_;
 };
 
 // Takes the part of noise out of the information. A direction of which more than half is noise is left to the
@@ -129,6 +171,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
     const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
     const Eigen::Vector3f translation = pose.translation.cast<float>();
     PlaneSums sums;
+    HangingTogether blocks(rays.width(), rays.height());
     for (int y = kStride / 2; y < rays.height(); y += kStride)
       for (int x = kStride / 2; x < rays.width(); x += kStride) {
         const float depth = here.depth(x, y);
@@ -146,24 +189,38 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
         const float distance = normal.dot(point - z * rays.ray(u, v));
         const auto sigma = static_cast<float>(noise_.flat_depth_sigma(z));
         const float variance = 2 * sigma * sigma;
-        const float allowed = variance + static_cast<float>(doubt) *
-                                             (position_variance + rotation_variance * point.cross(normal).squaredNorm());
+        const float allowed =
+            variance +
+            static_cast<float>(doubt) * (position_variance + rotation_variance * point.cross(normal).squaredNorm());
         const float share = distance * distance / (static_cast<float>(kTukey * kTukey) * allowed);
         if (share >= 1) continue;
-        const float weight = (1 - share) * (1 - share) / (static_cast<float>(kTogether) * variance);
+        const float trust = (1 - share) * (1 - share), weight = trust / variance;
         // The slope of a plane through nine depths, three each at -1, 0 and 1 spacings: of six squares in all.
         const float slope = sigma / z * spacings_per_unit;
         sums.add(normal, point, distance, weight, weight * slope * slope / 6);
+        blocks.add(x, y, distance / std::sqrt(variance), trust);
       }
     if (sums.cells() < kEnoughCells) return std::nullopt;
-    information = sums.information();
-    Vector6d gradient = sums.gradient();
-    keep_what_is_known(covariance, sums.noise(), &information, &gradient);
-    information += prior;
-    gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
-    const Vector6d step = -information.ldlt().solve(gradient);
+    const auto solve = [&](double hanging_together) -> Vector6d {
+      const double cells_like_one = kTogether * hanging_together;
+      information = sums.information() / cells_like_one;
+      Vector6d gradient = sums.gradient() / cells_like_one;
+      keep_what_is_known(covariance, sums.noise() / cells_like_one, &information, &gradient);
+      information += prior;
+      gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
+      return -information.ldlt().solve(gradient);
+    };
+    const double usual = together_.value_or(1);
+    Vector6d step = solve(usual);
+    const bool settled = step.head<3>().norm() < kSmallStep && step.tail<3>().norm() < kSmallTurn;
+    if (settled || iteration + 1 == kIterations) {
+      // Only now the distances are the surfaces' own, and no longer those of a pose that is off.
+      const std::optional<double> factor = blocks.factor();
+      if (factor && *factor > usual) step = solve(*factor);
+      if (factor) together_ = together_ ? usual + kFrameShare * (*factor - usual) : *factor;
+    }
     pose = rigid3_from_tangent(step) * pose;
-    if (step.head<3>().norm() < kSmallStep && step.tail<3>().norm() < kSmallTurn) break;
+    if (settled) break;
   }
   const Matrix6d to_here = adjoint(pose.inverse());
   return MotionPrior{pose, false, to_here * information.inverse() * to_here.transpose()};

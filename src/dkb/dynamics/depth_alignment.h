@@ -29,6 +29,8 @@ class DepthAlignment {
   double focal_;                    // [px]
   Image<Eigen::Vector3f> normals_;  // of the cells of `there` that were asked for; zero where there is none
   Image<uint8_t> asked_;            // 1 where it was
+  // How much more the cells of a block vary together than by the sensor's noise: so far, once it is known.
+  std::optional<double> together_;
 };
 
 }  // namespace dkb

@@ -155,6 +155,28 @@ TEST_F(DepthAlignmentTest, AlongACorridorTheExpectationHolds) {
   EXPECT_NEAR(way, 0.8, 0.02);
 }
 
+// Errors that are the same over 96 pixels, as a calibration's, say more than they are when each cell counts for itself.
+TEST_F(DepthAlignmentTest, DistancesThatHangTogetherTellLess) {
+  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  const auto sd_towards_wall = [&](double common) {
+    const MotionDepthGrid there = grid_of(view_of(wall, {}, 1), rays_);
+    DepthImage depth = view_of(wall, moved_.inverse(), 2);
+    Random random(3);
+    float of_block[3][4];
+    for (auto& row : of_block)
+      for (float& b : row) b = static_cast<float>(common * SensorNoise().flat_depth_sigma(2) * random.normal());
+    for (int y = 0; y < depth.height(); ++y)
+      for (int x = 0; x < depth.width(); ++x) depth(x, y) += of_block[y / 96][x / 96];
+    DepthAlignment alignment(SensorNoise(), small_camera().fx, rays_);
+    const auto found = alignment.align(grid_of(depth, rays_), there, rays_,
+                                       {moved_, false, axis_covariance(kPositionSd, kRotationSd)});
+    return found ? std::sqrt(found->covariance(2, 2)) : 0;
+  };
+  const double apart = sd_towards_wall(0);
+  EXPECT_GT(apart, 0);
+  EXPECT_GT(sd_towards_wall(1), 2 * apart);
+}
+
 TEST_F(DepthAlignmentTest, SomebodyBeforeAThirdOfTheImageDoesNotPullThePoseAlong) {
   const MotionDepthGrid there = grid_of(view_of(kCorner, {}, 1), rays_);
   DepthImage depth = view_of(kCorner, moved_.inverse(), 2);

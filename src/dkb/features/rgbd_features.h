@@ -45,6 +45,15 @@ inline double corner_sigma(const Keypoint& keypoint, const std::vector<double>& 
   return std::hypot(by_octave[keypoint.octave], static_cast<double>(keypoint.place_sigma));
 }
 
+// Whether a corner may show what lies `z` [m] before the camera: the surface whose depth it has or, where it has none
+// of its own, nothing nearer than the surfaces around it. `tolerance` times what the noise lets depths differ by is
+// allowed.
+inline bool may_show(const Keypoint& keypoint, double z, const SensorNoise& noise, double tolerance = 1) {
+  if (keypoint.depth > 0) return std::abs(z - keypoint.depth) < tolerance * noise.point_tolerance(keypoint.depth);
+  const double nearest = keypoint.lent_depth;  // zero where nothing is known
+  return z >= nearest || nearest - z < tolerance * noise.point_tolerance(nearest);
+}
+
 struct DepthOptions {
   bool model_time_offset = true;      // move depths to the colour image's time with the camera's motion
   bool model_rolling_shutter = true;  // move features to where they would lie had the whole image been exposed at once

@@ -127,6 +127,23 @@ TEST(RgbdFeatures, BesideAStepTheNearerSurfaceLendsItsDepth) {
   EXPECT_EQ(make(corners_at({{298, 100}}), image, camera).keypoints[0].lent_depth, 0);
 }
 
+TEST(RgbdFeatures, ACornerShowsItsOwnSurfaceOrNothingNearerThanThoseAround) {
+  const SensorNoise noise;  // three standard deviations at 2 m: 0.182 m
+  Keypoint k;
+  EXPECT_TRUE(may_show(k, 0.2, noise));
+  k.lent_depth = 2;
+  EXPECT_FALSE(may_show(k, 1.81, noise));
+  EXPECT_TRUE(may_show(k, 1.83, noise));
+  EXPECT_TRUE(may_show(k, 1.65, noise, 2));
+  EXPECT_TRUE(may_show(k, 7.0, noise));
+  k = Keypoint();
+  k.depth = 2;
+  EXPECT_FALSE(may_show(k, 1.81, noise));
+  EXPECT_TRUE(may_show(k, 1.83, noise));
+  EXPECT_TRUE(may_show(k, 2.17, noise));
+  EXPECT_FALSE(may_show(k, 2.19, noise));
+}
+
 // A floor that the camera looks along falls away fast, but is one surface.
 TEST(RgbdFeatures, AFloorSeenAtAFlatAngleIsOneSurface) {
   const CameraModel camera = plain_camera();

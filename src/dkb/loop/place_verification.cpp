@@ -73,6 +73,7 @@ std::optional<PlaceFit> fit_to_area(const Map& map, KeyframeId keyframe, const R
   fit.cam_from_world = cam_from_world;
   for (const float radius : kSearchRadii) {
     ProjectionMatchOptions match;
+    match.noise = optics.noise;
     match.radius = radius;
     match.max_distance = kMatchDistance;
     match.ratio = 0.9f;

@@ -170,6 +170,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
   }
   const Keyframe& k = *map_.keyframe(keyframe);
   ProjectionMatchOptions match;
+  match.noise = noise_;
   match.radius = static_cast<float>(tolerance * kFusionRadius);
   match.max_distance = 50;
   match.ratio = 1.0f;
@@ -188,7 +189,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
         5.991 * tolerance * tolerance * sigma * sigma)
       continue;
-    if (kp.depth > 0 && std::abs(in_cam.z() - kp.depth) > tolerance * noise_.point_tolerance(kp.depth)) continue;
+    if (!may_show(kp, in_cam.z(), noise_, tolerance)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];
     if (there == kNoPoint) {
       map_.observe(id, keyframe, m.feature);

@@ -109,7 +109,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
         if (in_cam.z() < 0.1) return false;
         const double sigma = corner_sigma(k, sigmas);
         if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * sigma * sigma) return false;
-        return !(k.depth > 0) || std::abs(in_cam.z() - k.depth) < noise.point_tolerance(k.depth);
+        return may_show(k, in_cam.z(), noise);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;
       found.push_back({static_cast<int>(fa), best.feature, best.distance, *point});

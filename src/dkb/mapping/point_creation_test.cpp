@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "dkb/mapping/test_map.h"
 #include "dkb/util/errors.h"
 
@@ -39,6 +41,19 @@ class PointCreation : public ::testing::Test {
   }
   std::vector<PointId> create(const PointCreationOptions& options = {}) {
     return triangulate_new_points(map, 1, scene.camera, {}, TestScene::kScaleFactor, options);
+  }
+
+  // `change` gets the fresh features of the first keyframe, and how far what they show is from it [m].
+  void change_first(const std::function<void(Keypoint&, double)>& change) {
+    auto changed = std::make_shared<RgbdFeatures>(*map.keyframe(0)->features);
+    for (size_t f = 0; f < changed->size(); ++f)
+      if (const int shows = fresh_shows[0][f]; shows >= 0)
+        change(changed->keypoints[f], scene.points[static_cast<size_t>(shows)].z());
+    std::vector<Keyframe> keyframes = {*map.keyframe(0), *map.keyframe(1)};
+    keyframes[0].features = changed;
+    std::vector<MapPoint> points;
+    for (PointId id : map.live_points()) points.push_back(*map.point(id));
+    map = Map::restore(keyframes, points, {});
   }
 
   TestScene known_scene{200, 7}, scene{400, 8};
@@ -106,17 +121,21 @@ TEST_F(PointCreation, FeaturesWithDepthAreLeftAlone) {
 
 TEST_F(PointCreation, TheDepthOfTheOtherKeyframeMustAgree) {
   // The neighbour has depths, all of them 1 m too large.
-  const Rigid3 second = TestScene::camera_at({0.2, 0, 0});
-  build(second);
-  auto wrong = std::make_shared<RgbdFeatures>(*map.keyframe(0)->features);
-  for (size_t f = 0; f < wrong->size(); ++f)
-    if (const int shows = fresh_shows[0][f]; shows >= 0)
-      wrong->keypoints[f].depth = static_cast<float>(scene.points[static_cast<size_t>(shows)].z() + 1);
-  std::vector<Keyframe> keyframes = {*map.keyframe(0), *map.keyframe(1)};
-  keyframes[0].features = wrong;
-  std::vector<MapPoint> points;
-  for (PointId id : map.live_points()) points.push_back(*map.point(id));
-  map = Map::restore(keyframes, points, {});
+  build(TestScene::camera_at({0.2, 0, 0}));
+  change_first([](Keypoint& k, double depth) { k.depth = static_cast<float>(depth + 1); });
+  EXPECT_TRUE(create().empty());
+}
+
+// A wrong match over a short base meets close to the camera, before surfaces that the depth image shows.
+TEST_F(PointCreation, NothingLiesBeforeTheSurfacesAround) {
+  build(TestScene::camera_at({0.2, 0, 0}));
+  const size_t all = create().size();
+  ASSERT_GT(all, 60U);
+  build(TestScene::camera_at({0.2, 0, 0}));
+  change_first([](Keypoint& k, double depth) { k.lent_depth = static_cast<float>(depth - 0.2); });
+  EXPECT_EQ(create().size(), all);
+  build(TestScene::camera_at({0.2, 0, 0}));
+  change_first([](Keypoint& k, double depth) { k.lent_depth = static_cast<float>(depth + 2); });
   EXPECT_TRUE(create().empty());
 }
 

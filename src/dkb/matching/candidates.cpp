@@ -77,6 +77,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     features.grid.for_each_near(u, v, radius, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
       if (k.octave < level - 1 || k.octave > level + 1) return;
+      if (p.z() < k.lent_depth && !may_show(k, p.z(), options.noise)) return;
       if (matchable.on_mover(static_cast<size_t>(f)) &&
           (!c.established || (k.depth > 0 && !options.noise.same_surface(k.depth, p.z()))))
         return;

@@ -32,7 +32,7 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
                        double scale_factor);
 
 struct ProjectionMatchOptions {
-  SensorNoise noise;             // a feature where a mover is suspected must lie on the candidate's surface
+  SensorNoise noise;             // by which a feature's depth tells what it may show
   float radius = 4.0f;           // [px] search radius at the finest level, > 0; grows with the predicted scale
   int max_distance = 64;         // [bits] largest Hamming distance of a match, 0 ... 256
   float ratio = 0.8f;            // best distance must be below this share of the second best on the same level, 0 ... 1

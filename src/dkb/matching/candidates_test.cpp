@@ -94,6 +94,14 @@ TEST_F(CandidateMatching, WhereAMoverIsSuspectedOnlyEstablishedPointsAreFoundAnd
   EXPECT_EQ(match({c}).size(), 1U);
 }
 
+TEST_F(CandidateMatching, AFeatureBesideAnOutlineShowsNothingNearerThanTheSurfacesThere) {
+  add_feature(100, 100, bits_set(0));
+  features.keypoints[0].lent_depth = 3.0F;
+  EXPECT_TRUE(match({at(100, 100)}).empty());  // 2 m away
+  EXPECT_EQ(match({at(100, 100, {}, 0, 2.9)}).size(), 1U);
+  EXPECT_EQ(match({at(100, 100, {}, 0, 5.0)}).size(), 1U);
+}
+
 TEST_F(CandidateMatching, AFeatureGoesToTheNearerCandidateWhateverTheirOrder) {
   add_feature(100, 100, bits_set(10));
   const Candidate near = at(101, 100, bits_set(12)), far = at(99, 100, bits_set(20));
