@@ -74,6 +74,21 @@ struct CeresMotion {
   }
 };
 
+// Student's t with four degrees of freedom in the plane about a variance: slope 6 / (4 + s / v).
+class CeresStudent : public ceres::LossFunction {
+ public:
+  explicit CeresStudent(double variance) : variance_(variance) {}
+  void Evaluate(double s, double rho[3]) const override {
+    const double sum = 4 + s / variance_;
+    rho[0] = 6 * variance_ * std::log(sum / 4);
+    rho[1] = 6 / sum;
+    rho[2] = -6 / (variance_ * sum * sum);
+  }
+
+ private:
+  double variance_;
+};
+
 struct CeresBa {
   double final_cost = 0;  // in the convention of BaResult
   int iterations = 0;
@@ -85,6 +100,7 @@ struct CeresBaOptions {
   double relative_tolerance = 1e-12;
   bool robust = true;
   bool fixed_points = false;
+  double student_variance = 0;  // above 0: CeresStudent's in the place of Huber's
   double chi2_pixel = 5.991, chi2_depth = 7.815, chi2_motion = 16.81;
   ceres::LinearSolverType solver = ceres::DENSE_SCHUR;
 };
@@ -113,7 +129,10 @@ inline CeresBa ceres_bundle_adjust(BaProblem& problem, const CeresBaOptions& opt
                     new ceres::AutoDiffCostFunction<CeresPixelDepth, 3, 6, 3>(new CeresPixelDepth(functor)))
               : new ceres::AutoDiffCostFunction<CeresPixel, 2, 6, 3>(new CeresPixel{functor});
     ceres::LossFunction* loss = nullptr;
-    if (options.robust) loss = new ceres::HuberLoss(std::sqrt(depth ? options.chi2_depth : options.chi2_pixel));
+    if (options.robust && options.student_variance > 0)
+      loss = new CeresStudent(options.student_variance);
+    else if (options.robust)
+      loss = new ceres::HuberLoss(std::sqrt(depth ? options.chi2_depth : options.chi2_pixel));
     if (!depth && o.weight != 1) loss = new ceres::ScaledLoss(loss, o.weight, ceres::TAKE_OWNERSHIP);
     ceres_problem.AddResidualBlock(cost, loss, poses[o.camera].data(), problem.points[o.point].data());
     ordering->AddElementToGroup(problem.points[o.point].data(), 0);

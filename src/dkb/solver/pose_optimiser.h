@@ -54,8 +54,9 @@ struct PoseEstimate {
 };
 
 // Pose that minimises sum rho(e^T Sigma^-1 e), e = [reprojection px, depth m], by Levenberg-Marquardt on 6 numbers;
-// observations are classified anew after each round, all of them, so that an outlier may come back. Ends early when
-// a round changed no classification and took no step. Deterministic; never throws but for options out of range.
+// observations are classified anew after each round, all of them, so that an outlier may come back, until a round
+// changes no classification. Then what fits is weighed by how well it does: rho is Student's t about the scale at hand.
+// Deterministic; never throws but for options out of range.
 PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_world_initial,
                            std::span<const PoseObservation> observations, const PoseOptions& options = {},
                            const PosePrior* prior = nullptr);

@@ -41,8 +41,20 @@ TEST(PoseOptimiser, ReachesTheMinimumThatCeresReachesOnItsInliers) {
   problem.cam_from_world[0] = nearby(world.cam_from_world[0]);
   std::vector<uint8_t> left_out;
   for (const uint8_t in : estimate.inlier) left_out.push_back(!in);
-  ceres_bundle_adjust(problem, {.robust = false, .fixed_points = true}, left_out);
-  EXPECT_LT(distance(estimate.cam_from_world, problem.cam_from_world[0]), 1e-5);
+  // The scale: of the median of what fits, beside 20 observations as given.
+  std::vector<double> fits;
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const PoseObservation& o = observations[i];
+    const Eigen::Vector3d p = estimate.cam_from_world * o.point_in_world;
+    const double pixel = (world.problem.camera.project(p) - o.pixel).squaredNorm() / (o.pixel_sigma * o.pixel_sigma);
+    const double depth = o.depth > 0 ? std::pow((p.z() - o.depth) / o.depth_sigma, 2) : 0;
+    if (estimate.inlier[i]) fits.push_back(pixel + depth);
+  }
+  std::sort(fits.begin(), fits.end());
+  const auto n = static_cast<double>(fits.size());
+  const double variance = (n * fits[fits.size() / 2] / 1.386 + 20) / (n + 20);
+  ceres_bundle_adjust(problem, {.robust = true, .fixed_points = true, .student_variance = variance}, left_out);
+  EXPECT_LT(distance(estimate.cam_from_world, problem.cam_from_world[0]), 1e-4);
 }
 
 TEST(PoseOptimiser, TellsOutliersApart) {
@@ -60,6 +72,23 @@ TEST(PoseOptimiser, TellsOutliersApart) {
   // Noise of 0.7 sigma: P(chi2_2 > 5.991 / 0.49) = 0.2 % without depth; with it 1 sigma in depth adds little.
   EXPECT_LT(wrongly, 0.04 * observations.size());
   EXPECT_LT(distance(estimate.cam_from_world, world.cam_from_world[0]), 0.01);
+}
+
+// One match in five is in the row of text beside, within the limit, and all to one side.
+TEST(PoseOptimiser, MatchesInTheRowBesideHardlyTakeThePoseAlong) {
+  const TestWorld world({.cameras = 1, .points = 300, .pixel_noise = 0.3, .depth_share = 0, .seed = 8});
+  auto observations = world.pose_observations(0);
+  for (size_t i = 0; i < observations.size(); i += 5) observations[i].pixel.x() += 2.2 * observations[i].pixel_sigma;
+  const PoseEstimate estimate = optimise_pose(world.problem.camera, world.cam_from_world[0], observations);
+  ASSERT_TRUE(estimate.ok);
+  double shift = 0, full = 0;
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const PoseObservation& o = observations[i];
+    const auto seen = [&](const Rigid3& pose) { return world.problem.camera.project(pose * o.point_in_world).x(); };
+    shift += seen(estimate.cam_from_world) - seen(world.cam_from_world[0]);
+    full += i % 5 == 0 ? 2.2 * o.pixel_sigma : 0;  // what least squares would give
+  }
+  EXPECT_LT(shift, 0.4 * full);
 }
 
 TEST(PoseOptimiser, CovarianceEqualsTheSpreadOfEstimates) {
@@ -97,24 +126,24 @@ TEST(PoseOptimiser, CovarianceEqualsTheSpreadOfEstimates) {
 }
 
 TEST(PoseOptimiser, APriorActsAsAMeasurement) {
-  const TestWorld world({.cameras = 1, .pixel_noise = 0, .depth_share = 0, .seed = 6});
+  const TestWorld world({.cameras = 1, .pixel_noise = 1, .depth_share = 0, .seed = 6});
   const auto observations = world.pose_observations(0);
-  const Rigid3& truth = world.cam_from_world[0];
+  PoseOptions wide;
+  wide.chi2_pixel = 1e6;
+  const PoseEstimate free = optimise_pose(world.problem.camera, world.cam_from_world[0], observations, wide);
+  const Rigid3& truth = free.cam_from_world;
   Vector6d offset;
   offset << 0.001, -0.002, 0.001, 0.001, 0.0005, -0.001;
   PosePrior prior;
   prior.cam_from_world = rigid3_from_tangent(offset).inverse() * truth;
-  const PoseEstimate free = optimise_pose(world.problem.camera, truth, observations);
   // As much information as the observations have: the estimate lies half way.
   prior.information = free.covariance.inverse();
-  PoseOptions wide;
-  wide.chi2_pixel = 1e6;
   const PoseEstimate half = optimise_pose(world.problem.camera, truth, observations, wide, &prior);
   const Rigid3 moved = truth * half.cam_from_world.inverse();
   Vector6d d;
   d << moved.translation, vector_from_rotation(moved.rotation);
-  EXPECT_LT((d - 0.5 * offset).norm(), 0.01 * offset.norm());
-  EXPECT_LT((2 * half.covariance - free.covariance).norm(), 0.05 * free.covariance.norm());
+  EXPECT_LT((d - 0.5 * offset).norm(), 0.1 * offset.norm());
+  EXPECT_LT((2 * half.covariance - free.covariance).norm(), 0.1 * free.covariance.norm());
   // Overwhelming information: the prior itself.
   prior.information = 1e12 * Matrix6d::Identity();
   const PoseEstimate held = optimise_pose(world.problem.camera, truth, observations, wide, &prior);
