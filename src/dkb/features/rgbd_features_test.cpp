@@ -136,7 +136,7 @@ TEST(RgbdFeatures, ACornerShowsItsOwnSurfaceOrNothingNearerThanThoseAround) {
   EXPECT_TRUE(may_show(k, 1.83, noise));
   EXPECT_TRUE(may_show(k, 1.65, noise, 2));
   EXPECT_TRUE(may_show(k, 7.0, noise));
-  k = Keypoint();
+  k.lent_depth = 0;
   k.depth = 2;
   EXPECT_FALSE(may_show(k, 1.81, noise));
   EXPECT_TRUE(may_show(k, 1.83, noise));
