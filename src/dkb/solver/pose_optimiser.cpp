@@ -19,7 +19,7 @@ using solver::CameraPose;
 // such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
 // freedom (Lange, Little and Taylor, JASA 1989), about a scale that each pose's own observations tell.
 constexpr double kFreedom = 4;
-constexpr int kTailRounds = 3;         // of weights and a step; more change nothing
+constexpr int kTailRounds = 3;         // of weights and a step
 constexpr double kMedianChi2 = 1.386;  // of two degrees of freedom
 // By such weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average, claim
 // 1 / 1.084: E[w^2 x] / 2 / E[24 / (4 + x)^2]^2 with w = 6 / (4 + x) and x of two degrees of freedom.
