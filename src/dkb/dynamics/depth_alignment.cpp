@@ -18,7 +18,7 @@ constexpr int kBlock = 24;        // [cells] over which distances that hang toge
 constexpr size_t kEnoughBlocks = 4;
 // What the sensor's calibration is off by hangs together over more than a block: so many blocks say no more than one.
 // Chosen by measurement: with 2 somebody who starts to walk takes the camera along (docs/decisions.md).
-constexpr double kTogether = 16;
+constexpr double kTogether = 12;
 constexpr double kFrameShare = 0.1;  // of a frame in what is known of how much hangs together
 constexpr size_t kEnoughCells = 100;
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
