@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/features/plane_test_scene.h"
 #include "dkb/geometry/motion_model.h"
 #include "dkb/util/random.h"
 
@@ -11,40 +12,7 @@ namespace {
 
 constexpr double kPositionSd = 0.03, kRotationSd = 0.03;
 
-struct Plane {
-  Eigen::Vector3d normal;  // of unit length
-  double offset;           // normal . x = offset
-};
-
-CameraModel small_camera() {
-  CameraModel c;
-  c.width = 320, c.height = 240;
-  c.fx = c.fy = 262;
-  c.cx = 159.5, c.cy = 119.5;
-  return c;
-}
-
-// What a camera sees of planes, each hiding those behind it, with the sensor's noise.
-DepthImage view_of(const std::vector<Plane>& planes, const Rigid3& cam_from_world, uint64_t seed) {
-  const CameraModel c = small_camera();
-  const Rigid3 world_from_cam = cam_from_world.inverse();
-  Random random(seed);
-  DepthImage depth(c.width, c.height);
-  for (int y = 0; y < c.height; ++y)
-    for (int x = 0; x < c.width; ++x) {
-      const Eigen::Vector3d ray = world_from_cam.rotation * c.unproject(Eigen::Vector2d(x, y), 1.0);
-      double nearest = 1e9;
-      for (const Plane& p : planes) {
-        const double z = (p.offset - p.normal.dot(world_from_cam.translation)) / p.normal.dot(ray);
-        if (z > 0.1 && z < nearest) nearest = z;
-      }
-      depth(x, y) = static_cast<float>(nearest + SensorNoise().flat_depth_sigma(nearest) * random.normal());
-    }
-  return depth;
-}
-
-const std::vector<Plane> kCorner{
-    {Eigen::Vector3d(0, 0, 1), 3.0}, {Eigen::Vector3d(1, 0, 0.4).normalized(), 1.5}, {Eigen::Vector3d(0, 1, 0), 1.0}};
+const std::vector<TestPlane> kCorner = corner_of_a_room();
 
 class DepthAlignmentTest : public testing::Test {
  protected:
@@ -65,8 +33,8 @@ class DepthAlignmentTest : public testing::Test {
   }
   static double degrees(const Rigid3& error) { return vector_from_rotation(error.rotation).norm() * 57.29578; }
 
-  MotionRays rays_{small_camera(), 4};
-  DepthAlignment alignment_{SensorNoise(), small_camera().fx, rays_};
+  MotionRays rays_{plane_test_camera(), 4};
+  DepthAlignment alignment_{SensorNoise(), plane_test_camera().fx, rays_};
   // The camera has come nearer, to the left, and turned by two degrees.
   const Rigid3 moved_{rotation_from_vector({0.01, 0.03, -0.015}), {0.03, -0.01, -0.04}};  // there_from_here
 };
@@ -80,7 +48,7 @@ TEST_F(DepthAlignmentTest, FindsTheMotionInACorner) {
 }
 
 TEST_F(DepthAlignmentTest, WhatAWallLeavesOpenStaysAsExpected) {
-  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  const std::vector<TestPlane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
   const MotionDepthGrid there = grid_of(view_of(wall, {}, 1), rays_);
   const Rigid3 moved(rotation_from_vector({0.01, 0.02, 0.02}), {0.02, 0.01, 0.03});
   const MotionDepthGrid here = grid_of(view_of(wall, moved.inverse(), 2), rays_);
@@ -96,7 +64,7 @@ TEST_F(DepthAlignmentTest, WhatAWallLeavesOpenStaysAsExpected) {
 // The covariance is that of the step itself: the motion found lies within it of the true one, and what one wall leaves
 // open (its own plane) keeps what was expected.
 TEST_F(DepthAlignmentTest, TheCovarianceTellsWhatTheSurfacesDoNot) {
-  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  const std::vector<TestPlane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
   for (const auto& planes : {wall, kCorner}) {
     double sum = 0;
     const int runs = 10;
@@ -129,7 +97,7 @@ TEST_F(DepthAlignmentTest, TheCovarianceTellsWhatTheSurfacesDoNot) {
 
 // Walls, floor and ceiling tell nothing of the way along them, though the noise of each normal points somewhere.
 TEST_F(DepthAlignmentTest, AlongACorridorTheExpectationHolds) {
-  const std::vector<Plane> corridor{{Eigen::Vector3d(1, 0, 0), 1.2},
+  const std::vector<TestPlane> corridor{{Eigen::Vector3d(1, 0, 0), 1.2},
                                     {Eigen::Vector3d(-1, 0, 0), 1.2},
                                     {Eigen::Vector3d(0, 1, 0), 1.3},
                                     {Eigen::Vector3d(0, -1, 0), 1.2}};
@@ -157,7 +125,7 @@ TEST_F(DepthAlignmentTest, AlongACorridorTheExpectationHolds) {
 
 // Errors that are the same over 96 pixels, as a calibration's, say more than they are when each cell counts for itself.
 TEST_F(DepthAlignmentTest, DistancesThatHangTogetherTellLess) {
-  const std::vector<Plane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
+  const std::vector<TestPlane> wall{{Eigen::Vector3d(0, 0, 1), 2.0}};
   const auto sd_towards_wall = [&](double common) {
     const MotionDepthGrid there = grid_of(view_of(wall, {}, 1), rays_);
     DepthImage depth = view_of(wall, moved_.inverse(), 2);
@@ -167,7 +135,7 @@ TEST_F(DepthAlignmentTest, DistancesThatHangTogetherTellLess) {
       for (float& b : row) b = static_cast<float>(common * SensorNoise().flat_depth_sigma(2) * random.normal());
     for (int y = 0; y < depth.height(); ++y)
       for (int x = 0; x < depth.width(); ++x) depth(x, y) += of_block[y / 96][x / 96];
-    DepthAlignment alignment(SensorNoise(), small_camera().fx, rays_);
+    DepthAlignment alignment(SensorNoise(), plane_test_camera().fx, rays_);
     const auto found = alignment.align(grid_of(depth, rays_), there, rays_,
                                        {moved_, false, axis_covariance(kPositionSd, kRotationSd)});
     return found ? std::sqrt(found->covariance(2, 2)) : 0;

@@ -9,6 +9,9 @@ using FrameIndex = int;      // counts the frames that a system was given, from 
 using KeyframeId = int32_t;  // counts keyframes in order of insertion, from 0; never used again
 inline constexpr KeyframeId kNoKeyframe = -1;
 
+using PlaneId = int32_t;  // counts planes in the order in which they were found, from 0
+inline constexpr PlaneId kNoPlane = -1;
+
 // A map point is named after its birth: the keyframe and the feature in it that first showed it. Tracking and mapping
 // can therefore name the same new point alike without talking to each other.
 using PointId = uint32_t;

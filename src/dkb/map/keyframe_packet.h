@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "dkb/features/plane_finder.h"
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
@@ -38,7 +39,8 @@ struct KeyframePacket {
   KeyframeId reference = kNoKeyframe;  // none for the first keyframe of a map
   Rigid3 cam_from_reference;           // cam_from_world for the first keyframe of a map
   std::shared_ptr<const KeyframeMotion> motion;
-  std::vector<PointId> points;  // per feature
+  std::shared_ptr<const PlaneView> planes;  // null: nobody looked
+  std::vector<PointId> points;              // per feature
   std::vector<ProvisionalPoint> new_points;
   std::vector<PointVisibility> visibility;  // by increasing point id
   std::vector<PointId> retracted;           // points that turned out to move

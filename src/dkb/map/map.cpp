@@ -318,6 +318,25 @@ void Map::hand_on_motion(KeyframeId id) {
                              : nullptr;
 }
 
+PlaneId Map::plane(PlaneId id) const {
+  while (joined_to_[static_cast<size_t>(id)] != id) id = joined_to_[static_cast<size_t>(id)];
+  return id;
+}
+
+PlaneId Map::add_plane() {
+  joined_to_.push_back(static_cast<PlaneId>(joined_to_.size()));
+  return joined_to_.back();
+}
+
+void Map::join_planes(PlaneId a, PlaneId b) {
+  const PlaneId one = plane(a), other = plane(b);
+  joined_to_[static_cast<size_t>(std::max(one, other))] = std::min(one, other);
+}
+
+void Map::name_planes(KeyframeId id, std::vector<PlaneId> plane_of_patch) {
+  edit(id).plane_of_patch = std::move(plane_of_patch);
+}
+
 void Map::cull_keyframe(KeyframeId id) {
   const Keyframe* k = live_keyframe(id);
   if (k == nullptr || k->parent == kNoKeyframe) return;  // the root stays
@@ -337,6 +356,8 @@ void Map::cull_keyframe(KeyframeId id) {
   me.points = std::vector<PointId>();  // {} would keep the memory
   me.covisible = std::vector<Covisible>();
   me.motion.reset();
+  me.planes.reset();
+  me.plane_of_patch = std::vector<PlaneId>();
   --live_keyframe_count_;
   places_.remove(id);
 }

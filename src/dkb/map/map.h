@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "dkb/features/plane_finder.h"
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
@@ -54,6 +55,10 @@ struct Keyframe {
   bool culled = false;
   // Since the live keyframe made just before it; null where nothing tells of it. Map files leave it out.
   std::shared_ptr<const KeyframeMotion> motion;
+  // The flat surfaces that it sees, and the planes they are; null and empty where nobody looked. Map files leave them
+  // out.
+  std::shared_ptr<const PlaneView> planes;
+  std::vector<PlaneId> plane_of_patch;
 };
 
 // A point that is no more.
@@ -91,6 +96,8 @@ class Map {
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
   // The live keyframe whose motion is told since this one; kNoKeyframe if there is none.
   KeyframeId moved_on_from(KeyframeId id) const;
+  // The plane that stands for this one since planes turned out to be the same; must exist.
+  PlaneId plane(PlaneId id) const;
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
@@ -110,6 +117,9 @@ class Map {
   void forget(PointId point, KeyframeId keyframe);  // a point left with no observation is removed
   void remove_point(PointId point) { remove_point(point, kNoPoint); }
   void fuse(PointId from, PointId into);  // observations move; `from` forwards to `into`
+  PlaneId add_plane();
+  void join_planes(PlaneId a, PlaneId b);                                // the older one stands for both from now on
+  void name_planes(KeyframeId id, std::vector<PlaneId> plane_of_patch);  // of the keyframe's flat surfaces
   void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
   MapPoint& edit_point(PointId id);  // must exist
   // Recomputes the covisibility of `id` and mirrors the edges in its neighbours.
@@ -160,6 +170,7 @@ class Map {
   CopyEpoch epoch_;
   std::vector<Shared<Keyframe>> keyframes_;
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
+  std::vector<PlaneId> joined_to_;          // per plane; itself where it stands for itself
   PlaceIndex places_;                       // of the live keyframes
   size_t point_count_ = 0;
   int live_keyframe_count_ = 0;

@@ -8,6 +8,7 @@ namespace dkb {
 
 void Map::append(const Map& other) {
   const KeyframeId shift = keyframe_count();
+  const auto plane_shift = static_cast<PlaneId>(joined_to_.size());
   if (shift + other.keyframe_count() > birth_keyframe(kNoPoint))
     throw InputError("the two maps have more keyframes than one map can hold");
   FrameIndex newest = -1, oldest = 0;
@@ -28,6 +29,7 @@ void Map::append(const Map& other) {
     if (k.motion)
       k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{k.motion->previous + shift, k.motion->since});
     for (PointId& p : k.points) p = renamed(p);
+    for (PlaneId& p : k.plane_of_patch) p += plane_shift;
     for (Covisible& c : k.covisible) c.keyframe += shift;
     keyframes.push_back(std::move(k));
   }
@@ -40,7 +42,10 @@ void Map::append(const Map& other) {
     if (points.back().born_at != kNoKeyframe) points.back().born_at += shift;
   }
   for (const RemovedPoint& r : other.removed_points()) removed.push_back({renamed(r.id), renamed(r.replaced_by)});
+  std::vector<PlaneId> joined_to = joined_to_;
+  for (PlaneId p : other.joined_to_) joined_to.push_back(p + plane_shift);
   *this = restore(std::move(keyframes), std::move(points), std::move(removed));
+  joined_to_ = std::move(joined_to);
 }
 
 }  // namespace dkb

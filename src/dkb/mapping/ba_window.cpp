@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/mapping/ba_window.h"
 
+#include "dkb/mapping/planes.h"
+
 namespace dkb {
 
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
@@ -24,6 +26,8 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
       problem.motions.push_back(
           {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), true});
   }
+
+  add_planes(map, window.keyframes, problem);
 
   const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
   window.points = std::move(points);

@@ -18,7 +18,7 @@ struct BaWindow {
     int point = 0;  // index into `points`
   };
   BaProblem problem;
-  std::vector<KeyframeId> keyframes;  // per camera of the problem
+  std::vector<KeyframeId> keyframes;  // per camera of the problem, before the poses of planes
   std::vector<PointId> points;        // per point
   std::vector<Source> sources;        // per observation
 };

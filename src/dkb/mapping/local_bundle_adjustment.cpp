@@ -64,7 +64,8 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
     if (result.outlier[o])
       map.forget(window.points[static_cast<size_t>(window.sources[o].point)], window.sources[o].keyframe);
 
-  report.cameras = static_cast<int>(std::count(problem.fixed.begin(), problem.fixed.end(), uint8_t{0}));
+  report.cameras = static_cast<int>(std::count(
+      problem.fixed.begin(), problem.fixed.begin() + static_cast<std::ptrdiff_t>(window.keyframes.size()), uint8_t{0}));
   report.fixed = static_cast<int>(window.keyframes.size()) - report.cameras;
   report.points = static_cast<int>(window.points.size());
   report.observations = static_cast<int>(window.sources.size());

@@ -29,6 +29,7 @@ LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, do
       scale_factor_(scale_factor),
       levels_(levels),
       options_(options),
+      planes_(camera, noise),
       map_(std::move(map)) {
   for (PointId id : map_.live_points())
     if (map_.keyframe_count() - 1 - map_.point(id)->born_at < kProbationKeyframes) young_.push_back(id);
@@ -46,6 +47,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   refresh(triangulated);
   fuse_neighbours(packet.id);
   map_.update_covisibility(packet.id, kMinSharedPoints);
+  if (packet.planes) planes_.recognise(map_, packet.id);
   if (map_.live_keyframe_count() > 1) {
     const Stopwatch ba;
     const LocalBaReport adjusted =
@@ -107,6 +109,7 @@ void LocalMapper::insert(const KeyframePacket& packet) {
                          ? packet.cam_from_reference
                          : packet.cam_from_reference * map_.cam_from_world(packet.reference);
   if (packet.motion && map_.live_keyframe(packet.motion->previous) != nullptr) k.motion = packet.motion;
+  k.planes = packet.planes;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();
   map_.add_keyframe(std::move(k));

@@ -9,6 +9,7 @@
 #include "dkb/map/map.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
+#include "dkb/mapping/planes.h"
 #include "dkb/mapping/point_creation.h"
 #include "dkb/util/timing.h"
 
@@ -16,6 +17,7 @@ namespace dkb {
 
 struct MappingOptions {
   double redundant_share = 0.9;  // a keyframe is culled when this share of its points is seen well elsewhere, 0 ... 1
+  bool planes = true;            // take part in bundle adjustment
   LocalBaOptions ba;
 };
 
@@ -54,6 +56,7 @@ class LocalMapper {
   double scale_factor_;
   int levels_;
   MappingOptions options_;
+  PlaneRecogniser planes_;
   Map map_;
   std::vector<PointId> young_;  // points on probation
   MappingReport report_;

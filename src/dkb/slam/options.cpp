@@ -139,8 +139,6 @@ void bind_experiments(Settings& s, SlamOptions& o) {
          {{"printed", Similarity::printed}, {"pks", Similarity::pks}});
   s.bind("experiment.keyframes.normals", &a.normals, "turned toward the camera or summed as printed (DKB eq. 28)",
          {{"oriented", NormalSum::oriented}, {"plain", NormalSum::plain}});
-  s.bind("experiment.keyframes.visibility_levels", &a.visibility_levels, "of 10 degrees each (DKB eq. 32)",
-         Range{2, 18});
 
   s.bind("experiment.smooth_trajectory", &o.smooth_trajectory,
          "let the poses of the final trajectory smooth each other");
@@ -149,6 +147,8 @@ void bind_experiments(Settings& s, SlamOptions& o) {
   s.bind("experiment.mapping.ba.edge_weight", &w.edge_weight, "of edge points without adaptive_weight (DKB Table 1)",
          Range{0, 10, true});
   s.bind("experiment.mapping.ba.adaptive_weight", &w.adaptive, "estimate the weight from the residuals");
+
+  s.bind("experiment.mapping.planes", &o.mapping.planes, "flat surfaces take part in bundle adjustment");
 
   PaperFilterOptions& paper = o.dynamics.rivals.paper;
   s.bind("experiment.dynamics.paper.flow_threshold", &paper.flow_threshold, "[px] d_th (DKB eq. 9)", above(0));
@@ -170,7 +170,7 @@ constexpr GoneSection kGone[] = {
      " candidates neighbours min_matches min_ransac_inliers radius radius_fine min_inliers min_share min_similarity "
      "min_similarity_far max_distance max_speed max_position_sd ambiguity clear_lead "},
     {"tracking.local_map", " voted_keyframes neighbours_of_each keyframes "},
-    {"keyframes", " floor_min_tracked floor_few_close floor_many_creatable "},
+    {"keyframes", " visibility_levels floor_min_tracked floor_few_close floor_many_creatable "},
     {"keyframes.baseline", " frames_between min_tracked reference_ratio few_close many_creatable "},
     {"mapping",
      " min_shared_points min_found_ratio probation_keyframes min_observers redundant_observers fusion_keyframes "
@@ -220,13 +220,14 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   if (name != "paper" && name != "orb")
     throw InputError(where + ": there is no preset \"" + name + "\"" + did_you_mean(name, names) +
                      "; presets: default, paper, orb");
-  // What the paper does not have: the camera's own motion within an image, between images and over many.
+  // What the paper does not have: the camera's own motion within an image, between images and over many, and planes.
   o.smooth_trajectory = false;
   o.depth.model_rolling_shutter = false;
   o.depth.model_time_offset = false;
   o.dynamics.filter = FilterKind::paper;
   o.adaptive_keyframes = paper_keyframe_options();
   o.mapping.ba.weights.adaptive = false;
+  o.mapping.planes = false;
   if (name == "orb") {
     o.dynamics.filter = FilterKind::none;
     o.keyframe_policy = KeyframePolicyKind::baseline;

@@ -13,6 +13,7 @@
 #include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
+#include "dkb/features/plane_finder.h"
 #include "dkb/slam/frame_rate.h"
 #include "dkb/slam/load_shedding.h"
 #include "dkb/slam/loop_stage.h"
@@ -77,6 +78,7 @@ class Pipeline {
   void retract_late(const std::vector<LateMask>& masks);
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
   KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
+  std::shared_ptr<const PlaneView> find_planes(const Scene& scene);
   void insert_keyframe(const Scene& scene, TrackedFrame& tracked);
   void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
   void note(Event::Kind kind, std::string text = "", int keyframe = -1);
@@ -88,6 +90,7 @@ class Pipeline {
   RunRecord& record_;
   UndistortionTable undistort_;
   OrbExtractor extractor_;
+  PlaneFinder planes_;
   Tracker tracker_;
   std::unique_ptr<KeyframeDecider> decider_;
   SceneStage scenes_;

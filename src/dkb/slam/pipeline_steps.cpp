@@ -35,6 +35,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       record_(record),
       undistort_(context.camera),
       extractor_(options_.features),
+      planes_(context.camera, options_.noise),
       tracker_(context.camera, options_.noise, options_.features.scale, options_.features.levels, options_.tracking,
                options_.seed),
       decider_(make_decider(context)),
@@ -275,11 +276,23 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
   return decision;
 }
 
+std::shared_ptr<const PlaneView> Pipeline::find_planes(const Scene& scene) {
+  const Stopwatch watch;
+  const RgbdImage& image = scene.extracted.image();
+  Rigid3 cam_from_depth_cam;
+  if (options_.depth.model_time_offset)
+    cam_from_depth_cam = rigid3_from_tangent(tracker_.velocity() * (image.timestamp - image.depth_timestamp));
+  auto planes = std::make_shared<const PlaneView>(planes_.find(image.depth, scene.mask, cam_from_depth_cam));
+  record_.add_time("planes", watch.ms());
+  return planes;
+}
+
 void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
   const KeyframeId id = next_keyframe_++;
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);
   if (since_keyframe_) packet.motion = std::make_shared<const KeyframeMotion>(*since_keyframe_);
+  if (options_.mapping.planes) packet.planes = find_planes(scene);
   since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
   for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;

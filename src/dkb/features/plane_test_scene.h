@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/geometry/rigid3.h"
+#include "dkb/geometry/sensor_noise.h"
+#include "dkb/image/image.h"
+#include "dkb/util/random.h"
+
+namespace dkb {
+
+struct TestPlane {
+  Eigen::Vector3d normal;  // of unit length
+  double offset;           // normal . x = offset, in the world
+};
+
+inline CameraModel plane_test_camera() {
+  CameraModel c;
+  c.width = 320, c.height = 240;
+  c.fx = c.fy = 262;
+  c.cx = 159.5, c.cy = 119.5;
+  return c;
+}
+
+// What a camera sees of planes, each hiding those behind it, with the sensor's noise.
+inline DepthImage view_of(const std::vector<TestPlane>& planes, const Rigid3& cam_from_world, uint64_t seed,
+                          const CameraModel& c = plane_test_camera()) {
+  const Rigid3 world_from_cam = cam_from_world.inverse();
+  Random random(seed);
+  DepthImage depth(c.width, c.height);
+  for (int y = 0; y < c.height; ++y)
+    for (int x = 0; x < c.width; ++x) {
+      const Eigen::Vector3d ray = world_from_cam.rotation * c.unproject(c.undistort(Eigen::Vector2d(x, y)), 1.0);
+      double nearest = 1e9;
+      for (const TestPlane& p : planes) {
+        const double z = (p.offset - p.normal.dot(world_from_cam.translation)) / p.normal.dot(ray);
+        if (z > 0.1 && z < nearest) nearest = z;
+      }
+      depth(x, y) = static_cast<float>(nearest + SensorNoise().flat_depth_sigma(nearest) * random.normal());
+    }
+  return depth;
+}
+
+// Back wall, a wall at an angle on the right, and the floor.
+inline std::vector<TestPlane> corner_of_a_room() {
+  return {
+      {Eigen::Vector3d(0, 0, 1), 3.0}, {Eigen::Vector3d(1, 0, 0.4).normalized(), 1.5}, {Eigen::Vector3d(0, 1, 0), 1.0}};
+}
+
+}  // namespace dkb
