@@ -55,7 +55,8 @@ class DKB_SLAM_API Options {
   struct Tracking {
     double close_depth = 6.0;  ///< [m] depths below make map points at once, above 0
     int initial_points = 100;  ///< [features] with depth that a map's first frame needs, at least 10
-    int min_inliers = 20;      ///< [points] that a pose rests on; with fewer tracking is lost, at least 6
+    int min_inliers = 20;      ///< [points] that a pose rests on, at least 6; half as many where depth or a prior
+                               ///< expects it; with fewer tracking is lost
     double new_map_after = 1;  ///< [s] lost in a row until a new map is begun; 0 = never, at least 0
   } tracking;
 

@@ -51,7 +51,8 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
   visit("tracking.initial_points", p.tracking.initial_points, o.tracking.initial_points,
         "[features] with depth in a map's first frame", at_least(10));
   visit("tracking.min_inliers", p.tracking.min_inliers, o.tracking.min_inliers,
-        "[points] that agree with a pose; with fewer, tracking is lost", at_least(6));
+        "[points] that agree with a pose, half as many with one that was expected; with fewer, tracking is lost",
+        at_least(6));
   visit("tracking.new_map_after", p.tracking.new_map_after, o.tracking.new_map_after,
         "[s] lost in a row until a new map is begun, 0 = never", at_least(0));
 

@@ -176,7 +176,7 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
 }
 
 bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
-                              TrackedFrame& frame) {
+                              TrackedFrame& frame, const std::function<bool(const PoseEstimate&)>& accept) {
   refresh_candidates(points, frame.timestamp);
   const RgbdFeatures& features = *frame.features;
   std::vector<uint8_t> taken(features.size(), 0);
@@ -234,7 +234,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const PoseEstimate pose = refine(initial, pairs, features, frame.predicted);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
-  if (inliers < min_inliers) return false;
+  if (inliers < min_inliers || (accept && !accept(pose))) return false;
 
   std::vector<PointId> in_view, found;
   in_view.reserve(candidates.size());

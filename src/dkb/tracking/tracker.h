@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -102,6 +103,7 @@ class Tracker {
   std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;
   std::vector<Rigid3> expected_poses(double dt, const TrackingInput& input) const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
+  bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
@@ -116,8 +118,9 @@ class Tracker {
   Rigid3 express_anew(TrackedFrame& frame) const;
   bool within_travel_distance(const PoseProposal& found, double timestamp) const;
   bool start_map(TrackedFrame& frame, const PosePrediction* expected);
+  // `accept`: what else a pose must fulfil; may be empty.
   bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
-                       TrackedFrame& frame);
+                       TrackedFrame& frame, const std::function<bool(const PoseEstimate&)>& accept = {});
   bool is_retracted(PointId id) const;
   void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, double now);

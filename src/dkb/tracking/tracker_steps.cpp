@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the last frame to this one.
+#include <algorithm>
 #include <utility>
 
 #include "dkb/tracking/descriptor_pose.h"
@@ -97,11 +98,30 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); }, {});
-    if (!near || !plausible_motion(near->cam_from_world, frame.timestamp)) return false;
-    pose = near->cam_from_world;
-    points = std::move(near->points);
+    if (near && plausible_motion(near->cam_from_world, frame.timestamp)) {
+      pose = near->cam_from_world;
+      points = std::move(near->points);
+    }
   }
-  return pose && track_local_map(*pose, kRadiusLocalMap, options_.min_inliers, points, frame);
+  if (pose && track_local_map(*pose, kRadiusLocalMap, options_.min_inliers, points, frame)) return true;
+  return frame.predicted && track_expected(*frame.predicted, frame);
+}
+
+// Where something else says where the camera is, fewer points need vouch for it: half as many, if they agree with what
+// is expected and most of what matches agrees with them. Down a blank corridor they are what holds the camera.
+bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame) {
+  const auto agrees = [&](const PoseEstimate& pose) {
+    return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() && expected.agrees(pose.cam_from_world);
+  };
+  // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
+  const double reach = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
+  for (double radius = kRadiusLocalMap; radius < 2 * reach; radius *= 2) {
+    std::vector<PointId> points(frame.points.size(), kNoPoint);
+    if (track_local_map(expected.cam_from_world, std::min(radius, reach), options_.min_inliers / 2, points, frame,
+                        agrees))
+      return true;
+  }
+  return false;
 }
 
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {

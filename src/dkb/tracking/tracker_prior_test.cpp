@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where something beside the images says where the camera is.
+#include "dkb/tracking/tracker_test_fixture.h"
+
+namespace dkb {
+namespace {
+
+class ExpectedCamera : public TrackerTest {
+ protected:
+  void SetUp() override {
+    publish(start(on_path(0)));
+    for (int i = 1; i < 4; ++i) ASSERT_EQ(see(i, 700, step_to(i)).state, TrackingState::tracking);
+  }
+  static MotionPrior step_to(double i) {
+    MotionPrior step{on_path(i - 1) * on_path(i).inverse(), false, Matrix6d::Zero()};
+    step.previous_from_current.translation += Eigen::Vector3d(0.03, 0, 0);
+    step.covariance = axis_covariance(0.02, 0.01);
+    return step;
+  }
+  // The next frame shows `shown` of the scene's points; something tells the step.
+  TrackedFrame see(double i, size_t shown, const MotionPrior& step, const Eigen::Vector2f& moved = {0, 0}) {
+    ++index;
+    ViewOptions options;
+    options.seed = static_cast<uint64_t>(index);
+    options.pixel_noise = 0.3;
+    view = scene.look(on_path(i), options);
+    std::vector<int> some;
+    for (size_t f = 0; f < view.shows.size() && some.size() < shown;
+         f += view.shows.size() / std::min(shown, view.shows.size()))
+      some.push_back(static_cast<int>(f));
+    RgbdFeatures features = subset(*view.features, some);
+    for (Keypoint& k : features.keypoints) k.pixel += moved;
+    features.grid = KeypointGrid(features.keypoints, features.width, features.height);
+    const FakeFeatures fake(std::make_shared<const RgbdFeatures>(std::move(features)));
+    return tracker.track({.index = index, .timestamp = index * kFrameTime, .features = fake, .step = &step});
+  }
+};
+
+TEST_F(ExpectedCamera, IsHeldByFewerPointsThanOneThatCouldBeAnywhere) {
+  const TrackedFrame frame = see(4, 15, step_to(4));
+  EXPECT_EQ(frame.state, TrackingState::tracking);
+  EXPECT_GE(frame.inliers, 10);
+  EXPECT_LT(frame.inliers, 20);
+  // The step alone is 3 cm off.
+  EXPECT_LT(distance_between(frame.cam_from_world, on_path(4)), 0.01);
+}
+
+TEST_F(ExpectedCamera, IsNotTakenAlongByPointsThatContradictIt) {
+  const TrackedFrame frame = see(4, 15, step_to(4), {0, 40});
+  EXPECT_EQ(frame.state, TrackingState::predicted);
+  EXPECT_LT(distance_between(frame.cam_from_world, on_path(4)), 0.04);
+}
+
+TEST_F(ExpectedCamera, GoesOnWithoutTheImagesWhereTooFewPointsAreInView) {
+  EXPECT_EQ(see(4, 7, step_to(4)).state, TrackingState::predicted);
+}
+
+}  // namespace
+}  // namespace dkb
