@@ -62,7 +62,7 @@ test-tsan: deps
 	$(NO_ASLR) ctest --test-dir build-tsan -L threads --output-on-failure --no-tests=error -j $(JOBS)
 
 # These want sequences made for them: docs/benchmarks.md.
-NEED_SEQUENCES = $(addprefix bench/,correction_bench.cpp dense_bench.cpp detector_bench.cpp movers_bench.cpp relocalise_bench.cpp soak_bench.cpp)
+NEED_SEQUENCES = $(addprefix bench/,correction_bench.cpp covariance_bench.cpp dense_bench.cpp detector_bench.cpp movers_bench.cpp relocalise_bench.cpp soak_bench.cpp)
 
 bench: deps  ## Build and run the benchmarks (DKB_DATA=folder of real sequences)
 	cmake --preset bench

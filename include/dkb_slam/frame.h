@@ -138,7 +138,9 @@ struct FrameResult {
   /// (Options::base_from_cam). There is a pose when tracked().
   std::optional<Rigid3> world_from_cam;
   std::optional<Rigid3> odom_from_cam;  ///< smooth: does not jump when the map is corrected; steer by this
-  std::optional<Matrix6d> covariance;   ///< right perturbation of world_from_cam, [translation m, rotation rad]
+  /// Of world_from_cam: right perturbation, [translation m, rotation rad]. The frame's in the map, and the map's own there
+  /// against the world's origin; a map that was loaded is taken for the truth.
+  std::optional<Matrix6d> covariance;
   Rigid3 world_from_odom;               ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
   int inliers = 0;                      ///< map points that the pose rests on
   int reference_keyframe = -1;          ///< the keyframe that shows most of them

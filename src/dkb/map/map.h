@@ -48,6 +48,9 @@ struct Keyframe {
   double timestamp = 0;                          // [s]
   std::shared_ptr<const RgbdFeatures> features;  // immutable; empty once culled
   Rigid3 cam_from_world;
+  // Of its pose in the world of its map's first keyframe: right perturbation of world_from_cam, [translation m,
+  // rotation rad]. Map files leave it out: who loads a map takes it for the truth.
+  Matrix6d covariance = Matrix6d::Zero();
   std::vector<PointId> points;       // per feature; kNoPoint where it shows none
   std::vector<Covisible> covisible;  // by decreasing shared_points, then increasing id
   KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
@@ -121,6 +124,7 @@ class Map {
   void join_planes(PlaneId a, PlaneId b);                                // the older one stands for both from now on
   void name_planes(KeyframeId id, std::vector<PlaneId> plane_of_patch);  // of the keyframe's flat surfaces
   void set_pose(KeyframeId id, const Rigid3& cam_from_world) { edit(id).cam_from_world = cam_from_world; }
+  void set_covariance(KeyframeId id, const Matrix6d& covariance) { edit(id).covariance = covariance; }
   MapPoint& edit_point(PointId id);  // must exist
   // Recomputes the covisibility of `id` and mirrors the edges in its neighbours.
   void update_covisibility(KeyframeId id, int min_shared_points);

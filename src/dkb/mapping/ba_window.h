@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +22,10 @@ struct BaWindow {
   std::vector<KeyframeId> keyframes;  // per camera of the problem, before the poses of planes
   std::vector<PointId> points;        // per point
   std::vector<Source> sources;        // per observation
+
+  int camera_of(KeyframeId keyframe) const {  // must be in it
+    return static_cast<int>(std::find(keyframes.begin(), keyframes.end(), keyframe) - keyframes.begin());
+  }
 };
 
 // `keyframes` with their observations of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.

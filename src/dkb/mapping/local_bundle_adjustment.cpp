@@ -7,6 +7,34 @@
 #include "dkb/mapping/ba_window.h"
 
 namespace dkb {
+namespace {
+
+// What the fixed keyframes of a window are off by, which the window's own follow: the mean of their covariances, each
+// by its part of what is observed. Nobody knows how much of their errors they share; all of it is the worst case. Left
+// perturbation of world_from_cam.
+Matrix6d common_error(const Map& map, const BaWindow& window, const BaResult& result) {
+  std::vector<int> observed(window.keyframes.size(), 0);
+  for (size_t o = 0; o < window.problem.observations.size(); ++o) {
+    const auto c = static_cast<size_t>(window.problem.observations[o].camera);
+    observed[c] += window.problem.fixed[c] && !result.outlier[o];
+  }
+  Matrix6d sum = Matrix6d::Zero();
+  int all = 0;
+  for (size_t c = 0; c < window.keyframes.size(); ++c) {
+    if (observed[c] == 0) continue;
+    const Matrix6d to_world = adjoint(window.problem.cam_from_world[c].inverse());
+    sum += observed[c] * to_world * map.keyframe(window.keyframes[c])->covariance * to_world.transpose();
+    all += observed[c];
+  }
+  return sum / std::max(all, 1);
+}
+
+Matrix6d carried_to(const Rigid3& cam_from_world, const Matrix6d& in_world) {
+  const Matrix6d to_camera = adjoint(cam_from_world);
+  return to_camera * in_world * to_camera.transpose();
+}
+
+}  // namespace
 
 LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
                                       double scale_factor, const LocalBaOptions& options) {
@@ -55,10 +83,14 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   BaOptions ba;
   ba.rounds = {4, 6};               // [steps] before and after outliers are told apart
   ba.prefilter = options.weighted;  // DKB section 3.3 leaves gross errors out beforehand
+  problem.asked = window.camera_of(newest);
   const BaResult result = bundle_adjust(problem, ba);
 
   for (size_t c = 0; c < window.keyframes.size(); ++c)
     if (!problem.fixed[c]) map.set_pose(window.keyframes[c], problem.cam_from_world[c]);
+  if (result.covariance)
+    map.set_covariance(newest, *result.covariance + carried_to(problem.cam_from_world[static_cast<size_t>(problem.asked)],
+                                                               common_error(map, window, result)));
   for (size_t p = 0; p < window.points.size(); ++p) map.edit_point(window.points[p]).position = problem.points[p];
   for (size_t o = 0; o < window.sources.size(); ++o)
     if (result.outlier[o])

@@ -231,5 +231,22 @@ TEST_F(LocalBa, WeightsAreAtWorkOnlyWhenAskedFor) {
   EXPECT_NE(light, heavy);
 }
 
+TEST_F(LocalBa, KeyframesAreKnownByWhatHoldsThemAndByTheMeasurements) {
+  build(6, {.pixel_noise = 0.5}, 0.01, 0.02);
+  for (int i = 0; i < 3; ++i) adjust(5);  // until nothing changes
+  const Matrix6d by_first = map.keyframe(5)->covariance;
+  EXPECT_TRUE(map.keyframe(0)->covariance.isZero()) << "it is the world";
+  EXPECT_GT(by_first.llt().info() == Eigen::Success ? by_first.trace() : 0, 0);
+  EXPECT_LT(std::sqrt(by_first.topLeftCorner<3, 3>().trace()), 0.02);
+
+  // What holds the window is off by a millimetre sideways: so is the newest.
+  Matrix6d off = Matrix6d::Zero();
+  off(1, 1) = 1e-6;
+  map.set_covariance(0, off);
+  adjust(5);
+  const double more = map.keyframe(5)->covariance(1, 1) - by_first(1, 1);
+  EXPECT_NEAR(more, 1e-6, 0.3e-6);
+}
+
 }  // namespace
 }  // namespace dkb

@@ -335,7 +335,10 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
-    result.covariance = tracked.covariance;
+    // The frame in its map, and the map in its world.
+    const Matrix6d to_camera = adjoint(tracked.cam_from_world);
+    result.covariance =
+        tracked.covariance + to_camera * tracker_.map().covariance(tracked.reference) * to_camera.transpose();
     result.reference_keyframe = tracked.reference;
   }
   if (tracked.tracked()) {

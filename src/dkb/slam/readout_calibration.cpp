@@ -7,7 +7,10 @@
 namespace dkb {
 namespace {
 constexpr int kMinMatches = 30;
-constexpr double kStepSd = 5e-4;       // [s] uncertainty of a step below which it is taken
+// [s] standard deviation of a readout before anything is seen of it: sensors are read within 0 to 33 ms.
+constexpr double kPriorSd = 0.015;
+// Errors of one point in one frame and in the next go together; MotionNoise has the same figure for poses.
+constexpr double kTogether = 4;
 constexpr double kMaxReadout = 0.033;  // [s] largest readout believed in: a frame's time at 30 Hz
 }  // namespace
 
@@ -17,7 +20,8 @@ ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNo
       noise_(noise),
       scale_factor_(scale_factor),
       readout_(camera.readout),
-      known_(camera.readout > 0 || !options.estimate) {}
+      known_(camera.readout > 0 || !options.estimate),
+      information_(1 / (kPriorSd * kPriorSd)) {}
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
                              const std::vector<std::optional<Eigen::Vector3d>>& positions) {
@@ -49,11 +53,9 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
   const Eigen::LDLT<Matrix6d> factor(pose_pose);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return;
   const Vector6d explained = factor.solve(pose_readout);
-  information_ += std::max(0.0, readout_readout - explained.dot(pose_readout));
-  gradient_ += readout_gradient - explained.dot(pose_gradient);
-  if (information_ * kStepSd * kStepSd < 1) return;
-  readout_ = std::clamp(readout_ + gradient_ / information_, 0.0, kMaxReadout);
-  information_ = gradient_ = 0;
+  const double gradient = (readout_gradient - explained.dot(pose_gradient)) / kTogether;
+  information_ += std::max(0.0, readout_readout - explained.dot(pose_readout)) / kTogether;
+  readout_ = std::clamp(readout_ + gradient / information_, 0.0, kMaxReadout);
 }
 
 }  // namespace dkb

@@ -17,9 +17,9 @@ struct ReadoutOptions {
 
 // Learns how long a rolling shutter takes from the first row to the last, while the camera is in use. Rows that are
 // exposed early or late show their points off by the image's motion times the row's delay; what a pose cannot explain
-// of that pattern tells the delay. Least squares with the pose of each frame eliminated, in steps, each as soon as its
-// standard deviation is small enough. The first steps fall short, since the map was made from the same sheared images;
-// later ones make up for it. Deterministic.
+// of that pattern tells the delay. Recursive least squares with the pose of each frame eliminated. The map was made from
+// the same sheared images, so that each frame tells less than all that is missing; the next ones make up for it.
+// Deterministic.
 class ReadoutCalibration {
  public:
   ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
@@ -39,7 +39,7 @@ class ReadoutCalibration {
   double scale_factor_;
   double readout_;
   bool known_;
-  double information_ = 0, gradient_ = 0;  // of the step at work
+  double information_;  // [1/s^2] of the readout
 };
 
 }  // namespace dkb

@@ -10,12 +10,12 @@ namespace dkb {
 namespace {
 
 // Frames of a scene under motion that changes, with rows exposed late by `readout`, of which `known` was taken out.
-double calibrated(double readout, ReadoutOptions options = {}, double file = 0) {
+double calibrated(double readout, ReadoutOptions options = {}, double file = 0, int frames = 60) {
   const TestScene scene(500);
   CameraModel camera = scene.camera;
   camera.readout = file;
   ReadoutCalibration calibration(camera, {}, TestScene::kScaleFactor, options);
-  for (int n = 0; n < 60; ++n) {
+  for (int n = 0; n < frames; ++n) {
     Vector6d velocity;
     velocity << 0.3 * std::sin(0.3 * n), 0.1, 0.2 * std::cos(0.2 * n), 0.2 * std::sin(0.5 * n), 0.7 * std::cos(0.4 * n),
         0.1;
@@ -41,6 +41,10 @@ double calibrated(double readout, ReadoutOptions options = {}, double file = 0) 
 
 TEST(ReadoutCalibration, FindsTheReadoutWithinAMillisecond) {
   for (const double readout : {0.0, 0.012, 0.025}) EXPECT_NEAR(calibrated(readout), readout, 1e-3);
+}
+
+TEST(ReadoutCalibration, KnowsMostOfItAfterHalfASecond) {
+  EXPECT_NEAR(calibrated(0.02, {}, 0, 15), 0.02, 3e-3);
 }
 
 TEST(ReadoutCalibration, ACameraThatTellsItsReadoutIsBelieved) {

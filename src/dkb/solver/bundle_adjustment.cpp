@@ -78,6 +78,7 @@ class BundleAdjuster {
       std::copy_n(state_.points.data() + 4 * p, 3, problem_.points[p].data());
     }
     result.outliers = static_cast<int>(std::count(result.outlier.begin(), result.outlier.end(), 1));
+    if (problem_.asked >= 0) result.covariance = covariance(layout_.free_of_camera[problem_.asked]);
     return result;
   }
 
@@ -217,6 +218,39 @@ class BundleAdjuster {
     return saved;
   }
 
+  std::optional<Matrix6d> covariance(int free) {
+    if (free < 0) return std::nullopt;
+    linearise();
+    double unused = 0;
+    if (!solve(kNoDamping, unused)) return std::nullopt;
+    Matrix6d inverse;
+    std::vector<double> column(gradient_.size());
+    for (int k = 0; k < 6; ++k) {
+      std::fill(column.begin(), column.end(), 0.0);
+      column[static_cast<size_t>(6 * free + k)] = 1;
+      cholesky_.solve(column);
+      inverse.col(k) = Eigen::Map<const Vector6d>(column.data() + 6 * free);
+    }
+    if (!inverse.allFinite()) return std::nullopt;
+    return variance_factor() * 0.5 * (inverse + inverse.transpose());
+  }
+
+  // The sum of squared errors by that of its expectation: one for each number observed, less one for each that was
+  // fitted.
+  double variance_factor() {
+    double squares = 0;
+    for (int c = 0; c < layout_.cameras; ++c) squares += kernels_.ba_cost(input(c, state_));
+    int observed = 0;
+    std::vector<uint8_t> seen(static_cast<size_t>(layout_.points) + 1, 0);
+    for (size_t e = 0; e < layout_.observation_of_entry.size(); ++e) {
+      if (array(kUsedWeight)[e] == 0) continue;
+      observed += array(kUsedInvDepthSigma)[e] > 0 ? 3 : 2;
+      seen[static_cast<size_t>(layout_.point_of_entry[e])] = 1;
+    }
+    const int fitted = 6 * layout_.free_cameras() + 3 * static_cast<int>(std::count(seen.begin(), seen.end(), 1));
+    return observed > fitted + kEnoughFreedom ? squares / (observed - fitted) : 1;
+  }
+
   double descend(double present, int iterations, int& total) {
     solver::NielsenDamping damping(options_.initial_damping, 1e-10);
     bool fresh = false;
@@ -253,6 +287,8 @@ class BundleAdjuster {
   }
 
   static constexpr double kMinDiagonal = 1e-6;
+  static constexpr int kEnoughFreedom = 100;  // a factor from so many is known to 14%
+  static constexpr double kNoDamping = 1e-9;  // leaves what nothing determines solvable
 
   BaProblem& problem_;
   const BaOptions& options_;

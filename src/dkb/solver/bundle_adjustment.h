@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dkb/geometry/camera.h"
@@ -28,6 +29,7 @@ struct BaProblem {
   std::vector<Eigen::Vector3d> points;      // [m] in the world
   std::vector<BaObservation> observations;  // any order; of one (camera, point) pair there may be several
   std::vector<PoseEdge> motions;            // between cameras, by what is not in the observations
+  int asked = -1;                           // a free camera whose covariance is wanted; -1 = none
 };
 
 struct BaOptions {
@@ -51,6 +53,10 @@ struct BaResult {
          final_cost = 0;  // sum of w rho(e^T Sigma^-1 e) of the first round's start and the last one's end
   int iterations = 0;     // accepted and rejected steps of all rounds
   int outliers = 0;
+  // Of the camera that was asked for, where the fixed cameras are known exactly: the inverse of the normal equations at
+  // the end, times the variance factor (what the errors are, by what was claimed; Triggs et al. 2000, section 9). Right
+  // perturbation of world_from_cam, [translation m, rotation rad]; null where the observations leave it open.
+  std::optional<Matrix6d> covariance;
 };
 
 // Bundle adjustment (DKB eqs. 42-48): refines the free cameras and all points of `problem` in place.

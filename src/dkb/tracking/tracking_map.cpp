@@ -34,6 +34,15 @@ Rigid3 TrackingMap::cam_from_world(KeyframeId id) const {
   return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * cam_from_world(p.reference);
 }
 
+Matrix6d TrackingMap::covariance(KeyframeId id) const {
+  while (view_->keyframe(id) == nullptr) {
+    id = pending_or_throw(id).reference;
+    if (id == kNoKeyframe) return Matrix6d::Zero();
+  }
+  const Matrix6d to_world = adjoint(view_->cam_from_world(id).inverse());
+  return to_world * view_->keyframe(id)->covariance * to_world.transpose();
+}
+
 KeyframeId TrackingMap::root(KeyframeId id) const {
   while (view_->keyframe(id) == nullptr) {
     const Pending& p = pending_or_throw(id);

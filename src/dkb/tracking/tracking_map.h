@@ -24,6 +24,9 @@ class TrackingMap {
   bool has(KeyframeId id) const { return view_->keyframe(id) != nullptr || pending(id) != nullptr; }
   // Pose of a keyframe. Throws std::logic_error for one that was never made.
   Rigid3 cam_from_world(KeyframeId id) const;
+  // Of the map where this keyframe is: left perturbation of world_from_cam, [translation m, rotation rad]. For one that
+  // is pending, that of the newest in the view which it hangs on.
+  Matrix6d covariance(KeyframeId id) const;
   // The first keyframe of the map that a keyframe belongs to, likewise.
   KeyframeId root(KeyframeId id) const;
 

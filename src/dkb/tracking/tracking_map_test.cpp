@@ -70,5 +70,21 @@ TEST(TrackingMap, ACopyKeepsWhatItKnew) {
   EXPECT_FALSE(copy.has(1));
 }
 
+TEST(TrackingMap, CovariancesAreOfTheWorldAndPendingKeyframesHaveTheirReferences) {
+  Map made = *two_roots();
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance(5, 5) = 4e-6;  // 2 mrad about the optical axis of a camera at x = -1 m
+  made.set_covariance(0, covariance);
+  TrackingMap map;
+  map.take_view(made.snapshot());
+  map.add_pending(2, 0, shifted(10));
+  const Matrix6d world = map.covariance(0);
+  EXPECT_NEAR(world(5, 5), 4e-6, 1e-12);
+  EXPECT_NEAR(world(1, 1), 4e-6, 1e-12) << "the lever of one metre";
+  EXPECT_NEAR(world(0, 0), 0, 1e-12);
+  EXPECT_TRUE(map.covariance(2).isApprox(world));
+  EXPECT_TRUE(map.covariance(1).isZero());
+}
+
 }  // namespace
 }  // namespace dkb
