@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensor's noise allows a camera's pose to be known to, and what a run made of it. Needs NumPy and OpenCV.
+"""What the sensor's noise allows a camera's pose to be known to, and what a run made of it. Needs NumPy and Pillow.
 
   dkb-slam simulate --scene room --out room
   dkb-slam run room --detector motion --dump-features --out out
@@ -18,8 +18,8 @@ import csv
 import pathlib
 import sys
 
-import cv2
 import numpy as np
+from PIL import Image
 
 BLOCK, STEP, FLAT, ENOUGH = 16, 4, 3.0, 12  # [px], [px], times the noise's variance, [blocks]: see PlaneFinder
 OPEN = 1.0  # [m, rad] a direction known to no better than this is open
@@ -172,9 +172,9 @@ def main():
     names, found = ("points", "planes", "both"), {"points": [], "planes": [], "both": []}
     rows = read_rows(arguments.sequence / "associations.txt")[:: arguments.every]
     for row in rows:
-        depth = cv2.imread(str(arguments.sequence / row[3]), cv2.IMREAD_UNCHANGED) / camera["depth_factor"]
-        mask = cv2.imread(str(arguments.sequence / "masks" / f"{float(row[0]):.6f}.png"), cv2.IMREAD_GRAYSCALE)
-        still = np.ones(depth.shape, bool) if mask is None else mask == 0
+        depth = np.asarray(Image.open(arguments.sequence / row[3])) / camera["depth_factor"]
+        mask = arguments.sequence / "masks" / f"{float(row[0]):.6f}.png"
+        still = np.asarray(Image.open(mask)) == 0 if mask.exists() else np.ones(depth.shape, bool)
         uv = np.array(used.get(f"{float(row[0]):.6f}", [])).reshape(-1, 2)
         x, y = np.rint(uv).astype(int).T
         own = (depth[y, x] > 0) & still[y, x]

@@ -67,6 +67,7 @@ TEST(OdometryTrack, AFileSaysHowGoodItIs) {
   }
   std::ofstream(bad) << "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
   EXPECT_THROW(read_odometry(bad), InputError) << "no motion in it";
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
