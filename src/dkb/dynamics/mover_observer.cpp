@@ -22,7 +22,11 @@ constexpr double kInnerShare = 0.4;   // of a region's cells must have all four 
 constexpr int kGap = 4;               // [cells] regions so near to each other in the image are one ...
 constexpr float kMergeDepth = 0.25f;  // [m] ... when so near in depth
 constexpr float kBin = 0.05f;         // [m] of depth histograms
-constexpr size_t kMaxPoints = 300;    // per object, that medians are taken of
+constexpr size_t kMaxPoints = 300;    // per object, that its place and size are taken of
+
+size_t stride_through(std::span<const uint32_t> cells) {
+  return (cells.size() + kMaxPoints - 1) / kMaxPoints;
+}
 
 // What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
 // sensor's noise.
@@ -73,14 +77,15 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
 
 // Between the twentieths at either end, which may be of other surfaces.
 Eigen::Vector3d MoverObserver::size_of(std::span<const uint32_t> cells) const {
+  const size_t stride = stride_through(cells);
   std::array<std::vector<float>, 3> values;
-  for (auto& v : values) v.resize(cells.size());
-  for (size_t k = 0; k < cells.size(); ++k) {
+  for (auto& v : values) v.reserve(cells.size() / stride + 1);
+  for (size_t k = 0; k < cells.size(); k += stride) {
     const Eigen::Vector2f& ray = rays_[cells[k]];
     const float depth = depth_[cells[k]];
-    values[0][k] = depth * ray.x();
-    values[1][k] = depth * ray.y();
-    values[2][k] = depth;
+    values[0].push_back(depth * ray.x());
+    values[1].push_back(depth * ray.y());
+    values[2].push_back(depth);
   }
   Eigen::Vector3d size;
   for (size_t i = 0; i < 3; ++i) {
@@ -98,7 +103,7 @@ Eigen::Vector3d MoverObserver::size_of(std::span<const uint32_t> cells) const {
 
 Eigen::Vector3d MoverObserver::median_position(std::span<const uint32_t> cells) const {
   const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
-  const size_t stride = (cells.size() + kMaxPoints - 1) / kMaxPoints;
+  const size_t stride = stride_through(cells);
   std::array<std::vector<float>, 3> values;
   for (auto& v : values) v.reserve(cells.size() / stride + 1);
   for (size_t k = 0; k < cells.size(); k += stride) {

@@ -20,7 +20,7 @@ FrameResult Pipeline::process(const Frame& frame) {
 
   const Stopwatch working;
   const Expectation expected = expect(frame);
-  scenes_.begin(next_frame_, frame, expected, outcome_);
+  scenes_.begin(frame, expected, outcome_);
   const Scene scene = scenes_.look(extract(frame), undistort_, detections, expected);  // DKB 3.1
   follow_motion(scene);
   retract_late(scene.late_masks);

@@ -34,8 +34,8 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
   if (!segments_motion_) options_.motion.cell = kSupportCell;
   if (segments_motion_ || supports) {
     motion_.emplace(camera, noise, options_.motion);
-    segmenting_.emplace([this](const SegmentationTask& task) { return segment_motion(task); },
-                        DueStageOptions{"motion segmentation", threaded, ThreadPriority::normal});
+    segmenting_.emplace("motion segmentation", [this] { segmentation_ = segment_motion(segmentation_task_); },
+                        threaded);
   }
   for (const auto& detector : prompt_) detector->reset();
   if (slow_ == nullptr) return;
@@ -96,22 +96,24 @@ Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   return made;
 }
 
-void SceneStage::begin(FrameIndex index, const Frame& frame, const Expectation& expected,
-                       const std::optional<FrameOutcome>& before) {
+void SceneStage::begin(const Frame& frame, const Expectation& expected, const std::optional<FrameOutcome>& before) {
   // What is left of a frame that failed in between belongs to nobody.
-  while (segmenting_ && segmenting_->outstanding() > 0) segmenting_->take_due(index, true);
+  if (segmenting_) segmenting_->finish();
   if (before) learn(*before);
   const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
-  if (segmenting_) segmenting_->push({frame, expected.cam_from_world, covariance}, index);
+  if (!segmenting_) return;
+  segmentation_task_ = {frame, expected.cam_from_world, covariance};
+  segmenting_->begin();
 }
 
-MoverMask SceneStage::take_motion(FrameIndex index, std::vector<Detection>& boxes) {
+MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
   if (!segmenting_) return {};
   const Stopwatch watch;
-  Segmentation made = *segmenting_->take_due(index, true);
+  segmenting_->finish();
+  segmentation_task_.frame = {};
   times_.add("motion", watch.ms());
-  times_.add("segmentation", made.ms);
-  MoverMask moving = std::move(made.mask);
+  times_.add("segmentation", segmentation_.ms);
+  MoverMask moving = std::move(segmentation_.mask);
   if (rival_ && !moving.empty())  // the rivals know boxes only
     for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
       const float c = static_cast<float>(moving.cell);
@@ -164,7 +166,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
   if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
-  const MoverMask moving = take_motion(scene.extracted.index, scene.boxes);
+  const MoverMask moving = take_motion(scene.boxes);
   if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
 
   watch = Stopwatch();

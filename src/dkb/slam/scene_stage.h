@@ -11,7 +11,7 @@
 #include "dkb/dynamics/motion_segmenter.h"
 #include "dkb/slam/detection_stage.h"
 #include "dkb/slam/scene.h"
-#include "dkb/util/due_stage.h"
+#include "dkb/util/side_task.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -67,8 +67,7 @@ class SceneStage {
     if (slow_stage_) slow_stage_->rest(on);
   }
   // Motion segmentation needs no corners: it starts, on a thread of its own, while they are extracted.
-  void begin(FrameIndex index, const Frame& frame, const Expectation& expected,
-             const std::optional<FrameOutcome>& before);
+  void begin(const Frame& frame, const Expectation& expected, const std::optional<FrameOutcome>& before);
   // Of the frame that was begun.
   Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
              const Expectation& expected);
@@ -90,7 +89,7 @@ class SceneStage {
   void learn(const FrameOutcome& before);
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
   Segmentation segment_motion(const SegmentationTask& task);
-  MoverMask take_motion(FrameIndex index, std::vector<Detection>& boxes);
+  MoverMask take_motion(std::vector<Detection>& boxes);
   MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
                     const MoverMask& moving) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
@@ -110,7 +109,9 @@ class SceneStage {
   PastFrames past_;               // as many as the slow detector's latency needs
   std::vector<std::string> warnings_;
   StageTimes times_;
-  std::optional<DueStage<SegmentationTask, Segmentation>> segmenting_;  // last: its thread ends first
+  SegmentationTask segmentation_task_;  // these two belong to segmenting_ while it is at work
+  Segmentation segmentation_;
+  std::optional<SideTask> segmenting_;  // last: its thread ends first
 };
 
 }  // namespace dkb

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/util/side_task.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "dkb/util/test_errors.h"
+
+namespace dkb {
+namespace {
+
+TEST(SideTask, DoesItsWorkOncePerRoundOnWhicheverThread) {
+  for (const bool threaded : {true, false}) {
+    int given = 0, sum = 0;
+    SideTask task("adding", [&] { sum += given; }, threaded);
+    for (int i = 1; i <= 5000; ++i) {
+      given = i;
+      task.begin();
+      task.finish();
+    }
+    EXPECT_EQ(sum, 5000 * 5001 / 2);
+  }
+}
+
+TEST(SideTask, HasNothingToFinishBeforeItIsBegun) {
+  int times = 0;
+  SideTask task("counting", [&] { ++times; }, true);
+  task.finish();
+  EXPECT_EQ(times, 0);
+  task.begin();
+  task.finish();
+  task.finish();
+  EXPECT_EQ(times, 1);
+}
+
+TEST(SideTask, ThrowsAtTheEndWhatTheWorkThrewAndGoesOn) {
+  for (const bool threaded : {true, false}) {
+    bool fails = true;
+    int times = 0;
+    SideTask task(
+        "counting",
+        [&] {
+          if (fails) throw std::runtime_error("no fingers");
+          ++times;
+        },
+        threaded);
+    task.begin();
+    EXPECT_EQ(test::input_error_of([&] { task.finish(); }), "counting failed: no fingers");
+    fails = false;
+    task.begin();
+    task.finish();
+    EXPECT_EQ(times, 1);
+  }
+}
+
+TEST(SideTask, MayBeDestroyedWhileAtWork) {
+  for (int i = 0; i < 200; ++i) {
+    int times = 0;
+    {
+      SideTask task("counting", [&] { ++times; }, true);
+      task.begin();
+    }
+    EXPECT_LE(times, 1);
+  }
+}
+
+}  // namespace
+}  // namespace dkb
