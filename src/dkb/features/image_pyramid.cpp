@@ -53,22 +53,23 @@ std::vector<ImagePyramid::Tap> ImagePyramid::make_taps(int source, int target, i
   return taps;
 }
 
-ImagePyramid::Resampling ImagePyramid::make_resampling(int width, int height, int next_width, int next_height) {
+ImagePyramid::Resampling ImagePyramid::make_resampling(int width, int height, int next_width, int next_height,
+                                                       Simd simd) {
   Resampling plan;
   plan.rows = make_taps(height, next_height, kRowOne);
   plan.columns = make_taps(width, next_width, kColumnOne);
-  plan.vectorised = true;
-  for (size_t x = 0; x + 8 <= plan.columns.size(); x += 4) {
-    const int start = plan.columns[x].index;
-    plan.group_start.push_back(start);
-    for (size_t i = 0; i < 4; ++i) {
-      const Tap& tap = plan.columns[x + i];
-      const int byte = 2 * (tap.index - start);
-      if (byte > 12) plan.vectorised = false;  // two 16-bit pixels must lie within the 16 bytes loaded
-      for (int k = 0; k < 4; ++k) plan.shuffles.push_back(static_cast<uint8_t>(byte + k));
-      plan.weights.push_back(static_cast<int16_t>(kColumnOne - tap.weight));
-      plan.weights.push_back(static_cast<int16_t>(tap.weight));
-    }
+  plan.simd = simd;
+  for (size_t x = 0; x < plan.columns.size(); ++x) {
+    const Tap& tap = plan.columns[x];
+    if (x % 4 == 0) plan.group_start.push_back(tap.index);
+    if (x % 16 == 0) plan.wide_start.push_back(tap.index);
+    const int byte = 2 * (tap.index - plan.group_start.back()), column = tap.index - plan.wide_start.back();
+    if (byte > 12) plan.simd = Simd::scalar;  // two 16-bit pixels must lie within the 16 bytes loaded
+    if (column > 30) plan.simd = std::min(plan.simd, Simd::avx2);  // and within 32 columns
+    for (int k = 0; k < 4; ++k) plan.shuffles.push_back(static_cast<uint8_t>(byte + k));
+    for (int k = 0; k < 2; ++k) plan.wide_columns.push_back(static_cast<uint16_t>(column + k));
+    plan.weights.push_back(static_cast<int16_t>(kColumnOne - tap.weight));
+    plan.weights.push_back(static_cast<int16_t>(tap.weight));
   }
   return plan;
 }
@@ -81,7 +82,7 @@ void ImagePyramid::plan(int width, int height) {
     const double factor = std::pow(options_.scale, i);
     const int w = static_cast<int>(std::lround(width / factor)), h = static_cast<int>(std::lround(height / factor));
     if (std::min(w, h) < options_.min_size) break;
-    resamplings_.push_back(make_resampling(images_.back().width(), images_.back().height(), w, h));
+    resamplings_.push_back(make_resampling(images_.back().width(), images_.back().height(), w, h, simd_));
     images_.emplace_back(w, h);
     scales_.push_back({static_cast<double>(width) / w, static_cast<double>(height) / h});
   }
@@ -90,20 +91,27 @@ void ImagePyramid::plan(int width, int height) {
 }
 
 void ImagePyramid::build(const GreyImage& image) {
+  start(image);
+  for (int i = 1; i < levels_; ++i) build_level(i);
+}
+
+void ImagePyramid::start(const GreyImage& image) {
   if (image.empty()) throw InputError("image pyramid: the image is empty; give one with at least one pixel");
   if (levels_ == 0 || images_[0].width() != image.width() || images_[0].height() != image.height())
     plan(image.width(), image.height());
   std::copy(image.data(), image.data() + image.size(), images_[0].data());
-  for (size_t i = 0; i < resamplings_.size(); ++i) {
-    const Resampling& resampling = resamplings_[i];
+}
+
+void ImagePyramid::build_level(int index) {
+  const auto i = static_cast<size_t>(index);
+  const Resampling& resampling = resamplings_[i - 1];
 #if defined(__x86_64__)
-    if (simd_ >= Simd::avx2 && resampling.vectorised) {
-      resample_avx2(resampling, images_[i], row_buffer_.data(), images_[i + 1]);
-      continue;
-    }
+  if (resampling.simd == Simd::avx512)
+    return resample_avx512(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
+  if (resampling.simd == Simd::avx2)
+    return resample_avx2(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
 #endif
-    resample_scalar(resampling, images_[i], row_buffer_.data(), images_[i + 1]);
-  }
+  resample_scalar(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
 }
 
 void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
@@ -122,7 +130,7 @@ void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& sour
 DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
                                                  GreyImage& target) {
   const int width = source.width();
-  const size_t groups = plan.group_start.size() & ~size_t{1};  // two groups of four pixels a step
+  const size_t groups = (plan.columns.size() / 4) & ~size_t{1};  // two groups of four pixels a step
   for (int y = 0; y < target.height(); ++y) {
     const Tap row = plan.rows[static_cast<size_t>(y)];
     const uint8_t* a = source.row(row.index);
@@ -155,6 +163,39 @@ DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const G
       __builtin_memcpy(out + 4 * g, &both, 8);
     }
     interpolate_columns(plan.columns, 4 * groups, row_buffer, out);
+  }
+}
+
+DKB_TARGET_AVX512 void ImagePyramid::resample_avx512(const Resampling& plan, const GreyImage& source,
+                                                     int16_t* row_buffer, GreyImage& target) {
+  const int width = source.width();
+  const size_t groups = plan.columns.size() / 16;
+  const __m512i round = _mm512_set1_epi32(kRound);
+  for (int y = 0; y < target.height(); ++y) {
+    const Tap row = plan.rows[static_cast<size_t>(y)];
+    const uint8_t* a = source.row(row.index);
+    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
+    const __m512i wa = _mm512_set1_epi16(static_cast<int16_t>(kRowOne - row.weight));
+    const __m512i wb = _mm512_set1_epi16(static_cast<int16_t>(row.weight));
+    int x = 0;
+    for (; x + 32 <= width; x += 32) {
+      const __m512i va = _mm512_cvtepu8_epi16(load_avx2(a + x)), vb = _mm512_cvtepu8_epi16(load_avx2(b + x));
+      const __m512i blend = _mm512_add_epi16(_mm512_mullo_epi16(va, wa), _mm512_mullo_epi16(vb, wb));
+      _mm512_storeu_si512(row_buffer + x, blend);
+    }
+    for (; x < width; ++x) row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+
+    uint8_t* out = target.row(y);
+    for (size_t g = 0; g < groups; ++g) {
+      const __m512i columns = _mm512_loadu_si512(plan.wide_columns.data() + 32 * g);
+      const __m512i weights = _mm512_loadu_si512(plan.weights.data() + 32 * g);
+      const __m512i pairs = _mm512_permutexvar_epi16(columns, _mm512_loadu_si512(row_buffer + plan.wide_start[g]));
+      // Masked, since GCC 12 warns of the undefined register that the plain ones start from.
+      const __m512i rounded = _mm512_add_epi32(_mm512_madd_epi16(pairs, weights), round);
+      const __m512i sums = _mm512_maskz_srai_epi32(0xFFFF, rounded, kShift);
+      _mm_storeu_si128(reinterpret_cast<__m128i*>(out + 16 * g), _mm512_maskz_cvtepi32_epi8(0xFFFF, sums));
+    }
+    interpolate_columns(plan.columns, 16 * groups, row_buffer, out);
   }
 }
 #endif

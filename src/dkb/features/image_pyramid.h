@@ -26,6 +26,10 @@ class ImagePyramid {
 
   // Throws InputError for an empty image.
   void build(const GreyImage& image);
+  // The same step by step: the image itself, then levels 1 ... levels() - 1 in order. Who makes a level on one thread
+  // may read those above it on others.
+  void start(const GreyImage& image);
+  void build_level(int index);
 
   // Levels built; less than asked for when the image is small. 0 before the first build().
   int levels() const { return levels_; }
@@ -49,11 +53,13 @@ class ImagePyramid {
   // Interpolation from one level to the next.
   struct Resampling {
     std::vector<Tap> rows, columns;
-    // For the vector kernel: per four output pixels the first source column, byte shuffles and weights.
-    std::vector<int32_t> group_start;
+    // For the vector kernels, two numbers per output pixel: its source columns, relative to the first of the group
+    // that it is worked at with, and their weights. Groups of 4 by AVX2 (of bytes), of 16 by AVX-512 (of columns).
+    std::vector<int32_t> group_start, wide_start;
     std::vector<uint8_t> shuffles;
+    std::vector<uint16_t> wide_columns;
     std::vector<int16_t> weights;
-    bool vectorised = false;
+    Simd simd = Simd::scalar;  // the best that can do it: groups must not reach farther than one register does
   };
   struct Scale {
     double x = 1, y = 1;
@@ -61,9 +67,10 @@ class ImagePyramid {
 
   void plan(int width, int height);
   static std::vector<Tap> make_taps(int source, int target, int one);
-  static Resampling make_resampling(int width, int height, int next_width, int next_height);
+  static Resampling make_resampling(int width, int height, int next_width, int next_height, Simd simd);
   static void resample_scalar(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
   static void resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
+  static void resample_avx512(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
 
   ImagePyramidOptions options_;
   Simd simd_;

@@ -135,27 +135,37 @@ TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {
   for (Keypoint& p : points) {
     p.pixel.x() = static_cast<float>(random.uniform(-30, 670));  // some outside the image
     p.pixel.y() = static_cast<float>(random.uniform(-30, 510));
+    p.octave = static_cast<uint8_t>(random.below(8));
   }
   const KeypointGrid grid(points, 640, 480);
   for (int trial = 0; trial < 100; ++trial) {
     const float cx = static_cast<float>(random.uniform(-40, 680)), cy = static_cast<float>(random.uniform(-40, 520));
     const float radius = static_cast<float>(random.uniform(0, 60));
     std::vector<int> found, again, expected;
-    grid.for_each_near(cx, cy, radius, [&](int i) { found.push_back(i); });
-    grid.for_each_near(cx, cy, radius, [&](int i) { again.push_back(i); });
+    grid.for_each_near({cx, cy, radius}, [&](int i) { found.push_back(i); });
+    grid.for_each_near({cx, cy, radius}, [&](int i) { again.push_back(i); });
     EXPECT_EQ(found, again);
     for (size_t i = 0; i < points.size(); ++i)
       if (std::abs(points[i].pixel.x() - cx) <= radius && std::abs(points[i].pixel.y() - cy) <= radius)
         expected.push_back(static_cast<int>(i));
     std::sort(found.begin(), found.end());
     EXPECT_EQ(found, expected);
+    const int least = static_cast<int>(random.below(9)) - 1, most = least + 2;
+    found.clear();
+    grid.for_each_near({cx, cy, radius, least, most}, [&](int i) { found.push_back(i); });
+    std::sort(found.begin(), found.end());
+    std::erase_if(expected, [&](int i) {
+      const int octave = points[static_cast<size_t>(i)].octave;
+      return octave < least || octave > most;
+    });
+    EXPECT_EQ(found, expected);
   }
 }
 
 TEST(KeypointGrid, AnEmptyGridHasNoNeighbours) {
   int visits = 0;
-  KeypointGrid().for_each_near(1, 1, 100, [&](int) { ++visits; });
-  KeypointGrid(std::vector<Keypoint>(), 640, 480).for_each_near(1, 1, 100, [&](int) { ++visits; });
+  KeypointGrid().for_each_near({1, 1, 100}, [&](int) { ++visits; });
+  KeypointGrid(std::vector<Keypoint>(), 640, 480).for_each_near({1, 1, 100}, [&](int) { ++visits; });
   EXPECT_EQ(visits, 0);
 }
 

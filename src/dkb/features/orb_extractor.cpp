@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "dkb/features/orientation.h"
 #include "dkb/features/subpixel.h"
@@ -11,27 +13,41 @@
 
 namespace dkb {
 
-OrbExtractor::OrbExtractor(OrbOptions options, Simd simd)
+OrbExtractor::OrbExtractor(OrbOptions options, Simd simd, bool threaded)
     : options_(options),
       simd_(simd),
       pyramid_({.levels = options.levels, .scale = options.scale}, simd),
-      finder_(simd),
-      blur_(simd),
-      brief_(simd) {}
+      brief_(simd),
+      worker_(simd),
+      other_worker_(simd),
+      beside_("feature extraction", [this] { take_levels(other_worker_); }, threaded) {}
 
 CornerRegion OrbExtractor::region(int level) const {
   const GreyImage& image = pyramid_.level(level);
   return {kOrbBorder, kOrbBorder, image.width() - kOrbBorder, image.height() - kOrbBorder};
 }
 
-void OrbExtractor::find_corners() {
-  const size_t levels = static_cast<size_t>(pyramid_.levels());
-  corners_.resize(levels);
-  for (size_t i = 0; i < levels; ++i) {
-    const int level = static_cast<int>(i);
-    finder_.find(pyramid_.level(level), options_.fast_threshold_min, kOrbBorder, corners_[i]);
-    spread_.drop_weak(region(level), options_.fast_threshold, kOrbCellSize, corners_[i]);
+void OrbExtractor::each_level(LevelStep step, const auto& before) {
+  step_ = step;
+  next_level_ = 0;
+  beside_.begin();
+  before();
+  take_levels(worker_);
+  beside_.finish();
+}
+
+// Each level is taken by one thread, the large ones first. What it makes has a place of its own.
+void OrbExtractor::take_levels(Worker& worker) {
+  for (int level = next_level_++; level < pyramid_.levels(); level = next_level_++) {
+    for (int built = levels_built_; built <= level; built = levels_built_) levels_built_.wait(built);
+    (this->*step_)(level, worker);
   }
+}
+
+void OrbExtractor::find_corners(int level, Worker& worker) {
+  auto& corners = corners_[static_cast<size_t>(level)];
+  worker.finder.find(pyramid_.level(level), options_.fast_threshold_min, kOrbBorder, corners);
+  worker.spread.drop_weak(region(level), options_.fast_threshold, kOrbCellSize, corners);
 }
 
 std::vector<int> OrbExtractor::quotas(const std::vector<std::vector<PixelCorner>>& corners, int count) const {
@@ -73,62 +89,75 @@ void OrbExtractor::split_corners(const Image<uint8_t>& poor, int cell) {
   }
 }
 
-// Keeps `count` of all levels' corners and returns how many there are now.
-int OrbExtractor::keep(std::vector<std::vector<PixelCorner>>& corners, int count) {
-  const std::vector<int> quota = quotas(corners, count);
-  int kept = 0;
-  for (size_t i = 0; i < corners.size(); ++i) {
-    if (!corners[i].empty()) spread_.keep(region(static_cast<int>(i)), quota[i], corners[i]);
-    kept += static_cast<int>(corners[i].size());
+void OrbExtractor::describe_corners(int level, Worker& worker) {
+  const auto i = static_cast<size_t>(level);
+  std::vector<PixelCorner>& corners = corners_[i];
+  worker.spread.keep(region(level), quotas_[i], corners);
+  if (!poor_quotas_.empty()) {
+    worker.spread.keep(region(level), poor_quotas_[i], poor_corners_[i]);
+    corners.insert(corners.end(), poor_corners_[i].begin(), poor_corners_[i].end());
   }
-  return kept;
+  if (corners.empty()) return;
+  const GreyImage& pixels = pyramid_.level(level);
+  GreyImage& blurred = blurred_[i];
+  worker.blur.apply(pixels, blurred);
+  size_t at = firsts_[i];
+  for (const PixelCorner& pixel : corners) {
+    Corner& corner = features_.corners[at];
+    corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
+    const SubpixelOffset offset =
+        options_.subpixel ? refine_corner(pixels, pixel.x, pixel.y, simd_) : SubpixelOffset{};
+    corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x + offset.x));
+    corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y + offset.y));
+    corner.place_sigma = offset.sigma * static_cast<float>(pyramid_.scale_x(level));
+    corner.response = pixel.score;
+    corner.octave = static_cast<uint8_t>(level);
+    features_.descriptors[at++] = brief_.describe(blurred.row(pixel.y) + pixel.x, pixels.width(), corner.angle);
+  }
 }
 
 OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& poor, int cell) {
   if (image.width() > 65535 || image.height() > 65535)
     throw InputError("feature extraction: the image is " + std::to_string(image.width()) + " x " +
                      std::to_string(image.height()) + " pixels; at most 65535 per side are possible");
-  pyramid_.build(image);
-  find_corners();
+  pyramid_.start(image);
+  const auto levels = static_cast<size_t>(pyramid_.levels());
+  corners_.resize(levels);
+  blurred_.resize(levels);
+  levels_built_ = 1;
+  each_level(&OrbExtractor::find_corners, [this] {
+    for (int level = 1; level < pyramid_.levels(); ++level) {
+      pyramid_.build_level(level);
+      levels_built_ = level + 1;
+      levels_built_.notify_one();
+    }
+  });
+
+  poor_quotas_.clear();
   if (poor.empty()) {
-    keep(corners_, options_.count);
+    quotas_ = quotas(corners_, options_.count);
   } else {
     split_corners(poor, cell);
-    size_t rich = 0;
-    for (const auto& corners : corners_) rich += corners.size();
+    const auto number = [](const auto& of_levels) {
+      size_t sum = 0;
+      for (const auto& corners : of_levels) sum += corners.size();
+      return static_cast<int>(sum);
+    };
     // The poor place keeps what it has when the others cannot use their half.
-    const int half = static_cast<int>(std::min(rich, static_cast<size_t>(options_.count + 1) / 2));
-    const int kept = keep(poor_corners_, options_.count - half);
-    keep(corners_, options_.count - kept);
-    for (size_t i = 0; i < corners_.size(); ++i)
-      corners_[i].insert(corners_[i].end(), poor_corners_[i].begin(), poor_corners_[i].end());
+    const int half = std::min(number(corners_), (options_.count + 1) / 2);
+    poor_quotas_ = quotas(poor_corners_, options_.count - half);
+    quotas_ = quotas(corners_, options_.count - std::accumulate(poor_quotas_.begin(), poor_quotas_.end(), 0));
   }
-  blurred_.resize(corners_.size());
-  OrbFeatures features;
-  features.corners.reserve(static_cast<size_t>(options_.count));
-  features.descriptors.reserve(static_cast<size_t>(options_.count));
-  for (size_t i = 0; i < corners_.size(); ++i) {
-    const int level = static_cast<int>(i);
-    const std::vector<PixelCorner>& corners = corners_[i];
-    if (corners.empty()) continue;
-    const GreyImage& pixels = pyramid_.level(level);
-    GreyImage& blurred = blurred_[i];
-    blur_.apply(pixels, blurred);
-    for (const PixelCorner& pixel : corners) {
-      Corner corner;
-      corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
-      const SubpixelOffset offset =
-          options_.subpixel ? refine_corner(pixels, pixel.x, pixel.y, simd_) : SubpixelOffset{};
-      corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x + offset.x));
-      corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y + offset.y));
-      corner.place_sigma = offset.sigma * static_cast<float>(pyramid_.scale_x(level));
-      corner.response = pixel.score;
-      corner.octave = static_cast<uint8_t>(level);
-      features.corners.push_back(corner);
-      features.descriptors.push_back(brief_.describe(blurred.row(pixel.y) + pixel.x, pixels.width(), corner.angle));
-    }
+  firsts_.assign(levels, 0);
+  size_t count = 0;
+  for (size_t i = 0; i < levels; ++i) {
+    firsts_[i] = count;
+    count += static_cast<size_t>(quotas_[i] + (poor_quotas_.empty() ? 0 : poor_quotas_[i]));
   }
-  return features;
+  features_.corners.resize(count);
+  features_.descriptors.resize(count);
+  each_level(&OrbExtractor::describe_corners, [] {});
+  return std::exchange(features_, {});
 }
 
 }  // namespace dkb

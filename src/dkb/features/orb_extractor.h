@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "dkb/features/simd.h"
 #include "dkb/features/steered_brief.h"
 #include "dkb/image/image.h"
+#include "dkb/util/side_task.h"
 
 namespace dkb {
 
@@ -30,10 +32,11 @@ struct OrbOptions {
 
 // Oriented FAST corners with rotated BRIEF descriptors on an image pyramid (Rublee et al., ICCV 2011), spread evenly
 // over the image and, by area, over the levels. Keeps its buffers from frame to frame; one object per thread.
-// Deterministic: the same image gives the same features, on every processor.
+// Deterministic: the same image gives the same features, on every processor, with and without a thread beside.
 class OrbExtractor {
  public:
-  explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd());
+  // `threaded`: a thread of its own takes a share of the levels.
+  explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd(), bool threaded = false);
 
   // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 65535.
   // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
@@ -46,22 +49,40 @@ class OrbExtractor {
   const OrbOptions& options() const { return options_; }
 
  private:
+  // What one thread keeps its buffers in.
+  struct Worker {
+    explicit Worker(Simd simd) : finder(simd), blur(simd) {}
+    FastCornerFinder finder;
+    CornerSpread spread;
+    GaussianBlur blur;
+  };
+  using LevelStep = void (OrbExtractor::*)(int level, Worker& worker);
+
   CornerRegion region(int level) const;
-  void find_corners();
+  // `step` for every level, by both threads; `before` is done first by the one that calls.
+  void each_level(LevelStep step, const auto& before);
+  void take_levels(Worker& worker);
+  void find_corners(int level, Worker& worker);
+  void describe_corners(int level, Worker& worker);
   // How many of each level's corners to keep, `count` in all: by area, what a level lacks goes to the others.
   std::vector<int> quotas(const std::vector<std::vector<PixelCorner>>& corners, int count) const;
   void split_corners(const Image<uint8_t>& poor, int cell);
-  int keep(std::vector<std::vector<PixelCorner>>& corners, int count);
 
   OrbOptions options_;
   Simd simd_;
   ImagePyramid pyramid_;
-  FastCornerFinder finder_;
-  CornerSpread spread_;
-  GaussianBlur blur_;
   SteeredBrief brief_;
   std::vector<std::vector<PixelCorner>> corners_, poor_corners_;  // per level
+  std::vector<int> quotas_, poor_quotas_;                         // per level
   std::vector<GreyImage> blurred_;                                // per level
+  std::vector<size_t> firsts_;                                    // of each level in `features_`
+  OrbFeatures features_;
+
+  LevelStep step_ = nullptr;
+  std::atomic<int> next_level_ = 0;    // that nobody works at
+  std::atomic<int> levels_built_ = 0;  // of the pyramid
+  Worker worker_, other_worker_;
+  SideTask beside_;  // last: its thread ends first
 };
 
 }  // namespace dkb

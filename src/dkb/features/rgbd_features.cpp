@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "dkb/features/vectorised.h"
+
 namespace dkb {
 namespace {
 
@@ -62,16 +64,29 @@ CornerDepths::Depth CornerDepths::at(float x, float y) const {
 }
 
 float CornerDepths::nearest_around(int cx, int cy) const {
-  float nearest[kAcross];  // by column, so that a row is taken at once
-  std::fill_n(nearest, kAcross, kFar);
-  for (int y = cy - kReach; y <= cy + kReach; ++y) {
-    const float* row = &depth_(cx - kReach, y);
-    for (int k = 0; k < kAcross; ++k) {
-      const float d = row[k] > 0 ? row[k] : kFar;
-      nearest[k] = d < nearest[k] ? d : nearest[k];
+  float nearest = kFar;
+  run_vectorised(simd_, [first = &depth_(cx - kReach, cy - kReach), stride = depth_.width(),
+                         to = &nearest]() DKB_KERNEL_BODY {
+    // Nine columns as two times eight, so that a row is two registers.
+    static_assert(kAcross == 9);
+    using Eight = float __attribute__((vector_size(32)));
+    const Eight far = Eight{} + kFar;
+    Eight left = far, right = far;
+    for (int y = 0; y < kAcross; ++y) {
+      Eight here, beside;
+      __builtin_memcpy(&here, first + y * stride, sizeof here);
+      __builtin_memcpy(&beside, first + y * stride + 1, sizeof beside);
+      here = here > 0 ? here : far;
+      beside = beside > 0 ? beside : far;
+      left = here < left ? here : left;
+      right = beside < right ? beside : right;
     }
-  }
-  return *std::min_element(nearest, nearest + kAcross);
+    left = left < right ? left : right;
+    float least = left[0];
+    for (int k = 1; k < 8; ++k) least = left[k] < least ? left[k] : least;
+    *to = least;
+  });
+  return nearest;
 }
 
 // The depth, up to `limit`, that lies nearest in the image.

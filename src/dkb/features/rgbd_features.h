@@ -7,6 +7,7 @@
 
 #include "dkb/features/features.h"
 #include "dkb/features/keypoint_grid.h"
+#include "dkb/features/simd.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
@@ -81,8 +82,8 @@ class UndistortionTable {
 class CornerDepths {
  public:
   // `depth` must outlive it.
-  CornerDepths(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise)
-      : depth_(depth), focal_(camera.fx), noise_(noise) {}
+  CornerDepths(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise, Simd simd = best_simd())
+      : depth_(depth), focal_(camera.fx), noise_(noise), simd_(simd) {}
 
   struct Depth {
     float own = 0, lent = 0;                           // [m] one of the two at most
@@ -100,6 +101,7 @@ class CornerDepths {
   const DepthImage& depth_;
   const double focal_;
   const SensorNoise& noise_;
+  const Simd simd_;
 };
 
 // Corners with depth and colour, as a camera that stands still has them.

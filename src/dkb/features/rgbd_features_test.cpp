@@ -65,7 +65,7 @@ TEST(RgbdFeatures, CarryWhatExtractionFound) {
   EXPECT_EQ(k.octave, 2);
   EXPECT_EQ(k.colour, (Rgb{10, 20, 30}));
   int near = 0;
-  f.grid.for_each_near(301, 199, 2, [&](int i) { near += i == 1; });
+  f.grid.for_each_near({301, 199, 2}, [&](int i) { near += i == 1; });
   EXPECT_EQ(near, 1);
 }
 
@@ -287,7 +287,7 @@ TEST(RgbdFeatures, NothingFoundIsNoError) {
   const CameraModel camera = plain_camera();
   const RgbdFeatures f = make({}, image_of(camera, 2), camera);
   EXPECT_EQ(f.size(), 0U);
-  f.grid.for_each_near(100, 100, 50, [](int) { FAIL(); });
+  f.grid.for_each_near({100, 100, 50}, [](int) { FAIL(); });
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ void write(ByteWriter& out, const RgbdFeatures& features) {
     out.u8(k.octave);
     write(out, k.colour);
     write(out, features.descriptors[i]);
-    features.grid.for_each_near(k.pixel.x(), k.pixel.y(), 8, [&](int near) { out.i32(near); });
+    features.grid.for_each_near({k.pixel.x(), k.pixel.y(), 8}, [&](int near) { out.i32(near); });
   }
 }
 

@@ -70,13 +70,13 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (scale < nearest_scale || scale > farthest_scale) continue;
     if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < options.min_view_cosine * distance) continue;
     if (visible != nullptr) (*visible)[i] = 1;
+    // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;
-    while (level < levels - 1 && scale > boundary[static_cast<size_t>(level)]) ++level;
+    for (int l = 0; l < levels - 1; ++l) level += scale > boundary[static_cast<size_t>(l)] ? 1 : 0;
     const float radius = options.radius * scales[static_cast<size_t>(level)];
     int best = 256, second = 256, best_feature = -1, best_level = -1, second_level = -1;
-    features.grid.for_each_near(u, v, radius, [&](int f) {
+    features.grid.for_each_near({u, v, radius, level - 1, level + 1}, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
-      if (k.octave < level - 1 || k.octave > level + 1) return;
       if (p.z() < k.lent_depth && !may_show(k, p.z(), options.noise)) return;
       if (matchable.on_mover(static_cast<size_t>(f)) &&
           (!c.established || (k.depth > 0 && !options.noise.same_surface(k.depth, p.z()))))

@@ -225,6 +225,7 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   o.smooth_trajectory = false;
   o.depth.model_rolling_shutter = false;
   o.depth.model_time_offset = false;
+  o.features.count = 1000;  // of every image
   o.dynamics.filter = FilterKind::paper;
   o.adaptive_keyframes = paper_keyframe_options();
   o.mapping.ba.weights.adaptive = false;

@@ -30,7 +30,7 @@ struct PipelineOptions {
 
 // What the stages are made from.
 struct SlamOptions {
-  OrbOptions features;
+  OrbOptions features{.count = 800};
   DepthOptions depth;
   SensorNoise noise;
   TrackingOptions tracking;

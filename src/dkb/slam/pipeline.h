@@ -68,10 +68,12 @@ class Pipeline {
     return mapping_due_ = std::max(mapping_due_, next_frame_ + rate_.frames(options_.pipeline.mapper_latency));
   }
   void shed_load();
+  bool late_for_features() const { return load_ && load_->level() >= LoadShedding::kFeatures; }
   void follow_motion(const Scene& scene);  // since the last keyframe
   void take_due_map();
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
+  int features_wanted() const;
   ExtractedFrame extract(const Frame& frame);
   Expectation expect(const Frame& frame) const;
   TrackedFrame track(const Scene& scene, const UsableFeatures& usable);

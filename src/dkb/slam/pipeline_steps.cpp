@@ -12,6 +12,7 @@ namespace dkb {
 namespace {
 
 constexpr int kFeatureShare = 2;  // by which the features are cut in a real-time run that is late
+constexpr double kUsualFeatures = 1000;  // of a frame, that the numbers of keyframe rules are meant for
 
 std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
   if (context.policy) return std::make_unique<UserKeyframeDecider>(context.policy);
@@ -34,7 +35,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       options_(context.options),
       record_(record),
       undistort_(context.camera),
-      extractor_(options_.features),
+      extractor_(options_.features, best_simd(), options_.pipeline.threaded),
       planes_(context.camera, options_.noise),
       tracker_(context.camera, options_.noise, options_.features.scale, options_.features.levels, options_.tracking,
                options_.seed),
@@ -88,8 +89,6 @@ void Pipeline::shed_load() {
   load_->begin(last_stamp_ns_, steady_ns());
   const LoadShedding::Level level = load_->level();
   scenes_.rest_detector(level >= LoadShedding::kDetection);
-  const int count = options_.features.count;
-  extractor_.set_count(level >= LoadShedding::kFeatures ? (count + kFeatureShare - 1) / kFeatureShare : count);
   if (std::string warning = load_->take_warning(); !warning.empty()) note(Event::Kind::warning, std::move(warning));
 }
 
@@ -128,11 +127,17 @@ void Pipeline::correct(std::vector<std::shared_ptr<const MapCorrection>> correct
   }
 }
 
+int Pipeline::features_wanted() const {
+  const int count = options_.features.count;
+  return late_for_features() ? (count + kFeatureShare - 1) / kFeatureShare : count;
+}
+
 ExtractedFrame Pipeline::extract(const Frame& frame) {
   const Stopwatch watch;
   const GreyImage& grey = frame.image()->grey;
   // When movers took most of the last frame's features, the rest of the image gets its half now.
   const bool crowded = crowded_share_ > 0.5 && !last_mask_.empty();
+  extractor_.set_count(features_wanted());
   ExtractedFrame extracted{
       next_frame_, frame,
       crowded ? extractor_.extract(grey, last_mask_.cells, last_mask_.cell) : extractor_.extract(grey)};
@@ -246,15 +251,19 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     c.last_relocalisation_frame = last_relocalisation_;
     c.last_keyframe = last_keyframe_.id;
     c.mapper_idle = mapping_.outstanding() == 0;
-    // The rules' numbers are those of a frame with all its features.
-    const int share = load_ && load_->level() >= LoadShedding::kFeatures ? kFeatureShare : 1;
-    c.tracked_points = share * tracked.inliers;
+    const auto as_usual = [](int count, int of) { return static_cast<int>(std::lround(kUsualFeatures * count / of)); };
+    const int wanted = features_wanted();
+    int tracked_close = 0, creatable_close = 0;
     for (size_t f = 0; f < tracked.points.size(); ++f) {
       const float z = tracked.features->keypoints[f].depth;
       if (!(z > 0) || z > options_.tracking.close_depth) continue;
-      (tracked.points[f] != kNoPoint ? c.tracked_close_points : c.creatable_close_points) += share;
+      ++(tracked.points[f] != kNoPoint ? tracked_close : creatable_close);
     }
-    c.reference_points = tracker_.reference_point_count(tracked.reference, next_keyframe_ > 2 ? 2 : 1);
+    c.tracked_points = as_usual(tracked.inliers, wanted);
+    c.tracked_close_points = as_usual(tracked_close, wanted);
+    c.creatable_close_points = as_usual(creatable_close, wanted);
+    c.reference_points = as_usual(tracker_.reference_point_count(tracked.reference, next_keyframe_ > 2 ? 2 : 1),
+                                  options_.features.count);
     c.cam_from_world = tracked.cam_from_world;
     c.last_keyframe_cam_from_world = tracker_.map().cam_from_world(c.last_keyframe);
     c.points = &tracked.points;

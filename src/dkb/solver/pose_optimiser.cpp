@@ -19,7 +19,6 @@ using solver::CameraPose;
 // such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
 // freedom (Lange, Little and Taylor, JASA 1989), about a scale that each pose's own observations tell.
 constexpr double kFreedom = 4;
-constexpr int kTailRounds = 3;         // of weights and a step
 constexpr double kMedianChi2 = 1.386;  // of two degrees of freedom
 // By such weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average, claim
 // 1 / 1.084: E[w^2 x] / 2 / E[24 / (4 + x)^2]^2 with w = 6 / (4 + x) and x of two degrees of freedom.
@@ -215,6 +214,7 @@ void PoseOptions::check() const {
   require_option(rounds >= 1, "rounds", rounds, ">= 1");
   require_option(iterations >= 1, "iterations", iterations, ">= 1");
   require_option(robust_rounds >= 0, "robust_rounds", robust_rounds, ">= 0");
+  require_option(tail_rounds >= 0, "tail_rounds", tail_rounds, ">= 0");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
   require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
   require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
@@ -242,7 +242,7 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
     if (estimate.inlier == used) break;
     used = estimate.inlier;
   }
-  for (int round = 0; round < kTailRounds; ++round) {
+  for (int round = 0; round < options.tail_rounds; ++round) {
     problem.weigh(estimate.inlier, pose);
     pose = one_step(problem, pose);
     ++estimate.iterations;

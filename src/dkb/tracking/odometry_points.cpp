@@ -69,7 +69,7 @@ bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypo
 float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& keypoint) {
   float sum = 0;
   int count = 0;
-  frame.features->grid.for_each_near(keypoint.pixel.x(), keypoint.pixel.y(), kSurroundings, [&](int f) {
+  frame.features->grid.for_each_near({keypoint.pixel.x(), keypoint.pixel.y(), kSurroundings}, [&](int f) {
     const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
     if (!(k.depth > 0)) return;
     sum += 1.0f / k.depth;

@@ -122,7 +122,7 @@ Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, co
 }
 
 PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
-                             const std::optional<PosePrediction>& expected) const {
+                             const std::optional<PosePrediction>& expected, const PoseOptions& options) const {
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
@@ -133,9 +133,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
-  if (!expected || !expected->weighs) return optimise_pose(camera_, initial, observations);
+  if (!expected || !expected->weighs) return optimise_pose(camera_, initial, observations, options);
   const PosePrior prior{expected->cam_from_world, expected->covariance.inverse()};
-  return optimise_pose(camera_, initial, observations, {}, &prior);
+  return optimise_pose(camera_, initial, observations, options, &prior);
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {

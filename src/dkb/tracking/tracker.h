@@ -97,7 +97,7 @@ class Tracker {
   };
   Pair odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
-                      const std::optional<PosePrediction>& expected = {}) const;
+                      const std::optional<PosePrediction>& expected = {}, const PoseOptions& options = {}) const;
   std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
                                          std::vector<PointId>& points) const;
   std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;

@@ -49,7 +49,8 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
   std::vector<Pair> pairs;
   pairs.reserve(matches.size());
   for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
-  const PoseEstimate pose = refine(predicted, pairs, features.features);
+  // It need only say where the map is to be searched.
+  const PoseEstimate pose = refine(predicted, pairs, features.features, {}, {.tail_rounds = 0});
   if (!pose.ok || pose.inliers < kMinMatches / 2) return std::nullopt;
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
