@@ -107,7 +107,7 @@ class DKB_SLAM_API Options {
   } dense;
 
   struct Pipeline {
-    double mapper_latency = 0.06;  ///< [s] after which tracking sees a keyframe's mapping, in whole frames, above 0
+    double mapper_latency = 0.1;  ///< [s] after which tracking sees a keyframe's mapping, in whole frames, above 0
     int mapper_queue = 4;          ///< [keyframes] that may wait for mapping in a real-time run, at least 1
   } pipeline;
 

@@ -2,6 +2,7 @@
 #include "dkb/dataset/rgbd_reader.h"
 
 #include "dkb/util/errors.h"
+#include "dkb/util/thread_priority.h"
 #include "dkb/util/thrown.h"
 
 namespace dkb {
@@ -124,6 +125,7 @@ RgbdReader::Slot RgbdReader::decoded(Probed next, size_t index) {
 // Pairs are taken from the recording by one worker at a time, which adds the pair's place in the order before it lets
 // the next one do so.
 void RgbdReader::run() {
+  set_thread_priority(ThreadPriority::background);
   std::unique_lock lock(mutex_);
   while (true) {
     room_.wait(lock, [this] {

@@ -61,12 +61,26 @@ void CornerSpread::keep(const CornerRegion& region, int count, std::vector<Pixel
   keys_.resize(corners.size());
   for (size_t i = 0; i < corners.size(); ++i)
     keys_[i] = static_cast<uint64_t>(corners[order_[i]].score) << 32 | (0xFFFFFFFFu - order_[i]);
-  for (size_t c = 0; c < cells; ++c)
-    std::sort(keys_.begin() + starts_[c], keys_.begin() + starts_[c + 1], std::greater<>());
+  const auto sort_all_cells = [&](uint32_t first, uint32_t end) {
+    for (size_t c = 0; c < cells; ++c) {
+      const auto from = keys_.begin() + std::min(starts_[c] + first, starts_[c + 1]);
+      const auto to = keys_.begin() + starts_[c + 1];
+      if (to - from > static_cast<ptrdiff_t>(end - first))
+        std::partial_sort(from, from + (end - first), to, std::greater<>());
+      else
+        std::sort(from, to, std::greater<>());
+    }
+  };
 
   taken_.assign(cells, 0);
   size_t left = static_cast<size_t>(count);
+  // No more are put in order than are looked at: most cells have several times as many as they give.
+  uint32_t in_order = 0;
   for (uint32_t round = 0; left > 0; ++round) {
+    if (round == in_order) {
+      sort_all_cells(in_order, in_order + 2 * kCornersPerCell);
+      in_order += 2 * kCornersPerCell;
+    }
     last_round_.clear();
     for (size_t c = 0; c < cells; ++c)
       if (starts_[c] + round < starts_[c + 1])

@@ -15,13 +15,13 @@ FrameResult Pipeline::process(const Frame& frame) {
   FrameResult result;
   const Stopwatch waiting;
   take_due_map();
-  const std::vector<DueDetections> detections = scenes_.exchange(next_frame_, frame);
+  std::vector<DueDetections> detections = scenes_.exchange(next_frame_, frame);
   result.waiting_ms = waiting.ms();
 
   const Stopwatch working;
   const Expectation expected = expect(frame);
-  scenes_.begin(frame, expected, outcome_);
-  const Scene scene = scenes_.look(extract(frame), undistort_, detections, expected);  // DKB 3.1
+  scenes_.begin(next_frame_, frame, std::move(detections), expected, outcome_);
+  const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
   follow_motion(scene);
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene);

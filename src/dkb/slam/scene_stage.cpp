@@ -24,7 +24,7 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
       prompt_(detectors.prompt),
       slow_(detectors.slow),
       inference_(detectors.inference),
-      carried_(camera, noise, options.carried) {
+      objects_(camera, noise, options.carried) {
   options_.rivals.flow = options_.carried.flow;
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
@@ -38,6 +38,8 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
                         threaded);
   }
   for (const auto& detector : prompt_) detector->reset();
+  if (slow_ != nullptr || (rival_ && rival_->needs_pyramid()))
+    carrying_.emplace("carrying detections", [this] { carried_ = carry(carry_task_); }, threaded);
   if (slow_ == nullptr) return;
   slow_->reset();
   slow_stage_.emplace(*slow_, camera, schedule_, threaded, realtime);
@@ -96,14 +98,38 @@ Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   return made;
 }
 
-void SceneStage::begin(const Frame& frame, const Expectation& expected, const std::optional<FrameOutcome>& before) {
+Carried SceneStage::carry(const CarryTask& task) {
+  const Stopwatch watch;
+  const RgbdImage& image = *task.frame.image();
+  Carried made;
+  auto pyramid = std::make_shared<ImagePyramid>(options_.carried.flow.pyramid());
+  pyramid->build(image.grey);
+  if (slow_stage_) objects_.follow(past_, *pyramid);
+  for (const DueDetections& d : task.due) {
+    auto late = objects_.receive(d.frame, d.detections, task.index, past_, *pyramid, options_.motion.cell);
+    if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
+  }
+  if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
+  made.pyramid = std::move(pyramid);
+  made.ms = watch.ms();
+  return made;
+}
+
+void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDetections> due,
+                       const Expectation& expected, const std::optional<FrameOutcome>& before) {
   // What is left of a frame that failed in between belongs to nobody.
-  if (segmenting_) segmenting_->finish();
+  for (auto* task : {&segmenting_, &carrying_})
+    if (*task) (*task)->finish();
   if (before) learn(*before);
-  const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
-  if (!segmenting_) return;
-  segmentation_task_ = {frame, expected.cam_from_world, covariance};
-  segmenting_->begin();
+  if (segmenting_) {
+    const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
+    segmentation_task_ = {frame, expected.cam_from_world, covariance};
+    segmenting_->begin();
+  }
+  if (carrying_) {
+    carry_task_ = {frame, index, std::move(due)};
+    carrying_->begin();
+  }
 }
 
 MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
@@ -122,13 +148,8 @@ MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
   return moving;
 }
 
-MoverMask SceneStage::mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
-                              const MoverMask& moving) const {
-  MoverMask mask = silhouettes(image.depth, unmasked, camera_, noise_, options_.carried.silhouette);
-  if (motion_) clear_still(mask, motion_->score(), options_.motion.cell);
-  unite(mask, given, camera_.width, camera_.height);
-  if (segments_motion_) unite(mask, moving, camera_.width, camera_.height);
-  return mask;
+MoverMask SceneStage::silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const {
+  return silhouettes(image.depth, boxes, camera_, noise_, options_.carried.silhouette);
 }
 
 void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid) {
@@ -139,8 +160,7 @@ void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const Ima
   while (past_.size() > kept) past_.pop_front();
 }
 
-Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
-                       const Expectation& expected) {
+Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort, const Expectation& expected) {
   Scene scene;
   scene.rejected.assign(frame.orb.corners.size(), FeatureReason::none);
   scene.extracted = std::move(frame);
@@ -149,22 +169,17 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   const RgbdImage& image = scene.extracted.image();
 
   Stopwatch watch;
-  std::shared_ptr<const ImagePyramid> pyramid;
-  if (slow_stage_ || (rival_ && rival_->needs_pyramid())) {
-    auto made = std::make_shared<ImagePyramid>(options_.carried.flow.pyramid());
-    made->build(image.grey);
-    pyramid = std::move(made);
+  if (carrying_) {
+    carrying_->finish();
+    carry_task_ = {};
+    times_.add("carrying", carried_.ms);
   }
-  if (slow_stage_) carried_.follow(past_, *pyramid);
-  for (const DueDetections& d : due) {
-    auto late = carried_.receive(d.frame, d.detections, scene.extracted.index, past_, *pyramid, options_.motion.cell);
-    if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(scene.late_masks));
-  }
-  scene.boxes = carried_.boxes();
+  Carried carried = std::exchange(carried_, {});
+  scene.late_masks = std::move(carried.late_masks);
+  scene.boxes = objects_.boxes();
   std::vector<Detection> unmasked;
-  if (carried_.mask().empty()) unmasked = scene.boxes;
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
-  if (!carried_.mask().empty()) unite(given, {1, carried_.mask()}, camera_.width, camera_.height);
+  if (!objects_.mask().empty()) unite(given, {1, objects_.mask()}, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
   const MoverMask moving = take_motion(scene.boxes);
   if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
@@ -174,17 +189,21 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   if (rival_) {
     const auto dynamic =
         rival_->dynamic({scene.extracted.orb, image, undistort, scene.boxes, past_.empty() ? nullptr : &past_.back(),
-                         pyramid.get(), expected.current_from_previous(), expected.keyframe_points_in_camera});
+                         carried.pyramid.get(), expected.current_from_previous(), expected.keyframe_points_in_camera});
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
-    scene.mask = mask_of(image, unmasked, given, moving);
+    scene.mask = silhouettes_of(image, unmasked);
+    unite(scene.mask, carried.silhouettes, camera_.width, camera_.height);
+    if (motion_) clear_still(scene.mask, motion_->score(), options_.motion.cell);
+    unite(scene.mask, given, camera_.width, camera_.height);
+    if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
     const CornerDepths depths(image.depth, camera_, noise_);
     for (size_t i = 0; i < corners.size(); ++i)
       if (is_on(scene.mask, {corners[i].x, corners[i].y}, depths)) scene.rejected[i] = FeatureReason::on_mover;
   }
   times_.add("filter", watch.ms());
-  if (pyramid) remember(scene.extracted, std::move(pyramid));
+  if (carried.pyramid) remember(scene.extracted, std::move(carried.pyramid));
   return scene;
 }
 

@@ -43,6 +43,19 @@ struct SegmentationTask {
   Matrix6d step_covariance;
 };
 
+// Where the slow detector's objects are in one frame.
+struct Carried {
+  std::shared_ptr<const ImagePyramid> pyramid;  // of the image
+  std::vector<LateMask> late_masks;
+  MoverMask silhouettes;  // of boxes without a mask
+  double ms = 0;
+};
+struct CarryTask {
+  Frame frame;
+  FrameIndex index = 0;
+  std::vector<DueDetections> due;
+};
+
 // What became of the frame before: what the stage learns by it.
 struct FrameOutcome {
   std::optional<Rigid3> cam_from_world;  // in the world of that time; nothing when lost
@@ -66,11 +79,11 @@ class SceneStage {
   void rest_detector(bool on) {
     if (slow_stage_) slow_stage_->rest(on);
   }
-  // Motion segmentation needs no corners: it starts, on a thread of its own, while they are extracted.
-  void begin(const Frame& frame, const Expectation& expected, const std::optional<FrameOutcome>& before);
+  // Motion segmentation and flow need no corners: they start, each on a thread of its own, while these are extracted.
+  void begin(FrameIndex index, const Frame& frame, std::vector<DueDetections> due, const Expectation& expected,
+             const std::optional<FrameOutcome>& before);
   // Of the frame that was begun.
-  Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const std::vector<DueDetections>& due,
-             const Expectation& expected);
+  Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const Expectation& expected);
 
   int keyframes_looked_at() const { return rival_ ? rival_->keyframes_looked_at() : 0; }
   // [frames] after which no late mask of a keyframe can come any more.
@@ -81,8 +94,9 @@ class SceneStage {
   double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
   int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
   std::string detector_inference() const { return slow_stage_ ? inference_ : std::string(); }
-  // Durations since they were taken last. Parts of tracking: flow, motion (what it waits for the segmentation), filter.
-  // Beside it: segmentation, and those of the detector.
+  // Durations since they were taken last. Parts of tracking: flow and motion (what it waits for carrying and for the
+  // segmentation, and what it does of them itself), filter. Beside it: carrying, segmentation, and those of the
+  // detector.
   StageTimes take_times();
 
  private:
@@ -90,8 +104,8 @@ class SceneStage {
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
   Segmentation segment_motion(const SegmentationTask& task);
   MoverMask take_motion(std::vector<Detection>& boxes);
-  MoverMask mask_of(const RgbdImage& image, const std::vector<Detection>& unmasked, const MoverMask& given,
-                    const MoverMask& moving) const;
+  Carried carry(const CarryTask& task);
+  MoverMask silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
 
   Camera camera_;
@@ -105,13 +119,15 @@ class SceneStage {
   std::optional<RivalFilter> rival_;
   std::optional<MotionSegmenter> motion_;
   bool segments_motion_ = false;  // as a detector of its own
-  CarriedObjects carried_;        // of the slow detector
+  CarriedObjects objects_;        // of the slow detector
   PastFrames past_;               // as many as the slow detector's latency needs
   std::vector<std::string> warnings_;
   StageTimes times_;
   SegmentationTask segmentation_task_;  // these two belong to segmenting_ while it is at work
   Segmentation segmentation_;
-  std::optional<SideTask> segmenting_;  // last: its thread ends first
+  CarryTask carry_task_;  // these two, objects_ and past_ belong to carrying_ likewise
+  Carried carried_;
+  std::optional<SideTask> segmenting_, carrying_;  // last: their threads end first
 };
 
 }  // namespace dkb
