@@ -27,6 +27,7 @@ constexpr double kClassPenalty = 9.0;       // added to the squared distance whe
 constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
 constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
 
+constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
 constexpr double kMemory = 1.2;        // [s] a mover unseen for longer is forgotten
 constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
 constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
@@ -49,12 +50,28 @@ void MoverTracker::predict(double seconds) {
   }
 }
 
+// Tracks whose place is known well enough to tell whose surface is whose.
+std::vector<ExpectedMover> MoverTracker::expected() {
+  std::vector<ExpectedMover> result;
+  expected_.clear();
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    const Eigen::Matrix3d covariance = tracks_[i].covariance.topLeftCorner<3, 3>();
+    if (time_ - tracks_[i].seen > kClaims) continue;
+    result.push_back({tracks_[i].state.head<3>(), covariance});
+    expected_.push_back(i);
+  }
+  return result;
+}
+
 // Index of the observation of each track, -1 = none.
 std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& observations,
                                          const Eigen::Matrix3d& noise, const Eigen::Vector3d& down) const {
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(tracks_.size()),
                                                    static_cast<Eigen::Index>(observations.size()), kUnassigned);
   const double noise_determinant = noise.determinant();
+  std::vector<char> has_region(tracks_.size(), 0);
+  for (const MoverObservation& o : observations)
+    if (o.expected >= 0) has_region[expected_[static_cast<size_t>(o.expected)]] = 1;
   for (size_t i = 0; i < tracks_.size(); ++i) {
     const Track& t = tracks_[i];
     const Eigen::Matrix3d spread = t.covariance.topLeftCorner<3, 3>() + noise;
@@ -65,6 +82,8 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
+      const bool region = o.class_name.empty(), own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
+      if (region && !own && (o.expected >= 0 || has_region[i])) continue;
       const Eigen::Vector3d off = o.position_in_world - t.state.head<3>();
       const double distance = off.dot(information * off), aside = (off - off.dot(down) * down).norm();
       if (distance > kGate || aside > max_distance) continue;
@@ -95,7 +114,8 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
   time_ = timestamp;
   std::erase_if(tracks_, [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? kMemory : kDoubtMemory); });
 
-  const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam);
+  const std::vector<MoverObservation> observations =
+      observer_.observe(depth, mask, boxes, world_from_cam, expected());
   const Eigen::Vector3d sd(kSdAcross, kSdDown, kSdDeep);
   const Eigen::Matrix3d axes = world_from_cam.matrix3();
   const Eigen::Matrix3d noise = axes * sd.cwiseAbs2().asDiagonal() * axes.transpose();
@@ -119,7 +139,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];
-    if (taken[k]) continue;
+    if (taken[k] || o.expected >= 0) continue;
     // Parts of one body may be taken for several regions, one above the other.
     const double apart = o.class_name.empty() ? kRegionsApart : kApart;
     const auto near = [&](const Eigen::Vector3d& p) {
