@@ -201,9 +201,14 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (owner[i] == static_cast<int>(b)) cells.push_back(static_cast<uint32_t>(i));
     });
-    if (cells.size() < kMinCells) continue;
-    observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells),
-                            position_sd(static_cast<double>(depths[b])), size_of(cells), -1});
+    if (cells.size() >= kMinCells) {
+      observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells), true,
+                              position_sd(static_cast<double>(depths[b])), size_of(cells), -1});
+    } else if (const Box& box = boxes[b].box; ranges[b].x0 < ranges[b].x1 && ranges[b].y0 < ranges[b].y1) {
+      const Eigen::Vector2d middle(0.5 * static_cast<double>(2 * box.x + box.w), 0.5 * static_cast<double>(2 * box.y + box.h));
+      const Eigen::Vector3d ray = camera_.unproject(camera_.undistort(middle), 1.0);
+      observations.push_back({boxes[b].class_name, box, world_from_cam_ * ray, false, 0, {0, 0, 0}, -1});
+    }
   }
   return observations;
 }
@@ -406,7 +411,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
     const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
-    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),
+    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells), true,
                             position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells), r.expected});
   }
   return observations;

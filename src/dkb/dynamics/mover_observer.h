@@ -28,6 +28,7 @@ struct MoverObservation {
   std::string class_name;             // of its box; empty: no box, found by its motion alone
   Box box;                            // [px] the detector's, or the region's bounds
   Eigen::Vector3d position_in_world;  // [m] median of its visible surface points, per coordinate
+  bool has_depth = true;              // else the position is where the middle of its box would be, 1 m deep
   double position_sd = 0;             // [m] standard deviation of each coordinate
   Eigen::Vector3d size{0, 0, 0};      // [m] of its visible surface along the camera's axes: width, height, depth
   int expected = -1;                  // index of the expected mover that this region is of; -1 = of none, or in a box
@@ -41,7 +42,7 @@ class MoverObserver {
   MoverObserver(const CameraModel& camera, const MoverObserverOptions& options);  // throws InvalidOption
 
   // `depth` has the camera's size (else InputError); `boxes` are in pixels of the same image. Objects in boxes come
-  // first, in the order of the boxes; those of too few cells with depth are left out.
+  // first, in the order of the boxes; regions of too few cells with depth are left out.
   std::vector<MoverObservation> observe(const DepthImage& depth, const MoverMask& mask,
                                         std::span<const Detection> boxes, const Rigid3& world_from_cam,
                                         std::span<const ExpectedMover> expected = {});

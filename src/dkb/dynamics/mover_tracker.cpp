@@ -17,6 +17,7 @@ constexpr const char* kUnnamed = "object";
 // Standard deviations of an observed position [m]: along the image's rows, along its columns, where clutter and other
 // movers hide legs and bodies, and along the optical axis.
 constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
+constexpr double kSdNoDepth = 1.0;  // [m] the last where the sensor tells no depth
 constexpr double kAgility = 3.0;  // [m^2/s^3] spectral density of the white noise that acceleration is taken for
 constexpr double kSpeedSd = 1.2;  // [m/s] standard deviation of the speed of something just found
 
@@ -33,6 +34,13 @@ constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
 constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
 constexpr double kApart = 0.35;        // [m] nothing is found so near to a mover already seen in the frame
 constexpr double kRegionsApart = 0.6;  // [m] the same for regions without a box, across and along the optical axis
+
+// Whether a box may be what is left of another one of the frame before.
+bool left_of(const Box& before, const Box& now) {
+  const float w = std::min(before.x + before.w, now.x + now.w) - std::max(before.x, now.x);
+  const float h = std::min(before.y + before.h, now.y + now.h) - std::max(before.y, now.y);
+  return w > 0 && h > 0 && 2 * w * h > now.area();
+}
 
 }  // namespace
 
@@ -68,6 +76,7 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
                                          const Eigen::Matrix3d& noise, const Eigen::Vector3d& down) const {
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(tracks_.size()),
                                                    static_cast<Eigen::Index>(observations.size()), kUnassigned);
+  Eigen::MatrixXd boxes_alone = cost;
   const double noise_determinant = noise.determinant();
   std::vector<char> has_region(tracks_.size(), 0);
   for (const MoverObservation& o : observations)
@@ -84,25 +93,42 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
       const MoverObservation& o = observations[k];
       const bool region = o.class_name.empty(), own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
       if (region && !own && (o.expected >= 0 || has_region[i])) continue;
-      const Eigen::Vector3d off = o.position_in_world - t.state.head<3>();
+      if (!o.has_depth && (t.id == 0 || unseen > kBoxMemory || !left_of(t.box, o.box))) continue;
+      const Eigen::Vector3d off = place(o, t) - t.state.head<3>();
       const double distance = off.dot(information * off), aside = (off - off.dot(down) * down).norm();
       if (distance > kGate || aside > max_distance) continue;
       double penalty = box_weight * (1 - static_cast<double>(intersection_over_union(t.box, o.box)));
       if (!o.class_name.empty() && !t.class_name.empty() && o.class_name != t.class_name) penalty += kClassPenalty;
-      cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+      (o.has_depth ? cost : boxes_alone)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
           std::min(distance + width + penalty, 0.999 * kUnassigned);
     }
   }
-  return assign(cost, kUnassigned);
+  std::vector<int> found = assign(cost, kUnassigned);
+  // Boxes without depth are left to movers that nothing else shows.
+  for (size_t i = 0; i < tracks_.size(); ++i)
+    if (found[i] >= 0) boxes_alone.row(static_cast<Eigen::Index>(i)).setConstant(kUnassigned);
+  const std::vector<int> alone = assign(boxes_alone, kUnassigned);
+  for (size_t i = 0; i < tracks_.size(); ++i)
+    if (found[i] < 0) found[i] = alone[i];
+  return found;
 }
 
-void MoverTracker::correct(const MoverObservation& o, const Eigen::Matrix3d& noise, Track* t) {
+// Where an observation would be, were it the track's: of a box without depth, at the depth of the track.
+Eigen::Vector3d MoverTracker::place(const MoverObservation& o, const Track& t) const {
+  if (o.has_depth) return o.position_in_world;
+  const double depth = (t.state.head<3>() - world_from_cam_.translation).dot(world_from_cam_.matrix3().col(2));
+  return world_from_cam_.translation + depth * (o.position_in_world - world_from_cam_.translation);
+}
+
+void MoverTracker::correct(const MoverObservation& o, Eigen::Matrix3d noise, Track* t) {
+  const Eigen::Vector3d axis = world_from_cam_.matrix3().col(2);
+  if (!o.has_depth) noise += kSdNoDepth * kSdNoDepth * axis * axis.transpose();
   const Eigen::Matrix3d spread = t->covariance.topLeftCorner<3, 3>() + noise;
   const Eigen::Matrix<double, 6, 3> gain = t->covariance.leftCols<3>() * spread.inverse();
-  t->state += gain * (o.position_in_world - t->state.head<3>());
+  t->state += gain * (place(o, *t) - t->state.head<3>());
   const Covariance less = gain * t->covariance.topRows<3>();
   t->covariance -= 0.5 * (less + less.transpose());
-  t->seen = time_;
+  if (o.has_depth) t->seen = time_;
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
   if (++t->observations >= kMinObservations && t->id == 0) t->id = ++last_id_;
@@ -112,6 +138,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
                                         std::span<const Detection> boxes, const Rigid3& world_from_cam) {
   predict(std::max(0.0, timestamp - time_));
   time_ = timestamp;
+  world_from_cam_ = world_from_cam;
   std::erase_if(tracks_, [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? kMemory : kDoubtMemory); });
 
   const std::vector<MoverObservation> observations =
@@ -131,15 +158,17 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     taken[k] = 1;
     const MoverObservation& o = observations[k];
     Track& t = tracks_[i];
+    const Eigen::Vector3d position = place(o, t);
     correct(o, noise, &t);
-    seen.push_back(o.position_in_world);
+    seen.push_back(position);
     if (t.id == 0) continue;
-    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
-                      o.position_sd, t.covariance, o.size, o.box});
+    const double sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
+    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), sd,
+                      t.covariance, o.size, o.box});
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];
-    if (taken[k] || o.expected >= 0) continue;
+    if (taken[k] || o.expected >= 0 || !o.has_depth) continue;
     // Parts of one body may be taken for several regions, one above the other.
     const double apart = o.class_name.empty() ? kRegionsApart : kApart;
     const auto near = [&](const Eigen::Vector3d& p) {

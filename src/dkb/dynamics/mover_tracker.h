@@ -47,12 +47,14 @@ class MoverTracker {
   std::vector<ExpectedMover> expected();
   std::vector<int> associate(const std::vector<MoverObservation>& observations, const Eigen::Matrix3d& noise,
                              const Eigen::Vector3d& down) const;
-  void correct(const MoverObservation& observation, const Eigen::Matrix3d& noise, Track* track);
+  Eigen::Vector3d place(const MoverObservation& observation, const Track& track) const;
+  void correct(const MoverObservation& observation, Eigen::Matrix3d noise, Track* track);
 
   MoverObserver observer_;
   std::vector<Track> tracks_;
   std::vector<size_t> expected_;  // the tracks that were told to the observer
   double time_ = 0;
+  Rigid3 world_from_cam_;
   int last_id_ = 0;
 };
 
