@@ -21,7 +21,7 @@ constexpr float kLayer = 0.45f;    // [m] an object reaches so far before and be
 constexpr double kInnerShare = 0.4;   // of a region's cells must have all four neighbours in it: others are rims
 constexpr int kGap = 4;               // [cells] regions so near to each other in the image are one ...
 constexpr float kMergeAcross = 0.45f, kMergeDepth = 0.25f;  // [m] ... when so near across and in depth
-constexpr double kBodySd = 0.2;   // [m] standard deviation of a body's surface around its middle, seen from above
+constexpr double kBodySd = 0.18;   // [m] standard deviation of a body's surface around its middle, seen from above
 constexpr float kReach = 3;       // times the standard deviation: so far from where it is expected a mover's surface is
 constexpr double kApart = 0.35;   // [m] movers expected nearer to each other have no regions each
 constexpr double kShare = 0.2;    // of what hangs together in depth that somebody else must have, to be told apart

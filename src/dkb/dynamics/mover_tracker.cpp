@@ -28,8 +28,9 @@ constexpr double kClassPenalty = 9.0;       // added to the squared distance whe
 constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
 constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
 
+constexpr double kBefore = 0.3;        // [m] what is so much nearer than a mover is not part of it
 constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
-constexpr double kMemory = 1.2;        // [s] a mover unseen for longer is forgotten
+constexpr double kMemory = 1.2;        // [s] a mover unseen for longer, and hidden by nothing, is forgotten
 constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
 constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
 constexpr double kApart = 0.35;        // [m] nothing is found so near to a mover already seen in the frame
@@ -53,6 +54,7 @@ void MoverTracker::predict(double seconds) {
   noise.topRightCorner<3, 3>().diagonal().setConstant(0.5 * seconds * seconds);
   noise.bottomLeftCorner<3, 3>() = noise.topRightCorner<3, 3>();
   for (Track& t : tracks_) {
+    if (!t.hidden) t.missed += seconds;
     t.state.head<3>() += seconds * t.state.tail<3>();
     t.covariance = transition * t.covariance * transition.transpose() + kAgility * noise;
   }
@@ -87,7 +89,7 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const Eigen::Matrix3d information = spread.inverse();
     // A mover long unseen fits anywhere: half its log likelihood's width keeps it from taking what others fit better.
     const double width = 0.5 * std::log(spread.determinant() / noise_determinant);
-    const double unseen = time_ - t.seen, max_distance = kMaxDistance + kMaxDistanceGrowth * unseen;
+    const double unseen = time_ - t.seen, max_distance = kMaxDistance + kMaxDistanceGrowth * t.missed;
     const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
@@ -128,7 +130,11 @@ void MoverTracker::correct(const MoverObservation& o, Eigen::Matrix3d noise, Tra
   t->state += gain * (place(o, *t) - t->state.head<3>());
   const Covariance less = gain * t->covariance.topRows<3>();
   t->covariance -= 0.5 * (less + less.transpose());
-  if (o.has_depth) t->seen = time_;
+  t->hidden = false;
+  if (o.has_depth) {
+    t->seen = time_;
+    t->missed = 0;
+  }
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
   if (++t->observations >= kMinObservations && t->id == 0) t->id = ++last_id_;
@@ -139,7 +145,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
   predict(std::max(0.0, timestamp - time_));
   time_ = timestamp;
   world_from_cam_ = world_from_cam;
-  std::erase_if(tracks_, [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? kMemory : kDoubtMemory); });
+  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
 
   const std::vector<MoverObservation> observations =
       observer_.observe(depth, mask, boxes, world_from_cam, expected());
@@ -188,8 +194,27 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     t.observations = 1;
     tracks_.push_back(std::move(t));
   }
+  for (Track& t : tracks_)
+    if (t.seen < time_) t.hidden = stands_behind(t, depth);
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
   return movers;
+}
+
+// Whether most of what can be seen where a mover is expected is nearer than it.
+bool MoverTracker::stands_behind(const Track& t, const DepthImage& depth) const {
+  const Eigen::Vector3d middle = world_from_cam_.inverse() * Eigen::Vector3d(t.state.head<3>());
+  int seen = 0, nearer = 0;
+  for (const double down : {-0.4, -0.2, 0.0, 0.2, 0.4})
+    for (const double across : {-0.15, 0.0, 0.15}) {
+      const Eigen::Vector3d p = middle + Eigen::Vector3d(across, down, 0);
+      if (p.z() < kBefore) continue;
+      const Eigen::Vector2d at = camera_.distort(camera_.project(p));
+      const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+      if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
+      ++seen;
+      nearer += static_cast<double>(depth(x, y)) < p.z() - kBefore;
+    }
+  return 2 * nearer > seen;
 }
 
 void MoverTracker::rebase(const Rigid3& new_from_old) {

@@ -18,7 +18,7 @@ namespace dkb {
 class MoverTracker {
  public:
   explicit MoverTracker(const CameraModel& camera, const MoverObserverOptions& options = {})
-      : observer_(camera, options) {}
+      : camera_(camera), observer_(camera, options) {}
 
   // The movers that are seen in the frame, by id. `mask`: silhouettes of the boxes, regions that move, or both; empty
   // when nothing moves. `boxes` may be empty: regions of the mask are the objects then. `timestamp` [s] must not go
@@ -41,6 +41,8 @@ class MoverTracker {
     Covariance covariance;
     Box box;          // [px] where it was last seen
     double seen = 0;  // [s]
+    double missed = 0;    // [s] unseen since, though nothing hid it
+    bool hidden = false;  // in the frame before
     int observations = 0;
   };
   void predict(double seconds);
@@ -48,8 +50,10 @@ class MoverTracker {
   std::vector<int> associate(const std::vector<MoverObservation>& observations, const Eigen::Matrix3d& noise,
                              const Eigen::Vector3d& down) const;
   Eigen::Vector3d place(const MoverObservation& observation, const Track& track) const;
+  bool stands_behind(const Track& track, const DepthImage& depth) const;
   void correct(const MoverObservation& observation, Eigen::Matrix3d noise, Track* track);
 
+  CameraModel camera_;
   MoverObserver observer_;
   std::vector<Track> tracks_;
   std::vector<size_t> expected_;  // the tracks that were told to the observer
