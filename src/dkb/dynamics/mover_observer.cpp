@@ -18,13 +18,13 @@ constexpr size_t kMinCells = 12;   // cells with depth that a boxed object needs
 constexpr size_t kMinRegion = 40;  // the same for a region without a box
 constexpr double kMargin = 0.1;    // share of a box's size by which its rim reaches; mask there is no object of its own
 constexpr float kLayer = 0.45f;    // [m] an object reaches so far before and behind its main depth layer
-constexpr double kInnerShare = 0.4;   // of a region's cells must have all four neighbours in it: others are rims
-constexpr int kGap = 4;               // [cells] regions so near to each other in the image are one ...
+constexpr double kInnerShare = 0.4;  // of a region's cells must have all four neighbours in it: others are rims
+constexpr int kGap = 4;              // [cells] regions so near to each other in the image are one ...
 constexpr float kMergeAcross = 0.45f, kMergeDepth = 0.25f;  // [m] ... when so near across and in depth
-constexpr double kBodySd = 0.18;   // [m] standard deviation of a body's surface around its middle, seen from above
-constexpr float kReach = 3;       // times the standard deviation: so far from where it is expected a mover's surface is
-constexpr double kApart = 0.35;   // [m] movers expected nearer to each other have no regions each
-constexpr double kShare = 0.2;    // of what hangs together in depth that somebody else must have, to be told apart
+constexpr double kBodySd = 0.18;  // [m] standard deviation of a body's surface around its middle, seen from above
+constexpr float kBodyReach = 3;   // times the standard deviation: so far from where it is expected a mover's surface is
+constexpr double kToldApart = 0.35;   // [m] movers expected nearer to each other have no regions each
+constexpr double kOthersShare = 0.2;  // of what hangs together in depth that somebody else must have, to be told apart
 constexpr float kBin = 0.05f;         // [m] of depth histograms
 constexpr size_t kMaxPoints = 300;    // per object, that its place and size are taken of
 
@@ -119,6 +119,20 @@ Eigen::Vector3d MoverObserver::median_position(std::span<const uint32_t> cells) 
          Eigen::Vector3f(upper_median(values[0]), upper_median(values[1]), upper_median(values[2])).cast<double>();
 }
 
+MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
+  MoverSurface surface;
+  const double side = kCell / camera_.fx;  // [m] of a cell, 1 m deep
+  for (const uint32_t i : cells) surface.area += side * side * static_cast<double>(depth_[i] * depth_[i]);
+  const size_t stride = (cells.size() + MoverSurface::kMaxPoints - 1) / MoverSurface::kMaxPoints;
+  for (size_t k = 0; k < cells.size(); k += stride) {
+    const Eigen::Vector2f& ray = rays_[cells[k]];
+    const auto depth = static_cast<double>(depth_[cells[k]]);
+    surface.points_in_world.push_back(world_from_cam_ * Eigen::Vector3d(depth * static_cast<double>(ray.x()),
+                                                                        depth * static_cast<double>(ray.y()), depth));
+  }
+  return surface;
+}
+
 // Middle of the stretch of depth, twice `layer` long, that holds most of the depths; the nearest of equals.
 float MoverObserver::main_layer(const std::vector<float>& depths) const {
   std::vector<int> histogram;
@@ -203,11 +217,12 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     });
     if (cells.size() >= kMinCells) {
       observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells), true,
-                              position_sd(static_cast<double>(depths[b])), size_of(cells), -1});
+                              position_sd(static_cast<double>(depths[b])), size_of(cells), surface_of(cells), -1});
     } else if (const Box& box = boxes[b].box; ranges[b].x0 < ranges[b].x1 && ranges[b].y0 < ranges[b].y1) {
-      const Eigen::Vector2d middle(0.5 * static_cast<double>(2 * box.x + box.w), 0.5 * static_cast<double>(2 * box.y + box.h));
+      const Eigen::Vector2d middle(0.5 * static_cast<double>(2 * box.x + box.w),
+                                   0.5 * static_cast<double>(2 * box.y + box.h));
       const Eigen::Vector3d ray = camera_.unproject(camera_.undistort(middle), 1.0);
-      observations.push_back({boxes[b].class_name, box, world_from_cam_ * ray, false, 0, {0, 0, 0}, -1});
+      observations.push_back({boxes[b].class_name, box, world_from_cam_ * ray, false, 0, {0, 0, 0}, {}, -1});
     }
   }
   return observations;
@@ -331,7 +346,7 @@ int MoverObserver::owner_of(uint32_t cell) const {
     const Footprint& f = footprints_[e];
     const Eigen::Vector2f off = p - f.middle;
     const float distance = off.dot(f.information * off), cost = distance + f.width;
-    if (distance > kReach * kReach || cost >= least) continue;
+    if (distance > kBodyReach * kBodyReach || cost >= least) continue;
     least = cost;
     owner = static_cast<int>(e);
   }
@@ -355,7 +370,8 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
     ++count[owner[k]];
   }
   const auto most = static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
-  const double enough = std::max(static_cast<double>(kMinRegion), kShare * static_cast<double>(part.cells.size()));
+  const double enough =
+      std::max(static_cast<double>(kMinRegion), kOthersShare * static_cast<double>(part.cells.size()));
   std::vector<int> region_of(owners, 0);  // in the result; 0 = that of the owner of most
   result.emplace_back();
   const auto expected = [&](size_t o) { return o == nobody ? -1 : static_cast<int>(o); };
@@ -363,7 +379,7 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
   for (size_t o = 0; o < owners; ++o) {
     if (o == most || static_cast<double>(count[o]) < enough) continue;
     const bool apart = o == nobody || most == nobody ||
-                       (footprints_[o].middle - footprints_[most].middle).norm() > static_cast<float>(kApart);
+                       (footprints_[o].middle - footprints_[most].middle).norm() > static_cast<float>(kToldApart);
     if (!apart) continue;
     region_of[o] = static_cast<int>(result.size());
     result.emplace_back().expected = expected(o);
@@ -412,7 +428,8 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
     observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells), true,
-                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells), r.expected});
+                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells),
+                            surface_of(r.cells), r.expected});
   }
   return observations;
 }

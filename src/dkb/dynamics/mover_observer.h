@@ -8,6 +8,7 @@
 
 #include "dkb/detection/detection.h"
 #include "dkb/dynamics/mover_mask.h"
+#include "dkb/dynamics/mover_surface.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 
@@ -31,12 +32,13 @@ struct MoverObservation {
   bool has_depth = true;              // else the position is where the middle of its box would be, 1 m deep
   double position_sd = 0;             // [m] standard deviation of each coordinate
   Eigen::Vector3d size{0, 0, 0};      // [m] of its visible surface along the camera's axes: width, height, depth
+  MoverSurface surface;               // empty without depth
   int expected = -1;                  // index of the expected mover that this region is of; -1 = of none, or in a box
 };
 
 // Tells the objects of one image apart and measures where their surfaces are: those in boxes, each with the part of the
-// mask that is at its depth, and regions of the mask outside all boxes, split by depth. What is where movers are expected
-// goes to these, so that neighbours are not one region, and a body cut up by missing depth is. Deterministic.
+// mask that is at its depth, and regions of the mask outside all boxes, split by depth. What is where movers are
+// expected goes to these, so that neighbours are not one region, and a body cut up by missing depth is. Deterministic.
 class MoverObserver {
  public:
   MoverObserver(const CameraModel& camera, const MoverObserverOptions& options);  // throws InvalidOption
@@ -68,6 +70,7 @@ class MoverObserver {
   float depth_near(const DepthImage& depth, int x, int y) const;
   Eigen::Vector3d median_position(std::span<const uint32_t> cells) const;
   Eigen::Vector3d size_of(std::span<const uint32_t> cells) const;
+  MoverSurface surface_of(std::span<const uint32_t> cells) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
   std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellRange>& ranges) const;

@@ -18,8 +18,8 @@ constexpr const char* kUnnamed = "object";
 // movers hide legs and bodies, and along the optical axis.
 constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
 constexpr double kSdNoDepth = 1.0;  // [m] the last where the sensor tells no depth
-constexpr double kAgility = 3.0;  // [m^2/s^3] spectral density of the white noise that acceleration is taken for
-constexpr double kSpeedSd = 1.2;  // [m/s] standard deviation of the speed of something just found
+constexpr double kAgility = 3.0;    // [m^2/s^3] spectral density of the white noise that acceleration is taken for
+constexpr double kSpeedSd = 1.2;    // [m/s] standard deviation of the speed of something just found
 
 constexpr double kGate = 25.0;              // squared Mahalanobis distance within which an observation may be a track's
 constexpr double kMaxDistance = 0.9;        // [m] nor may it lie farther from where it is expected than this ...
@@ -28,6 +28,7 @@ constexpr double kClassPenalty = 9.0;       // added to the squared distance whe
 constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
 constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
 
+constexpr double kHasMoved = 0.5;      // [m] from where it was found: it is a mover, and no fault of the mask
 constexpr double kBefore = 0.3;        // [m] what is so much nearer than a mover is not part of it
 constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
 constexpr double kMemory = 1.2;        // [s] a mover unseen for longer, and hidden by nothing, is forgotten
@@ -93,7 +94,8 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
-      const bool region = o.class_name.empty(), own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
+      const bool region = o.class_name.empty(),
+                 own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
       if (region && !own && (o.expected >= 0 || has_region[i])) continue;
       if (!o.has_depth && (t.id == 0 || unseen > kBoxMemory || !left_of(t.box, o.box))) continue;
       const Eigen::Vector3d off = place(o, t) - t.state.head<3>();
@@ -147,8 +149,7 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
   world_from_cam_ = world_from_cam;
   std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
 
-  const std::vector<MoverObservation> observations =
-      observer_.observe(depth, mask, boxes, world_from_cam, expected());
+  const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam, expected());
   const Eigen::Vector3d sd(kSdAcross, kSdDown, kSdDeep);
   const Eigen::Matrix3d axes = world_from_cam.matrix3();
   const Eigen::Matrix3d noise = axes * sd.cwiseAbs2().asDiagonal() * axes.transpose();
@@ -166,11 +167,26 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     Track& t = tracks_[i];
     const Eigen::Vector3d position = place(o, t);
     correct(o, noise, &t);
+    if (o.has_depth) remember(o, depth, &t);
     seen.push_back(position);
     if (t.id == 0) continue;
-    const double sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
-    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), sd,
+    const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
+    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), position_sd,
                       t.covariance, o.size, o.box});
+  }
+  for (size_t i = 0; i < observation_of.size(); ++i) {
+    Track& t = tracks_[i];
+    if (observation_of[i] >= 0) continue;
+    if (t.moved && t.surface.stands(depth, camera_, noise_, world_from_cam)) {
+      MoverObservation o{
+          "", t.surface.box, t.surface.position_in_world, true, std::sqrt(noise.trace() / 3), {0, 0, 0}, {}, -1};
+      correct(o, noise, &t);
+      movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
+                        o.position_sd, t.covariance, o.size, o.box});
+      seen.push_back(o.position_in_world);
+    } else {
+      t.hidden = stands_behind(t, depth);
+    }
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];
@@ -192,10 +208,9 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     t.seen = time_;
     t.box = o.box;
     t.observations = 1;
+    t.first = o.position_in_world;
     tracks_.push_back(std::move(t));
   }
-  for (Track& t : tracks_)
-    if (t.seen < time_) t.hidden = stands_behind(t, depth);
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
   return movers;
 }
@@ -217,10 +232,22 @@ bool MoverTracker::stands_behind(const Track& t, const DepthImage& depth) const 
   return 2 * nearer > seen;
 }
 
+void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, Track* t) const {
+  t->moved |= t->id > 0 && (o.position_in_world - t->first).norm() > kHasMoved;
+  // The mask leaves who stands still piece by piece.
+  if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
+  t->surface = o.surface;
+  t->surface.box = o.box;
+  t->surface.position_in_world = o.position_in_world;
+}
+
 void MoverTracker::rebase(const Rigid3& new_from_old) {
   Covariance rotation = Covariance::Zero();
   rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = new_from_old.matrix3();
   for (Track& t : tracks_) {
+    t.first = new_from_old * t.first;
+    t.surface.position_in_world = new_from_old * t.surface.position_in_world;
+    for (Eigen::Vector3d& p : t.surface.points_in_world) p = new_from_old * p;
     t.state.head<3>() = new_from_old * t.state.head<3>();
     t.state.tail<3>() = new_from_old.rotation * t.state.tail<3>();
     t.covariance = rotation * t.covariance * rotation.transpose();

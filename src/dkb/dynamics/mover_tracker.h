@@ -39,10 +39,13 @@ class MoverTracker {
     std::string class_name;
     State state;
     Covariance covariance;
-    Box box;          // [px] where it was last seen
-    double seen = 0;  // [s]
-    double missed = 0;    // [s] unseen since, though nothing hid it
-    bool hidden = false;  // in the frame before
+    Box box;                         // [px] where it was last seen
+    double seen = 0;                 // [s]
+    double missed = 0;               // [s] unseen since, though nothing hid it
+    bool hidden = false;             // in the frame before
+    Eigen::Vector3d first{0, 0, 0};  // [m] where it was found
+    bool moved = false;              // away from there
+    MoverSurface surface;            // as last seen whole
     int observations = 0;
   };
   void predict(double seconds);
@@ -51,9 +54,11 @@ class MoverTracker {
                              const Eigen::Vector3d& down) const;
   Eigen::Vector3d place(const MoverObservation& observation, const Track& track) const;
   bool stands_behind(const Track& track, const DepthImage& depth) const;
+  void remember(const MoverObservation& observation, const DepthImage& depth, Track* track) const;
   void correct(const MoverObservation& observation, Eigen::Matrix3d noise, Track* track);
 
   CameraModel camera_;
+  SensorNoise noise_;
   MoverObserver observer_;
   std::vector<Track> tracks_;
   std::vector<size_t> expected_;  // the tracks that were told to the observer
