@@ -363,10 +363,10 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
   }
   const size_t owners = footprints_.size() + 1, nobody = owners - 1;
   std::vector<size_t> count(owners, 0);
-  std::vector<uint8_t> owner(part.cells.size());
+  std::vector<uint16_t> owner(part.cells.size());
   for (size_t k = 0; k < part.cells.size(); ++k) {
     const int e = owner_of(part.cells[k]);
-    owner[k] = static_cast<uint8_t>(e < 0 ? nobody : static_cast<size_t>(e));
+    owner[k] = static_cast<uint16_t>(e < 0 ? nobody : static_cast<size_t>(e));
     ++count[owner[k]];
   }
   const auto most = static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "dkb/detection/detection.h"
+
 namespace dkb {
 namespace {
 
@@ -36,6 +38,18 @@ bool MoverSurface::stands(const DepthImage& depth, const CameraModel& camera, co
     gone += measured > p.z() + tolerance;
   }
   return there >= kMinThere && there >= gone;
+}
+
+Box MoverSurface::box_in(const CameraModel& camera, const Rigid3& world_from_cam) const {
+  const Rigid3 cam_from_world = world_from_cam.inverse();
+  Eigen::Vector2i low(camera.width, camera.height), high(0, 0), at;
+  for (const Eigen::Vector3d& point : points_in_world) {
+    if (!pixel_of(camera, cam_from_world * point, &at)) continue;
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
+  }
+  const Eigen::Vector2f corner = low.cast<float>(), size = (high - low).cwiseMax(0).cast<float>();
+  return clip({corner.x(), corner.y(), size.x(), size.y()}, camera.width, camera.height);
 }
 
 }  // namespace dkb

@@ -17,12 +17,13 @@ struct MoverSurface {
 
   std::vector<Eigen::Vector3d> points_in_world;  // [m]
   double area = 0;                               // [m^2] seen then
-  Box box;                                       // [px] then
   Eigen::Vector3d position_in_world{0, 0, 0};    // [m] median of all of it
 
   // Whether a depth image shows the surface where it was: half and more of what nothing hides, and enough of it.
   bool stands(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
               const Rigid3& world_from_cam) const;
+  // Bounds [px] of its points in an image.
+  Box box_in(const CameraModel& camera, const Rigid3& world_from_cam) const;
 };
 
 }  // namespace dkb

@@ -136,6 +136,8 @@ void MoverTracker::correct(const MoverObservation& o, Eigen::Matrix3d noise, Tra
   if (o.has_depth) {
     t->seen = time_;
     t->missed = 0;
+    t->size = o.size;
+    t->position_sd = o.position_sd;
   }
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
@@ -172,17 +174,18 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     if (t.id == 0) continue;
     const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
     movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), position_sd,
-                      t.covariance, o.size, o.box});
+                      t.covariance, t.size, o.box});
   }
   for (size_t i = 0; i < observation_of.size(); ++i) {
     Track& t = tracks_[i];
     if (observation_of[i] >= 0) continue;
     if (t.moved && t.surface.stands(depth, camera_, noise_, world_from_cam)) {
-      MoverObservation o{
-          "", t.surface.box, t.surface.position_in_world, true, std::sqrt(noise.trace() / 3), {0, 0, 0}, {}, -1};
+      const MoverObservation o{
+          "", t.surface.box_in(camera_, world_from_cam), t.surface.position_in_world, true, t.position_sd, t.size, {},
+          -1};
       correct(o, noise, &t);
       movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
-                        o.position_sd, t.covariance, o.size, o.box});
+                        o.position_sd, t.covariance, t.size, o.box});
       seen.push_back(o.position_in_world);
     } else {
       t.hidden = stands_behind(t, depth);
@@ -237,7 +240,6 @@ void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, 
   // The mask leaves who stands still piece by piece.
   if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
   t->surface = o.surface;
-  t->surface.box = o.box;
   t->surface.position_in_world = o.position_in_world;
 }
 

@@ -20,9 +20,10 @@ class MoverTracker {
   explicit MoverTracker(const CameraModel& camera, const MoverObserverOptions& options = {})
       : camera_(camera), observer_(camera, options) {}
 
-  // The movers that are seen in the frame, by id. `mask`: silhouettes of the boxes, regions that move, or both; empty
-  // when nothing moves. `boxes` may be empty: regions of the mask are the objects then. `timestamp` [s] must not go
-  // back. Frames whose pose is unknown are left out by the caller.
+  // The movers that are seen in the frame, by id; also those who have moved and stand still, for as long as nothing is
+  // seen through where they are, and those of whom but a box without depth is left. `mask`: silhouettes of the boxes,
+  // regions that move, or both; empty when nothing moves. `boxes` may be empty: regions of the mask are the objects
+  // then. `timestamp` [s] must not go back. Frames whose pose is unknown are left out by the caller.
   std::vector<Mover> update(double timestamp, const DepthImage& depth, const MoverMask& mask,
                             std::span<const Detection> boxes, const Rigid3& world_from_cam);
 
@@ -45,6 +46,8 @@ class MoverTracker {
     bool hidden = false;             // in the frame before
     Eigen::Vector3d first{0, 0, 0};  // [m] where it was found
     bool moved = false;              // away from there
+    Eigen::Vector3d size{0, 0, 0};   // [m] as last seen
+    double position_sd = 0;          // [m] the same
     MoverSurface surface;            // as last seen whole
     int observations = 0;
   };
