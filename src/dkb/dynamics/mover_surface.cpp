@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "dkb/detection/detection.h"
-
 namespace dkb {
 namespace {
 

@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "dkb/detection/detection.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb/image/rgbd_image.h"
 
 namespace dkb {
 
