@@ -236,6 +236,11 @@ bool MoverTracker::stands_behind(const Track& t, const DepthImage& depth) const 
 }
 
 void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, Track* t) const {
+  // A detector tells of those who stand, too, and its boxes may hold what is behind somebody.
+  if (!o.class_name.empty()) {
+    t->surface = {};
+    return;
+  }
   t->moved |= t->id > 0 && (o.position_in_world - t->first).norm() > kHasMoved;
   // The mask leaves who stands still piece by piece.
   if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
