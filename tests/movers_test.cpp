@@ -100,8 +100,9 @@ TEST_P(Movers, ArePlacedWithin15CentimetresAndKeepTheirIds) {
     EXPECT_EQ(movers_to_csv(follow(frames, simulator.camera(), mask_from).estimate), movers_to_csv(scene.estimate))
         << "not deterministic";
     EXPECT_GE(result.crossings, 4u);
-    // Silhouettes leave out much of who stands behind somebody else: fewer ids are kept, measured 0.67 and 0.94.
-    EXPECT_GE(result.kept_share(), mask_from == MaskFrom::truth ? 0.9 : 0.6);
+    EXPECT_GE(result.kept_share(), 0.9);
+    // What was taken for a mover once is not one for ever.
+    EXPECT_LE(result.false_movers * 4, result.found);
   }
 }
 

@@ -100,7 +100,7 @@ TEST(DenseMapper, DepthTakesItsPoseAtItsOwnTime) {
 TEST(DenseMapper, MaskedMoversLeaveNoTraceWhenKnownInTimeOrLate) {
   const auto build = [](bool at_once, bool late) {
     DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 5; ++i) {
       DenseScene scene;
       scene.person.emplace(-0.4, 2.2);
       const RgbdImage with = scene.draw(testing::scene_camera(), testing::scene_pose(i), time_of(i));
@@ -114,7 +114,7 @@ TEST(DenseMapper, MaskedMoversLeaveNoTraceWhenKnownInTimeOrLate) {
       if (late) mapper.remove_movers(i, mask);
     }
     size_t on_person = 0;
-    for (const auto& v : mapper.build(trajectory(3), 1).mesh.vertices)
+    for (const auto& v : mapper.build(trajectory(5), 1).mesh.vertices)
       on_person += std::abs(std::hypot(v.x() + 0.4F, v.z() - 2.2F) - 0.25F) < 0.05F && v.y() < 1.1F ? 1 : 0;
     return on_person;
   };

@@ -11,6 +11,7 @@ namespace dkb {
 namespace {
 
 constexpr int kMinViews = 2;          // keyframes that must see a surface
+constexpr float kMinTime = 0.2F;      // [s] from the first of them to the last: who walks has left the voxel by then
 constexpr double kFreeShare = 0.08;   // of a voxel's keyframes that may have seen through it (docs/benchmarks.md)
 constexpr int kAllocationStride = 2;  // view pixels: a block is much larger than what lies between them
 
@@ -102,6 +103,7 @@ class BlockFuser {
   struct Sums {
     float weight = 0, distance = 0, red = 0, green = 0, blue = 0;
     int hits = 0, seen_through = 0;
+    float first = 0, last = 0;  // [s] of the hits, since the first view
   };
   static constexpr double kWeightStep = 0.05;  // [m]
   static constexpr float kMinFacing = 0.15F;   // depths of surfaces seen at a flatter angle are not worth much
@@ -125,6 +127,7 @@ class BlockFuser {
     const auto cx = static_cast<float>(camera_.cx + 0.5), cy = static_cast<float>(camera_.cy + 0.5);
     const auto truncation = static_cast<float>(options_.truncation), max_depth = static_cast<float>(options_.max_depth);
     const auto width = static_cast<float>(camera_.width), height = static_cast<float>(camera_.height);
+    const auto time = static_cast<float>(view.depth_timestamp - views_.front().view->depth_timestamp);
     Sums* sums = sums_.data();
     for (int k = 0; k < VoxelBlock::kSide; ++k)
       for (int j = 0; j < VoxelBlock::kSide; ++j) {
@@ -156,14 +159,16 @@ class BlockFuser {
           sums->red += weight * static_cast<float>(colour.r);
           sums->green += weight * static_cast<float>(colour.g);
           sums->blue += weight * static_cast<float>(colour.b);
-          ++sums->hits;
+          if (sums->hits++ == 0) sums->first = time;
+          sums->last = time;
         }
       }
   }
 
   Voxel result(const Sums& s) const {
     Voxel voxel;
-    voxel.known = s.hits >= kMinViews && s.seen_through <= kFreeShare * static_cast<double>(s.hits + s.seen_through);
+    voxel.known = s.hits >= kMinViews && s.last - s.first >= kMinTime &&
+                  s.seen_through <= kFreeShare * static_cast<double>(s.hits + s.seen_through);
     if (!voxel.known) return voxel;
     voxel.distance = s.distance / s.weight;
     const auto byte = [&](float sum) { return static_cast<uint8_t>(sum / s.weight + 0.5F); };

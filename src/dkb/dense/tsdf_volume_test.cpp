@@ -20,14 +20,15 @@ struct Views {
 };
 
 // The person stands in the scene in the views of `with_person`.
-Views make_views(int count, const std::vector<int>& with_person, const DenseOptions& options = scene_options()) {
+Views make_views(int count, const std::vector<int>& with_person, const DenseOptions& options = scene_options(),
+                 double interval = 0.25) {
   Views v;
   const DepthViewMaker maker(scene_camera(), options);
   v.camera = maker.camera();
   for (int i = 0; i < count; ++i) {
     DenseScene scene;
     if (std::find(with_person.begin(), with_person.end(), i) != with_person.end()) scene.person.emplace(-0.4, 2.2);
-    v.views.push_back(maker.make(i, scene.draw(scene_camera(), scene_pose(i)), {}));
+    v.views.push_back(maker.make(i, scene.draw(scene_camera(), scene_pose(i), interval * i), {}));
   }
   for (int i = 0; i < count; ++i) v.placed.push_back({&v.views[static_cast<size_t>(i)], scene_pose(i).inverse()});
   return v;
@@ -67,6 +68,12 @@ TEST(TsdfVolume, NothingFromNoViews) {
   EXPECT_TRUE(volume.blocks().empty());
   EXPECT_EQ(volume.find({0, 0, 0}), -1);
   EXPECT_EQ(TsdfVolume().find({0, 0, 0}), -1);
+}
+
+TEST(TsdfVolume, WhatWasSeenForAMomentIsNotKnown) {
+  // Three views within 0.1 s: somebody who walks is still there in the last of them.
+  EXPECT_TRUE(near_surface(fuse(make_views(3, {}, scene_options(), 0.05))).empty());
+  EXPECT_FALSE(near_surface(fuse(make_views(3, {}, scene_options(), 0.15))).empty());
 }
 
 TEST(TsdfVolume, SurfacesLieWhereTheyAre) {

@@ -18,9 +18,13 @@ constexpr size_t kMinCells = 12;   // cells with depth that a boxed object needs
 constexpr size_t kMinRegion = 40;  // the same for a region without a box
 constexpr double kMargin = 0.1;    // share of a box's size by which its rim reaches; mask there is no object of its own
 constexpr float kLayer = 0.45f;    // [m] an object reaches so far before and behind its main depth layer
-constexpr double kInnerShare = 0.4;   // of a region's cells must have all four neighbours in it: others are rims
-constexpr int kGap = 4;               // [cells] regions so near to each other in the image are one ...
-constexpr float kMergeDepth = 0.25f;  // [m] ... when so near in depth
+constexpr double kInnerShare = 0.4;  // of a region's cells must have all four neighbours in it: others are rims
+constexpr int kGap = 4;              // [cells] regions so near to each other in the image are one ...
+constexpr float kMergeAcross = 0.45f, kMergeDepth = 0.25f;  // [m] ... when so near across and in depth
+constexpr double kBodySd = 0.18;  // [m] standard deviation of a body's surface around its middle, seen from above
+constexpr float kBodyReach = 3;   // times the standard deviation: so far from where it is expected a mover's surface is
+constexpr double kToldApart = 0.35;   // [m] movers expected nearer to each other have no regions each
+constexpr double kOthersShare = 0.2;  // of what hangs together in depth that somebody else must have, to be told apart
 constexpr float kBin = 0.05f;         // [m] of depth histograms
 constexpr size_t kMaxPoints = 300;    // per object, that its place and size are taken of
 
@@ -115,6 +119,20 @@ Eigen::Vector3d MoverObserver::median_position(std::span<const uint32_t> cells) 
          Eigen::Vector3f(upper_median(values[0]), upper_median(values[1]), upper_median(values[2])).cast<double>();
 }
 
+MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
+  MoverSurface surface;
+  const double side = kCell / camera_.fx;  // [m] of a cell, 1 m deep
+  for (const uint32_t i : cells) surface.area += side * side * static_cast<double>(depth_[i] * depth_[i]);
+  const size_t stride = (cells.size() + MoverSurface::kMaxPoints - 1) / MoverSurface::kMaxPoints;
+  for (size_t k = 0; k < cells.size(); k += stride) {
+    const Eigen::Vector2f& ray = rays_[cells[k]];
+    const auto depth = static_cast<double>(depth_[cells[k]]);
+    surface.points_in_world.push_back(world_from_cam_ * Eigen::Vector3d(depth * static_cast<double>(ray.x()),
+                                                                        depth * static_cast<double>(ray.y()), depth));
+  }
+  return surface;
+}
+
 // Middle of the stretch of depth, twice `layer` long, that holds most of the depths; the nearest of equals.
 float MoverObserver::main_layer(const std::vector<float>& depths) const {
   std::vector<int> histogram;
@@ -197,9 +215,15 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
     for_each_cell(ranges[b], [&](size_t i, int, int) {
       if (owner[i] == static_cast<int>(b)) cells.push_back(static_cast<uint32_t>(i));
     });
-    if (cells.size() < kMinCells) continue;
-    observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells),
-                            position_sd(static_cast<double>(depths[b])), size_of(cells)});
+    if (cells.size() >= kMinCells) {
+      observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells), true,
+                              position_sd(static_cast<double>(depths[b])), size_of(cells), surface_of(cells), -1});
+    } else if (const Box& box = boxes[b].box; ranges[b].x0 < ranges[b].x1 && ranges[b].y0 < ranges[b].y1) {
+      const Eigen::Vector2d middle(0.5 * static_cast<double>(2 * box.x + box.w),
+                                   0.5 * static_cast<double>(2 * box.y + box.h));
+      const Eigen::Vector3d ray = camera_.unproject(camera_.undistort(middle), 1.0);
+      observations.push_back({boxes[b].class_name, box, world_from_cam_ * ray, false, 0, {0, 0, 0}, {}, -1});
+    }
   }
   return observations;
 }
@@ -208,14 +232,8 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
 std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector<char>& claimed) const {
   std::vector<char> free(rays_.size());
   for (size_t i = 0; i < free.size(); ++i) free[i] = depth_[i] > 0 && !claimed[i];
-  struct Part {
-    Region region;
-    float depth;
-    size_t merged_into;
-  };
-  std::vector<Part> parts;
+  std::vector<Region> parts;
   const auto width = static_cast<uint32_t>(columns_), size = static_cast<uint32_t>(rays_.size());
-  std::vector<float> depths;
   std::vector<uint32_t> part_of(size, 0);  // seed + 1
   std::vector<uint32_t> cells;
   for (uint32_t seed = 0; seed < size; ++seed) {
@@ -224,13 +242,11 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
     part_of[seed] = seed + 1;
     cells.assign(1, seed);
     CellRange bounds{columns_, rows_, 0, 0};
-    depths.clear();
     for (size_t k = 0; k < cells.size(); ++k) {
       const uint32_t i = cells[k];
       const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
       bounds = {std::min(bounds.x0, x), std::min(bounds.y0, y), std::max(bounds.x1, x + 1), std::max(bounds.y1, y + 1)};
       const float d = depth_[i];
-      depths.push_back(d);
       const auto visit = [&](bool there, uint32_t j) {
         if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.depth_jump) * d) return;
         free[j] = 0;
@@ -251,34 +267,132 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector
                (i + width >= size || mine(i + width));
     }
     if (static_cast<double>(inner) < kInnerShare * static_cast<double>(cells.size())) continue;
-    parts.push_back({{bounds, cells}, upper_median(depths), parts.size()});
+    for (Region& region : divide({bounds, cells, -1})) parts.push_back(std::move(region));
   }
-  // Holes of the depth image and arms held out cut bodies into parts.
+  return join(std::move(parts));
+}
+
+// Holes of the depth image and arms held out cut bodies into parts.
+std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts) const {
+  std::vector<size_t> merged_into(parts.size());
+  std::iota(merged_into.begin(), merged_into.end(), size_t{0});
+  std::vector<Eigen::Vector2f> middles;
+  std::vector<float> across, deep;
+  for (const Region& part : parts) {
+    across.clear();
+    deep.clear();
+    const size_t stride = stride_through(part.cells);
+    for (size_t k = 0; k < part.cells.size(); k += stride) {
+      const Eigen::Vector2f p = from_above(part.cells[k]);
+      across.push_back(p.x());
+      deep.push_back(p.y());
+    }
+    middles.emplace_back(upper_median(across), upper_median(deep));
+  }
   const auto root = [&](size_t p) {
-    while (parts[p].merged_into != p) p = parts[p].merged_into;
+    while (merged_into[p] != p) p = merged_into[p];
     return p;
   };
+  const auto of_one_body = [&](size_t a, size_t b) {
+    if (parts[a].expected >= 0 || parts[b].expected >= 0) return parts[a].expected == parts[b].expected;
+    const CellRange &p = parts[a].bounds, &q = parts[b].bounds;
+    const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
+    const Eigen::Vector2f off = (middles[a] - middles[b]).cwiseAbs();
+    return gap <= kGap && off.x() <= kMergeAcross && off.y() <= kMergeDepth;
+  };
   for (size_t a = 0; a < parts.size(); ++a)
-    for (size_t b = a + 1; b < parts.size(); ++b) {
-      const CellRange &p = parts[a].region.bounds, &q = parts[b].region.bounds;
-      const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
-      if (gap > kGap || std::abs(parts[a].depth - parts[b].depth) > kMergeDepth) continue;
-      const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
-      parts[high].merged_into = low;
-    }
+    for (size_t b = a + 1; b < parts.size(); ++b)
+      if (of_one_body(a, b)) {
+        const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
+        merged_into[high] = low;
+      }
   for (size_t p = 0; p < parts.size(); ++p) {
     const size_t r = root(p);
     if (r == p) continue;
-    Region &into = parts[r].region, &from = parts[p].region;
+    Region &into = parts[r], &from = parts[p];
     into.cells.insert(into.cells.end(), from.cells.begin(), from.cells.end());
     into.bounds = {std::min(into.bounds.x0, from.bounds.x0), std::min(into.bounds.y0, from.bounds.y0),
                    std::max(into.bounds.x1, from.bounds.x1), std::max(into.bounds.y1, from.bounds.y1)};
   }
   std::vector<Region> regions;
   for (size_t p = 0; p < parts.size(); ++p)
-    if (parts[p].merged_into == p && parts[p].region.cells.size() >= kMinRegion)
-      regions.push_back(std::move(parts[p].region));
+    if (merged_into[p] == p && parts[p].cells.size() >= (parts[p].expected >= 0 ? kMinCells : kMinRegion))
+      regions.push_back(std::move(parts[p]));
   return regions;
+}
+
+std::vector<MoverObserver::Footprint> MoverObserver::footprints(std::span<const ExpectedMover> expected) const {
+  const Rigid3 cam_from_world = world_from_cam_.inverse();
+  const Eigen::Matrix3d rotation = cam_from_world.matrix3();
+  std::vector<Footprint> result;
+  for (const ExpectedMover& e : expected) {
+    const Eigen::Vector3d p = cam_from_world * e.position_in_world;
+    const Eigen::Matrix3d c = rotation * e.covariance * rotation.transpose();
+    Eigen::Matrix2d spread;
+    spread << c(0, 0), c(0, 2), c(2, 0), c(2, 2);
+    spread.diagonal().array() += kBodySd * kBodySd;
+    result.push_back({Eigen::Vector2d(p.x(), p.z()).cast<float>(), spread.inverse().cast<float>(),
+                      static_cast<float>(std::log(spread.determinant()))});
+  }
+  return result;
+}
+
+// The expected mover that a cell fits best; -1 = none.
+int MoverObserver::owner_of(uint32_t cell) const {
+  const Eigen::Vector2f p = from_above(cell);
+  int owner = -1;
+  float least = std::numeric_limits<float>::max();
+  for (size_t e = 0; e < footprints_.size(); ++e) {
+    const Footprint& f = footprints_[e];
+    const Eigen::Vector2f off = p - f.middle;
+    const float distance = off.dot(f.information * off), cost = distance + f.width;
+    if (distance > kBodyReach * kBodyReach || cost >= least) continue;
+    least = cost;
+    owner = static_cast<int>(e);
+  }
+  return owner;
+}
+
+// A part that hangs together in depth goes to the mover that most of it fits, and is divided where others, or somebody
+// not expected, have a good share of it.
+std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
+  std::vector<Region> result;
+  if (footprints_.empty()) {
+    result.push_back(std::move(part));
+    return result;
+  }
+  const size_t owners = footprints_.size() + 1, nobody = owners - 1;
+  std::vector<size_t> count(owners, 0);
+  std::vector<uint16_t> owner(part.cells.size());
+  for (size_t k = 0; k < part.cells.size(); ++k) {
+    const int e = owner_of(part.cells[k]);
+    owner[k] = static_cast<uint16_t>(e < 0 ? nobody : static_cast<size_t>(e));
+    ++count[owner[k]];
+  }
+  const auto most = static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+  const double enough =
+      std::max(static_cast<double>(kMinRegion), kOthersShare * static_cast<double>(part.cells.size()));
+  std::vector<int> region_of(owners, 0);  // in the result; 0 = that of the owner of most
+  result.emplace_back();
+  const auto expected = [&](size_t o) { return o == nobody ? -1 : static_cast<int>(o); };
+  result[0].expected = expected(most);
+  for (size_t o = 0; o < owners; ++o) {
+    if (o == most || static_cast<double>(count[o]) < enough) continue;
+    const bool apart = o == nobody || most == nobody ||
+                       (footprints_[o].middle - footprints_[most].middle).norm() > static_cast<float>(kToldApart);
+    if (!apart) continue;
+    region_of[o] = static_cast<int>(result.size());
+    result.emplace_back().expected = expected(o);
+  }
+  for (Region& r : result) r.bounds = {columns_, rows_, 0, 0};
+  for (size_t k = 0; k < part.cells.size(); ++k) {
+    Region& r = result[static_cast<size_t>(region_of[owner[k]])];
+    const int x = static_cast<int>(part.cells[k]) % columns_, y = static_cast<int>(part.cells[k]) / columns_;
+    r.bounds = {std::min(r.bounds.x0, x), std::min(r.bounds.y0, y), std::max(r.bounds.x1, x + 1),
+                std::max(r.bounds.y1, y + 1)};
+    r.cells.push_back(part.cells[k]);
+  }
+  return result;
 }
 
 void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
@@ -293,7 +407,8 @@ void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& 
 }
 
 std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, const MoverMask& mask,
-                                                     std::span<const Detection> boxes, const Rigid3& world_from_cam) {
+                                                     std::span<const Detection> boxes, const Rigid3& world_from_cam,
+                                                     std::span<const ExpectedMover> expected) {
   if (depth.width() != camera_.width || depth.height() != camera_.height)
     throw InputError("depth image is " + std::to_string(depth.width()) + " x " + std::to_string(depth.height()) +
                      " px; it must have the camera's size " + std::to_string(camera_.width) + " x " +
@@ -301,6 +416,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   if (mask.empty()) return {};
   world_from_cam_ = world_from_cam;
   take_masked_depth(depth, mask);
+  footprints_ = footprints(expected);
   std::vector<char> claimed(rays_.size(), 0);  // by a box or its rim
   for (const Detection& d : boxes) for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { claimed[i] = 1; });
   std::vector<MoverObservation> observations = observe_boxes(boxes);
@@ -311,8 +427,9 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
     const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
-    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells),
-                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells)});
+    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells), true,
+                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells),
+                            surface_of(r.cells), r.expected});
   }
   return observations;
 }

@@ -109,15 +109,61 @@ TEST(MoverObserver, TheMaskRoundABoxIsNoObjectOfItsOwn) {
   EXPECT_EQ(observe(scene).size(), 1u);
 }
 
-TEST(MoverObserver, SpecksAndObjectsWithoutDepthAreLeftOut) {
+TEST(MoverObserver, SpecksAndRegionsWithoutDepthAreLeftOut) {
   MoverTestScene scene;
-  scene.add(100, 40, 108, 48, 2);         // 4 cells in a box
-  scene.add(200, 40, 216, 56, 2, false);  // 16 cells without one
+  scene.add(200, 40, 216, 56, 2, false);  // 16 cells without a box
   EXPECT_TRUE(observe(scene).empty());
+  MoverTestScene dark;
+  dark.add(100, 40, 160, 200, 2, false);
+  dark.depth = DepthImage(320, 240);
+  EXPECT_TRUE(observe(dark).empty());
+}
+
+TEST(MoverObserver, ABoxWithoutDepthTellsADirection) {
   MoverTestScene dark;
   dark.add(100, 40, 160, 200, 2);
   dark.depth = DepthImage(320, 240);
-  EXPECT_TRUE(observe(dark).empty());
+  const auto found = observe(dark);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_FALSE(found[0].has_depth);
+  // Middle (130, 120): (130 - 159.5) / 250, (120 - 119.5) / 250.
+  EXPECT_NEAR((found[0].position_in_world - Eigen::Vector3d(-0.118, 0.002, 1)).norm(), 0, 1e-6);
+}
+
+std::vector<MoverObservation> observe_expecting(const MoverTestScene& scene, const std::vector<Eigen::Vector3d>& at) {
+  std::vector<ExpectedMover> expected;
+  for (const Eigen::Vector3d& p : at) expected.push_back({p, 0.01 * Eigen::Matrix3d::Identity()});
+  return MoverObserver(scene.camera, {}).observe(scene.depth, scene.mask, scene.boxes, {}, expected);
+}
+
+TEST(MoverObserver, NeighboursWhoTouchAreToldApartByWhereTheyAreExpected) {
+  MoverTestScene scene;
+  scene.add(100, 40, 220, 200, 2, false);  // 0.96 m wide: two people shoulder to shoulder
+  EXPECT_EQ(observe(scene).size(), 1u);
+  const auto found = observe_expecting(scene, {{-0.24, 0, 2}, {0.24, 0, 2}});
+  ASSERT_EQ(found.size(), 2u);
+  for (const MoverObservation& o : found) EXPECT_NEAR(o.position_in_world.x(), o.expected == 0 ? -0.24 : 0.24, 0.03);
+}
+
+TEST(MoverObserver, PartsOfOneExpectedBodyAreJoined) {
+  MoverTestScene scene;
+  scene.add(130, 40, 190, 90, 2, false);
+  scene.add(130, 130, 190, 200, 2.2f, false);  // a gap of ten cells
+  EXPECT_EQ(observe(scene).size(), 2u);
+  const auto found = observe_expecting(scene, {{0, 0, 2.1}});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].expected, 0);
+  EXPECT_EQ(found[0].box, (Box{128, 40, 60, 160}));
+}
+
+TEST(MoverObserver, WhoIsNotExpectedIsNotTakenForWhoIs) {
+  MoverTestScene scene;
+  scene.add(100, 40, 160, 200, 2, false);
+  scene.add(230, 40, 290, 200, 2, false);
+  const auto found = observe_expecting(scene, {{-0.24, 0, 2}});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].expected, 0);
+  EXPECT_EQ(found[1].expected, -1);
 }
 
 TEST(MoverObserver, AnEmptyMaskHoldsNothing) {

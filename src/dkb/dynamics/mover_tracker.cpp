@@ -17,8 +17,9 @@ constexpr const char* kUnnamed = "object";
 // Standard deviations of an observed position [m]: along the image's rows, along its columns, where clutter and other
 // movers hide legs and bodies, and along the optical axis.
 constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
-constexpr double kAgility = 3.0;  // [m^2/s^3] spectral density of the white noise that acceleration is taken for
-constexpr double kSpeedSd = 1.2;  // [m/s] standard deviation of the speed of something just found
+constexpr double kSdNoDepth = 1.0;  // [m] the last where the sensor tells no depth
+constexpr double kAgility = 3.0;    // [m^2/s^3] spectral density of the white noise that acceleration is taken for
+constexpr double kSpeedSd = 1.2;    // [m/s] standard deviation of the speed of something just found
 
 constexpr double kGate = 25.0;              // squared Mahalanobis distance within which an observation may be a track's
 constexpr double kMaxDistance = 0.9;        // [m] nor may it lie farther from where it is expected than this ...
@@ -27,11 +28,21 @@ constexpr double kClassPenalty = 9.0;       // added to the squared distance whe
 constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
 constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
 
-constexpr double kMemory = 1.2;        // [s] a mover unseen for longer is forgotten
+constexpr double kHasMoved = 0.5;      // [m] from where it was found: it is a mover, and no fault of the mask
+constexpr double kBefore = 0.3;        // [m] what is so much nearer than a mover is not part of it
+constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
+constexpr double kMemory = 1.2;        // [s] a mover unseen for longer, and hidden by nothing, is forgotten
 constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
 constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
 constexpr double kApart = 0.35;        // [m] nothing is found so near to a mover already seen in the frame
 constexpr double kRegionsApart = 0.6;  // [m] the same for regions without a box, across and along the optical axis
+
+// Whether a box may be what is left of another one of the frame before.
+bool left_of(const Box& before, const Box& now) {
+  const float w = std::min(before.x + before.w, now.x + now.w) - std::max(before.x, now.x);
+  const float h = std::min(before.y + before.h, now.y + now.h) - std::max(before.y, now.y);
+  return w > 0 && h > 0 && 2 * w * h > now.area();
+}
 
 }  // namespace
 
@@ -44,9 +55,23 @@ void MoverTracker::predict(double seconds) {
   noise.topRightCorner<3, 3>().diagonal().setConstant(0.5 * seconds * seconds);
   noise.bottomLeftCorner<3, 3>() = noise.topRightCorner<3, 3>();
   for (Track& t : tracks_) {
+    if (!t.hidden) t.missed += seconds;
     t.state.head<3>() += seconds * t.state.tail<3>();
     t.covariance = transition * t.covariance * transition.transpose() + kAgility * noise;
   }
+}
+
+// Tracks whose place is known well enough to tell whose surface is whose.
+std::vector<ExpectedMover> MoverTracker::expected() {
+  std::vector<ExpectedMover> result;
+  expected_.clear();
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    const Eigen::Matrix3d covariance = tracks_[i].covariance.topLeftCorner<3, 3>();
+    if (time_ - tracks_[i].seen > kClaims) continue;
+    result.push_back({tracks_[i].state.head<3>(), covariance});
+    expected_.push_back(i);
+  }
+  return result;
 }
 
 // Index of the observation of each track, -1 = none.
@@ -54,36 +79,66 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
                                          const Eigen::Matrix3d& noise, const Eigen::Vector3d& down) const {
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(tracks_.size()),
                                                    static_cast<Eigen::Index>(observations.size()), kUnassigned);
+  Eigen::MatrixXd boxes_alone = cost;
   const double noise_determinant = noise.determinant();
+  std::vector<char> has_region(tracks_.size(), 0);
+  for (const MoverObservation& o : observations)
+    if (o.expected >= 0) has_region[expected_[static_cast<size_t>(o.expected)]] = 1;
   for (size_t i = 0; i < tracks_.size(); ++i) {
     const Track& t = tracks_[i];
     const Eigen::Matrix3d spread = t.covariance.topLeftCorner<3, 3>() + noise;
     const Eigen::Matrix3d information = spread.inverse();
     // A mover long unseen fits anywhere: half its log likelihood's width keeps it from taking what others fit better.
     const double width = 0.5 * std::log(spread.determinant() / noise_determinant);
-    const double unseen = time_ - t.seen, max_distance = kMaxDistance + kMaxDistanceGrowth * unseen;
+    const double unseen = time_ - t.seen, max_distance = kMaxDistance + kMaxDistanceGrowth * t.missed;
     const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
-      const Eigen::Vector3d off = o.position_in_world - t.state.head<3>();
+      const bool region = o.class_name.empty(),
+                 own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
+      if (region && !own && (o.expected >= 0 || has_region[i])) continue;
+      if (!o.has_depth && (t.id == 0 || unseen > kBoxMemory || !left_of(t.box, o.box))) continue;
+      const Eigen::Vector3d off = place(o, t) - t.state.head<3>();
       const double distance = off.dot(information * off), aside = (off - off.dot(down) * down).norm();
       if (distance > kGate || aside > max_distance) continue;
       double penalty = box_weight * (1 - static_cast<double>(intersection_over_union(t.box, o.box)));
       if (!o.class_name.empty() && !t.class_name.empty() && o.class_name != t.class_name) penalty += kClassPenalty;
-      cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+      (o.has_depth ? cost : boxes_alone)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
           std::min(distance + width + penalty, 0.999 * kUnassigned);
     }
   }
-  return assign(cost, kUnassigned);
+  std::vector<int> found = assign(cost, kUnassigned);
+  // Boxes without depth are left to movers that nothing else shows.
+  for (size_t i = 0; i < tracks_.size(); ++i)
+    if (found[i] >= 0) boxes_alone.row(static_cast<Eigen::Index>(i)).setConstant(kUnassigned);
+  const std::vector<int> alone = assign(boxes_alone, kUnassigned);
+  for (size_t i = 0; i < tracks_.size(); ++i)
+    if (found[i] < 0) found[i] = alone[i];
+  return found;
 }
 
-void MoverTracker::correct(const MoverObservation& o, const Eigen::Matrix3d& noise, Track* t) {
+// Where an observation would be, were it the track's: of a box without depth, at the depth of the track.
+Eigen::Vector3d MoverTracker::place(const MoverObservation& o, const Track& t) const {
+  if (o.has_depth) return o.position_in_world;
+  const double depth = (t.state.head<3>() - world_from_cam_.translation).dot(world_from_cam_.matrix3().col(2));
+  return world_from_cam_.translation + depth * (o.position_in_world - world_from_cam_.translation);
+}
+
+void MoverTracker::correct(const MoverObservation& o, Eigen::Matrix3d noise, Track* t) {
+  const Eigen::Vector3d axis = world_from_cam_.matrix3().col(2);
+  if (!o.has_depth) noise += kSdNoDepth * kSdNoDepth * axis * axis.transpose();
   const Eigen::Matrix3d spread = t->covariance.topLeftCorner<3, 3>() + noise;
   const Eigen::Matrix<double, 6, 3> gain = t->covariance.leftCols<3>() * spread.inverse();
-  t->state += gain * (o.position_in_world - t->state.head<3>());
+  t->state += gain * (place(o, *t) - t->state.head<3>());
   const Covariance less = gain * t->covariance.topRows<3>();
   t->covariance -= 0.5 * (less + less.transpose());
-  t->seen = time_;
+  t->hidden = false;
+  if (o.has_depth) {
+    t->seen = time_;
+    t->missed = 0;
+    t->size = o.size;
+    t->position_sd = o.position_sd;
+  }
   t->box = o.box;
   if (!o.class_name.empty()) t->class_name = o.class_name;
   if (++t->observations >= kMinObservations && t->id == 0) t->id = ++last_id_;
@@ -93,9 +148,10 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
                                         std::span<const Detection> boxes, const Rigid3& world_from_cam) {
   predict(std::max(0.0, timestamp - time_));
   time_ = timestamp;
-  std::erase_if(tracks_, [&](const Track& t) { return time_ - t.seen > (t.id > 0 ? kMemory : kDoubtMemory); });
+  world_from_cam_ = world_from_cam;
+  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
 
-  const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam);
+  const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam, expected());
   const Eigen::Vector3d sd(kSdAcross, kSdDown, kSdDeep);
   const Eigen::Matrix3d axes = world_from_cam.matrix3();
   const Eigen::Matrix3d noise = axes * sd.cwiseAbs2().asDiagonal() * axes.transpose();
@@ -111,15 +167,33 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     taken[k] = 1;
     const MoverObservation& o = observations[k];
     Track& t = tracks_[i];
+    const Eigen::Vector3d position = place(o, t);
     correct(o, noise, &t);
-    seen.push_back(o.position_in_world);
+    if (o.has_depth) remember(o, depth, &t);
+    seen.push_back(position);
     if (t.id == 0) continue;
-    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
-                      o.position_sd, t.covariance, o.size, o.box});
+    const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
+    movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), position_sd,
+                      t.covariance, t.size, o.box});
+  }
+  for (size_t i = 0; i < observation_of.size(); ++i) {
+    Track& t = tracks_[i];
+    if (observation_of[i] >= 0) continue;
+    if (t.moved && t.surface.stands(depth, camera_, noise_, world_from_cam)) {
+      const MoverObservation o{
+          "", t.surface.box_in(camera_, world_from_cam), t.surface.position_in_world, true, t.position_sd, t.size, {},
+          -1};
+      correct(o, noise, &t);
+      movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
+                        o.position_sd, t.covariance, t.size, o.box});
+      seen.push_back(o.position_in_world);
+    } else {
+      t.hidden = stands_behind(t, depth);
+    }
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];
-    if (taken[k]) continue;
+    if (taken[k] || o.expected >= 0 || !o.has_depth) continue;
     // Parts of one body may be taken for several regions, one above the other.
     const double apart = o.class_name.empty() ? kRegionsApart : kApart;
     const auto near = [&](const Eigen::Vector3d& p) {
@@ -137,16 +211,50 @@ std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& dept
     t.seen = time_;
     t.box = o.box;
     t.observations = 1;
+    t.first = o.position_in_world;
     tracks_.push_back(std::move(t));
   }
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
   return movers;
 }
 
+// Whether most of what can be seen where a mover is expected is nearer than it.
+bool MoverTracker::stands_behind(const Track& t, const DepthImage& depth) const {
+  const Eigen::Vector3d middle = world_from_cam_.inverse() * Eigen::Vector3d(t.state.head<3>());
+  int seen = 0, nearer = 0;
+  for (const double down : {-0.4, -0.2, 0.0, 0.2, 0.4})
+    for (const double across : {-0.15, 0.0, 0.15}) {
+      const Eigen::Vector3d p = middle + Eigen::Vector3d(across, down, 0);
+      if (p.z() < kBefore) continue;
+      const Eigen::Vector2d at = camera_.distort(camera_.project(p));
+      const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+      if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
+      ++seen;
+      nearer += static_cast<double>(depth(x, y)) < p.z() - kBefore;
+    }
+  return 2 * nearer > seen;
+}
+
+void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, Track* t) const {
+  // A detector tells of those who stand, too, and its boxes may hold what is behind somebody.
+  if (!o.class_name.empty()) {
+    t->surface = {};
+    return;
+  }
+  t->moved |= t->id > 0 && (o.position_in_world - t->first).norm() > kHasMoved;
+  // The mask leaves who stands still piece by piece.
+  if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
+  t->surface = o.surface;
+  t->surface.position_in_world = o.position_in_world;
+}
+
 void MoverTracker::rebase(const Rigid3& new_from_old) {
   Covariance rotation = Covariance::Zero();
   rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = new_from_old.matrix3();
   for (Track& t : tracks_) {
+    t.first = new_from_old * t.first;
+    t.surface.position_in_world = new_from_old * t.surface.position_in_world;
+    for (Eigen::Vector3d& p : t.surface.points_in_world) p = new_from_old * p;
     t.state.head<3>() = new_from_old * t.state.head<3>();
     t.state.tail<3>() = new_from_old.rotation * t.state.tail<3>();
     t.covariance = rotation * t.covariance * rotation.transpose();

@@ -18,11 +18,12 @@ namespace dkb {
 class MoverTracker {
  public:
   explicit MoverTracker(const CameraModel& camera, const MoverObserverOptions& options = {})
-      : observer_(camera, options) {}
+      : camera_(camera), observer_(camera, options) {}
 
-  // The movers that are seen in the frame, by id. `mask`: silhouettes of the boxes, regions that move, or both; empty
-  // when nothing moves. `boxes` may be empty: regions of the mask are the objects then. `timestamp` [s] must not go
-  // back. Frames whose pose is unknown are left out by the caller.
+  // The movers that are seen in the frame, by id; also those who have moved and stand still, for as long as nothing is
+  // seen through where they are, and those of whom but a box without depth is left. `mask`: silhouettes of the boxes,
+  // regions that move, or both; empty when nothing moves. `boxes` may be empty: regions of the mask are the objects
+  // then. `timestamp` [s] must not go back. Frames whose pose is unknown are left out by the caller.
   std::vector<Mover> update(double timestamp, const DepthImage& depth, const MoverMask& mask,
                             std::span<const Detection> boxes, const Rigid3& world_from_cam);
 
@@ -39,18 +40,33 @@ class MoverTracker {
     std::string class_name;
     State state;
     Covariance covariance;
-    Box box;          // [px] where it was last seen
-    double seen = 0;  // [s]
+    Box box;                         // [px] where it was last seen
+    double seen = 0;                 // [s]
+    double missed = 0;               // [s] unseen since, though nothing hid it
+    bool hidden = false;             // in the frame before
+    Eigen::Vector3d first{0, 0, 0};  // [m] where it was found
+    bool moved = false;              // away from there
+    Eigen::Vector3d size{0, 0, 0};   // [m] as last seen
+    double position_sd = 0;          // [m] the same
+    MoverSurface surface;            // as last seen whole
     int observations = 0;
   };
   void predict(double seconds);
+  std::vector<ExpectedMover> expected();
   std::vector<int> associate(const std::vector<MoverObservation>& observations, const Eigen::Matrix3d& noise,
                              const Eigen::Vector3d& down) const;
-  void correct(const MoverObservation& observation, const Eigen::Matrix3d& noise, Track* track);
+  Eigen::Vector3d place(const MoverObservation& observation, const Track& track) const;
+  bool stands_behind(const Track& track, const DepthImage& depth) const;
+  void remember(const MoverObservation& observation, const DepthImage& depth, Track* track) const;
+  void correct(const MoverObservation& observation, Eigen::Matrix3d noise, Track* track);
 
+  CameraModel camera_;
+  SensorNoise noise_;
   MoverObserver observer_;
   std::vector<Track> tracks_;
+  std::vector<size_t> expected_;  // the tracks that were told to the observer
   double time_ = 0;
+  Rigid3 world_from_cam_;
   int last_id_ = 0;
 };
 

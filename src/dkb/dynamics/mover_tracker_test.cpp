@@ -95,6 +95,62 @@ TEST(MoverTracker, IdsAreKeptThroughACrossingWithoutBoxes) {
   expect_ids_kept_through_a_crossing(false);
 }
 
+TEST(MoverTracker, WhoIsHiddenForLongKeepsTheId) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  int hidden = 0;
+  for (int i = 0; i <= 120; ++i) {
+    // Somebody walks to the right behind a pillar 1 m wide that is as near as half of the way.
+    MoverTestScene scene;
+    const double x = -1.2 + 0.6 * i * kStep;
+    for (int y = 0; y < 240; ++y)
+      for (int u = 100; u < 225; ++u) scene.depth(u, y) = 2;
+    add_person(x, 3.5, &scene, false);
+    movers = show(&tracker, i * kStep, scene);
+    hidden += movers.empty() && i > 5;
+  }
+  EXPECT_GT(hidden, 40);  // more than the 1.2 s after which one is forgotten who is hidden by nothing
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].id, 1);
+}
+
+TEST(MoverTracker, WhoStopsIsFollowedThoughNothingMovesUntilHeIsSeenThrough) {
+  const auto stop_after = [](double way, bool leaves) {
+    MoverTracker tracker(MoverTestScene().camera, {});
+    std::vector<Mover> movers;
+    for (int i = 0; i < 120; ++i) {
+      MoverTestScene scene;
+      if (!leaves || i < 110) add_person(-0.5 + way * std::min(1.0, i / 30.0), 2.5, &scene, false);
+      if (i > 40) scene.mask.cells = {};  // the motion segmentation has forgotten him
+      movers = show(&tracker, i * kStep, scene);
+    }
+    return movers;
+  };
+  const std::vector<Mover> stands = stop_after(1.0, false);
+  ASSERT_EQ(stands.size(), 1u);
+  EXPECT_EQ(stands[0].id, 1);
+  EXPECT_NEAR(stands[0].position_in_world.x(), 0.5, 0.02);
+  EXPECT_LT(stands[0].velocity_in_world.norm(), 0.1);
+  EXPECT_TRUE(stop_after(1.0, true).empty());
+  EXPECT_TRUE(stop_after(0.1, false).empty());  // has never gone anywhere: a fault of the mask, maybe
+}
+
+TEST(MoverTracker, ABoxWithoutDepthGoesOnWithWhomItIsLeftOf) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  MoverTestScene foot;
+  foot.boxes.push_back({"person", {150, 190, 20, 17}, 1});
+  foot.mask.cells(0, 0) = 255;
+  const auto movers = show(&tracker, 5 * kStep, foot);
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].id, 1);
+  EXPECT_NEAR(movers[0].position_in_world.z(), 2, 1e-6);
+  MoverTestScene elsewhere;
+  elsewhere.boxes.push_back({"person", {250, 190, 20, 17}, 1});
+  elsewhere.mask.cells(0, 0) = 255;
+  EXPECT_TRUE(show(&tracker, 6 * kStep, elsewhere).empty());
+}
+
 int id_after_gap(double seconds) {
   MoverTracker tracker(MoverTestScene().camera, {});
   double t = 0;
