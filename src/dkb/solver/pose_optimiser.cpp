@@ -77,10 +77,7 @@ class PoseProblem {
     for (size_t i = 0; i < count_; ++i)
       if (inlier[i]) *end++ = array(kChi2)[i];
     if (end == fits) return;
-    double* const middle = fits + (end - fits) / 2;
-    std::nth_element(fits, middle, end);
-    const auto n = static_cast<double>(end - fits);
-    const double variance = (n * *middle / kMedianChi2 + kUsualScale) / (n + kUsualScale);
+    const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
       const double weight = times * (kFreedom + 2) / (kFreedom + array(kChi2)[i] / variance);
@@ -209,6 +206,13 @@ Rigid3 one_step(PoseProblem& problem, const Rigid3& pose) {
 }
 
 }  // namespace
+
+double variance_by_median(std::span<double> squares) {
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  const auto n = static_cast<double>(squares.size());
+  return (n * *middle / kMedianChi2 + kUsualScale) / (n + kUsualScale);
+}
 
 void PoseOptions::check() const {
   require_option(rounds >= 1, "rounds", rounds, ">= 1");

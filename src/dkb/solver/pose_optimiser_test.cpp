@@ -91,6 +91,15 @@ TEST(PoseOptimiser, MatchesInTheRowBesideHardlyTakeThePoseAlong) {
   EXPECT_LT(shift, 0.4 * full);
 }
 
+TEST(PoseOptimiser, TailsHardlyMoveTheVarianceOfErrors) {
+  std::vector<double> many(1000000, 4 * 1.386);
+  EXPECT_NEAR(variance_by_median(many), 4, 1e-3);
+  // 20 errors of variance 4 beside the 20 of variance 1; a quarter of them is anything.
+  std::vector<double> few(20, 4 * 1.386);
+  std::fill(few.begin(), few.begin() + 5, 1e6);
+  EXPECT_NEAR(variance_by_median(few), 2.5, 1e-9);
+}
+
 TEST(PoseOptimiser, CovarianceEqualsTheSpreadOfEstimates) {
   constexpr int kTrials = 600;
   const TestWorld clean({.cameras = 1, .points = 150, .pixel_noise = 0, .depth_share = 0.5, .seed = 4});

@@ -51,7 +51,7 @@ double OdometryPoints::parallax_sigma(const OdometryMatch& guessed, const Rigid3
 }
 
 bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
-                               const Matrix6d& covariance) const {
+                               const Matrix6d& covariance, double limit) const {
   const SightRay ray = transformed(cam_from_world, match.first);
   if (!(ray.direction.z() > 0)) return false;
   // It is seen from where it is near to either camera up to infinity.
@@ -62,7 +62,7 @@ bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypo
   const double length = along.squaredNorm();
   const double t = length > 0 ? std::clamp((seen - from).dot(along) / length, 0.0, 1.0) : 0.0;
   const double variance = ray.variance + sight_variance(keypoint, cam_from_world * match.point_in_world, covariance);
-  return (seen - from - t * along).squaredNorm() > PoseOptions().chi2_pixel * variance;
+  return (seen - from - t * along).squaredNorm() > limit * variance;
 }
 
 // Harmonic mean of the depths of the features nearby, since parallax goes with the inverse depth; 0 when there is none.

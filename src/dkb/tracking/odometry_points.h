@@ -33,9 +33,9 @@ class OdometryPoints {
   double parallax_sigma(const OdometryMatch& guessed, const Rigid3& last_cam_from_world,
                         const Rigid3& cam_from_world) const;
   // Whether a guessed point has moved when `keypoint` shows it from a pose of that covariance (as TrackedFrame has it):
-  // no place on the ray of its first sighting is seen there.
+  // no place on the ray of its first sighting is seen there. `limit` is that of the squared distance over its variance.
   bool has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
-                 const Matrix6d& covariance) const;
+                 const Matrix6d& covariance, double limit) const;
   // Takes the features of `frame`, which has a pose: inliers of points known before keep their place in the world, but
   // for guessed ones; the others start at their depth.
   void remember(const TrackedFrame& frame);

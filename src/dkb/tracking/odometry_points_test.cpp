@@ -117,7 +117,7 @@ struct SeenWithoutDepth : testing::Test {
   }
   bool moved(const OdometryMatch& match, const Eigen::Vector2d& pixel, const Rigid3& cam_from_world,
              const Matrix6d& covariance = Matrix6d::Zero()) const {
-    return points.has_moved(match, keypoint_at(pixel), cam_from_world, covariance);
+    return points.has_moved(match, keypoint_at(pixel), cam_from_world, covariance, 5.991);
   }
   static Keypoint keypoint_at(const Eigen::Vector2d& pixel) {
     Keypoint k;

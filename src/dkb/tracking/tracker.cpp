@@ -138,6 +138,27 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   return optimise_pose(camera_, initial, observations, options, &prior);
 }
 
+// Visual-odometry points weigh little in a pose, and the limits of an inlier widen with their sigmas: a shoe that goes
+// 3 px a frame was within them. What has moved is told by what these points leave in this frame instead; it starts anew
+// where it is now. Returns the limit, for squared errors over their variance.
+double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, const PoseEstimate& pose,
+                              const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const {
+  std::vector<double> squares(pairs.size()), of_inliers;
+  for (size_t i = first; i < pairs.size(); ++i) {
+    if (!pose.inlier[i]) continue;
+    const Keypoint& k = features.keypoints[static_cast<size_t>(pairs[i].feature)];
+    const double sigma = std::hypot(corner_sigma(k, noise_, scale_factor_), pairs[i].parallax_sigma);
+    const Eigen::Vector2d at = camera_.project(pose.cam_from_world * pairs[i].point_in_world);
+    squares[i] = (at - k.pixel.cast<double>()).squaredNorm() / (sigma * sigma);
+    of_inliers.push_back(squares[i]);
+  }
+  if (of_inliers.empty()) return PoseOptions().chi2_pixel;
+  const double limit = kStudent90 * variance_by_median(of_inliers);
+  for (size_t i = first; i < pairs.size(); ++i)
+    if (squares[i] > limit) followed[static_cast<size_t>(pairs[i].feature)].reset();
+  return limit;
+}
+
 void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {
   if (candidates_made_ && now - *candidates_made_ < kRefreshAfter) return;
   candidates_ = local_map_candidates(points, map_.view());
@@ -236,6 +257,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
   if (inliers < min_inliers || (accept && !accept(pose))) return false;
 
+  const double limit = forget_strays(pairs, in_map, pose, features, followed);
   std::vector<PointId> in_view, found;
   in_view.reserve(candidates.size());
   found.reserve(features.size());
@@ -263,7 +285,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     if (followed[f] && followed[f]->moves) shown = followed[f];
     if (!shown || !shown->guessed) continue;
     shown->moves =
-        shown->moves || odometry_.has_moved(*shown, features.keypoints[f], pose.cam_from_world, pose.covariance);
+        shown->moves || odometry_.has_moved(*shown, features.keypoints[f], pose.cam_from_world, pose.covariance, limit);
     frame.outlier[f] = shown->moves;
   }
   visibility_.add_found(std::move(found));

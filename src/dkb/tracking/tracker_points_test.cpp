@@ -55,6 +55,33 @@ TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
   EXPECT_EQ(guessed, 0);
 }
 
+TEST_F(TrackerTest, AnOdometryPointThatMovesByThreePixelsStartsAnew) {
+  publish(start(on_path(0), {.depth_share = 0.5}));
+  TrackedFrame o;
+  for (int f = 1; f <= 3; ++f) o = track(on_path(f));
+  // Of the features of this frame that show an odometry point, the place of the one nearest to the image's middle.
+  int mover = -1;
+  double nearest = 1e9;
+  for (size_t i = 0; i < o.points.size(); ++i) {
+    const double distance = (o.features->keypoints[i].pixel - Eigen::Vector2f(320, 240)).norm();
+    if (!o.odometry[i] || distance > nearest) continue;
+    nearest = distance;
+    mover = view.shows[i];
+  }
+  ASSERT_GE(mover, 0);
+  const auto followed = [&](int frame) {
+    const TrackedFrame seen = track(on_path(frame));
+    for (size_t i = 0; i < seen.points.size(); ++i)
+      if (view.shows[i] == mover) return seen.odometry[i].has_value();
+    return false;
+  };
+  Eigen::Vector3d& place = scene.points[static_cast<size_t>(mover)];
+  ASSERT_TRUE(followed(4));
+  place.y() += 3 / scene.camera.fy * (on_path(4) * place).z();
+  EXPECT_FALSE(followed(5)) << "within the limit of an inlier whose sigma is doubled";
+  EXPECT_TRUE(followed(6)) << "it stands still now";
+}
+
 TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
   publish(start(on_path(0), {.depth_share = 0.5}));
   track(on_path(1));
