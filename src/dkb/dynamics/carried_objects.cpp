@@ -90,6 +90,13 @@ void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid)
   carried_ = std::move(moved);
 }
 
+MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {
+  MoverMask wide;
+  unite(wide, {1, mask}, camera_.width, camera_.height);
+  dilate(wide, options_.silhouette.rim);
+  return wide;
+}
+
 std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, FrameIndex now,
                                               const PastFrames& past, const ImagePyramid& pyramid, int score_cell) {
   std::vector<LateMask> late;
@@ -104,7 +111,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
       LateMask mask{p.frame, silhouettes(p.image->depth, there.mask.empty() ? there.boxes : std::vector<Detection>(),
                                          camera_, noise_, options_.silhouette)};
       if (!p.still_score.empty()) clear_still(mask.mask, p.still_score, score_cell);
-      if (!there.mask.empty()) unite(mask.mask, {1, there.mask}, camera_.width, camera_.height);
+      unite(mask.mask, with_rim(there.mask), camera_.width, camera_.height);
       late.push_back(std::move(mask));
     }
     here = carry(detections, motions(*source, pyramid, detections.boxes), now - from, camera_.width, camera_.height,

@@ -40,6 +40,8 @@ class CarriedObjects {
 
   std::vector<Detection> boxes() const;
   const GreyImage& mask() const { return mask_; }  // empty when the detector gives none
+  // The same as what movers cover: with a rim as silhouettes have, since at its edge a carried mask is off by some pixels.
+  MoverMask mover_mask() const { return with_rim(mask_); }
 
  private:
   struct Carried {
@@ -48,6 +50,7 @@ class CarriedObjects {
   };
   std::vector<PointMotion> motions(const PastFrame& from, const ImagePyramid& to,
                                    const std::vector<Detection>& boxes) const;
+  MoverMask with_rim(const GreyImage& mask) const;
   Detections carry_to(const PastFrame& from, const ImagePyramid& to, const Detections& detections, int frames) const;
 
   Camera camera_;

@@ -110,6 +110,7 @@ Carried SceneStage::carry(const CarryTask& task) {
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
   }
   if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
+  if (!objects_.mask().empty()) made.mask = objects_.mover_mask();
   made.pyramid = std::move(pyramid);
   made.ms = watch.ms();
   return made;
@@ -179,7 +180,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   scene.boxes = objects_.boxes();
   std::vector<Detection> unmasked;
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
-  if (!objects_.mask().empty()) unite(given, {1, objects_.mask()}, camera_.width, camera_.height);
+  unite(given, carried.mask, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
   const MoverMask moving = take_motion(scene.boxes);
   if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();

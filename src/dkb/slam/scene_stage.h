@@ -48,6 +48,7 @@ struct Carried {
   std::shared_ptr<const ImagePyramid> pyramid;  // of the image
   std::vector<LateMask> late_masks;
   MoverMask silhouettes;  // of boxes without a mask
+  MoverMask mask;         // that the detector gave
   double ms = 0;
 };
 struct CarryTask {
