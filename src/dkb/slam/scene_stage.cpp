@@ -120,7 +120,7 @@ void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDete
                        const Expectation& expected, const std::optional<FrameOutcome>& before) {
   // What is left of a frame that failed in between belongs to nobody.
   for (auto* task : {&segmenting_, &carrying_})
-    if (*task) (*task)->finish();
+    if (*task) (*task)->drop();
   if (before) learn(*before);
   if (segmenting_) {
     const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();

@@ -23,7 +23,7 @@ class SideTask {
     if (threaded) thread_ = std::thread([this] { run(); });
   }
   ~SideTask() {
-    settle();
+    drop();
     state_.store(kStopping, std::memory_order_release);
     state_.notify_one();
     if (thread_.joinable()) thread_.join();
@@ -31,10 +31,15 @@ class SideTask {
   SideTask(const SideTask&) = delete;
   SideTask& operator=(const SideTask&) = delete;
 
-  // Not again before finish().
   void begin() {
+    drop();
     state_.store(kOffered, std::memory_order_release);
     if (thread_.joinable()) state_.notify_one();
+  }
+  // Ends a round that nobody finished, as when something failed in between. What was not begun is not done.
+  void drop() {
+    settle();
+    error_ = nullptr;
   }
   // Returns when the work is done, at once when it was not begun. What it threw it throws as an InputError that names
   // the work.

@@ -54,6 +54,27 @@ TEST(SideTask, ThrowsAtTheEndWhatTheWorkThrewAndGoesOn) {
   }
 }
 
+TEST(SideTask, ARoundThatNobodyFinishedIsNoPartOfTheNext) {
+  for (const bool threaded : {true, false})
+    for (int i = 0; i < 200; ++i) {
+      bool fails = true;
+      int times = 0;
+      SideTask task(
+          "counting",
+          [&] {
+            if (fails) throw std::runtime_error("no fingers");
+            ++times;
+          },
+          threaded);
+      task.begin();
+      task.drop();
+      fails = false;
+      task.begin();
+      task.finish();
+      EXPECT_EQ(times, 1);
+    }
+}
+
 TEST(SideTask, MayBeDestroyedWhileAtWork) {
   for (int i = 0; i < 200; ++i) {
     int times = 0;
