@@ -67,7 +67,7 @@ void expect_sound(const std::string& html) {
 
 TEST(Report, VerdictIsThatOfStatsAndEval) {
   const TempFolder temp;
-  const SlamRun run(sequence(), temp / "out", {"--set", "features.count=900"});
+  const SlamRun run(sequence(), temp / "out", {"--set", "features.count=850"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   const std::string html = read_text(run.out / "report.html");
   expect_sound(html);
@@ -78,7 +78,7 @@ TEST(Report, VerdictIsThatOfStatsAndEval) {
   std::snprintf(ape, sizeof ape, "%.4f", ape_of(sequence(), run.out / "trajectory.txt"));
   EXPECT_EQ(by_id(html, "ape"), ape);
   EXPECT_NE(html.find("every frame was tracked"), std::string::npos);
-  EXPECT_NE(html.find("<td>features.count</td><td>900</td><td>800</td>"), std::string::npos);
+  EXPECT_NE(html.find("<td>features.count</td><td>850</td><td>900</td>"), std::string::npos);
   EXPECT_NE(html.find("data:image/jpeg;base64,"), std::string::npos);
 }
 

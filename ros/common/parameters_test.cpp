@@ -16,7 +16,7 @@ const ParameterDescription& description(const std::string& name) {
 }
 
 TEST(Parameters, EverySettingOfTheLibraryIsOneWithItsTypeAndRange) {
-  EXPECT_EQ(std::get<int64_t>(description("features.count").initial), 800);
+  EXPECT_EQ(std::get<int64_t>(description("features.count").initial), 900);
   EXPECT_EQ(description("features.count").min, 1);
   EXPECT_EQ(description("features.count").meaning, "[features] wanted per image");
   EXPECT_EQ(std::get<double>(description("features.scale").initial), 1.2);

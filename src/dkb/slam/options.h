@@ -30,7 +30,7 @@ struct PipelineOptions {
 
 // What the stages are made from.
 struct SlamOptions {
-  OrbOptions features{.count = 800};
+  OrbOptions features{.count = 900};
   DepthOptions depth;
   SensorNoise noise;
   TrackingOptions tracking;
