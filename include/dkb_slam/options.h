@@ -108,7 +108,7 @@ class DKB_SLAM_API Options {
 
   struct Pipeline {
     double mapper_latency = 0.1;  ///< [s] after which tracking sees a keyframe's mapping, in whole frames, above 0
-    int mapper_queue = 4;          ///< [keyframes] that may wait for mapping in a real-time run, at least 1
+    int mapper_queue = 4;         ///< [keyframes] that may wait for mapping in a real-time run, at least 1
   } pipeline;
 
   bool threaded = true;  ///< mapping, detection and loop search on threads of their own; false: the same bytes from one

@@ -40,7 +40,8 @@ class CarriedObjects {
 
   std::vector<Detection> boxes() const;
   const GreyImage& mask() const { return mask_; }  // empty when the detector gives none
-  // The same as what movers cover: with a rim as silhouettes have, since at its edge a carried mask is off by some pixels.
+  // The same as what movers cover: with a rim as silhouettes have, since at its edge a carried mask is off by some
+  // pixels.
   MoverMask mover_mask() const { return with_rim(mask_); }
 
  private:

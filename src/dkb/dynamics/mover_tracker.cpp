@@ -66,9 +66,8 @@ std::vector<ExpectedMover> MoverTracker::expected() {
   std::vector<ExpectedMover> result;
   expected_.clear();
   for (size_t i = 0; i < tracks_.size(); ++i) {
-    const Eigen::Matrix3d covariance = tracks_[i].covariance.topLeftCorner<3, 3>();
     if (time_ - tracks_[i].seen > kClaims) continue;
-    result.push_back({tracks_[i].state.head<3>(), covariance});
+    result.push_back({tracks_[i].state.head<3>(), tracks_[i].covariance.topLeftCorner<3, 3>()});
     expected_.push_back(i);
   }
   return result;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/features/vectorised.h"
 #include "dkb/util/errors.h"
 
 #if defined(__x86_64__)
@@ -18,6 +19,16 @@ constexpr int kColumnOne = 2048;  // weight of one column
 constexpr int kShift = 18;        // log2(kRowOne * kColumnOne)
 constexpr int kRound = 1 << (kShift - 1);
 constexpr int kPadding = 32;  // entries that vector loads may read past the end of a row buffer
+
+// The row of the source at `index` and the next one, blended by the second one's weight.
+void blend_rows(Simd simd, const GreyImage& source, int index, int weight, int16_t* blended) {
+  const uint8_t* const a = source.row(index);
+  const uint8_t* const b = source.row(std::min(index + 1, source.height() - 1));
+  run_vectorised(simd, [a, b, weight, width = source.width(), blended]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (int x = 0; x < width; ++x) blended[x] = static_cast<int16_t>(a[x] * (kRowOne - weight) + b[x] * weight);
+  });
+}
 
 // One output row between the vertical blend and the end: scalar columns from `first` on.
 template <class Taps>
@@ -108,8 +119,7 @@ void ImagePyramid::build_level(int index) {
 #if defined(__x86_64__)
   if (resampling.simd == Simd::avx512)
     return resample_avx512(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
-  if (resampling.simd == Simd::avx2)
-    return resample_avx2(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
+  if (resampling.simd == Simd::avx2) return resample_avx2(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
 #endif
   resample_scalar(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
 }
@@ -118,10 +128,7 @@ void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& sour
                                    GreyImage& target) {
   for (int y = 0; y < target.height(); ++y) {
     const Tap row = plan.rows[static_cast<size_t>(y)];
-    const uint8_t* a = source.row(row.index);
-    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
-    for (int x = 0; x < source.width(); ++x)
-      row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+    blend_rows(Simd::scalar, source, row.index, row.weight, row_buffer);
     interpolate_columns(plan.columns, 0, row_buffer, target.row(y));
   }
 }
@@ -129,22 +136,10 @@ void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& sour
 #if defined(__x86_64__)
 DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
                                                  GreyImage& target) {
-  const int width = source.width();
   const size_t groups = (plan.columns.size() / 4) & ~size_t{1};  // two groups of four pixels a step
   for (int y = 0; y < target.height(); ++y) {
     const Tap row = plan.rows[static_cast<size_t>(y)];
-    const uint8_t* a = source.row(row.index);
-    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
-    const __m256i wa = _mm256_set1_epi16(static_cast<int16_t>(kRowOne - row.weight));
-    const __m256i wb = _mm256_set1_epi16(static_cast<int16_t>(row.weight));
-    int x = 0;
-    for (; x + 16 <= width; x += 16) {
-      const __m256i va = _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + x)));
-      const __m256i vb = _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(b + x)));
-      const __m256i blend = _mm256_add_epi16(_mm256_mullo_epi16(va, wa), _mm256_mullo_epi16(vb, wb));
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(row_buffer + x), blend);
-    }
-    for (; x < width; ++x) row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+    blend_rows(Simd::avx2, source, row.index, row.weight, row_buffer);
 
     uint8_t* out = target.row(y);
     const __m256i round = _mm256_set1_epi32(kRound);
@@ -168,22 +163,11 @@ DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const G
 
 DKB_TARGET_AVX512 void ImagePyramid::resample_avx512(const Resampling& plan, const GreyImage& source,
                                                      int16_t* row_buffer, GreyImage& target) {
-  const int width = source.width();
   const size_t groups = plan.columns.size() / 16;
   const __m512i round = _mm512_set1_epi32(kRound);
   for (int y = 0; y < target.height(); ++y) {
     const Tap row = plan.rows[static_cast<size_t>(y)];
-    const uint8_t* a = source.row(row.index);
-    const uint8_t* b = source.row(std::min(row.index + 1, source.height() - 1));
-    const __m512i wa = _mm512_set1_epi16(static_cast<int16_t>(kRowOne - row.weight));
-    const __m512i wb = _mm512_set1_epi16(static_cast<int16_t>(row.weight));
-    int x = 0;
-    for (; x + 32 <= width; x += 32) {
-      const __m512i va = _mm512_cvtepu8_epi16(load_avx2(a + x)), vb = _mm512_cvtepu8_epi16(load_avx2(b + x));
-      const __m512i blend = _mm512_add_epi16(_mm512_mullo_epi16(va, wa), _mm512_mullo_epi16(vb, wb));
-      _mm512_storeu_si512(row_buffer + x, blend);
-    }
-    for (; x < width; ++x) row_buffer[x] = static_cast<int16_t>(a[x] * (kRowOne - row.weight) + b[x] * row.weight);
+    blend_rows(Simd::avx512, source, row.index, row.weight, row_buffer);
 
     uint8_t* out = target.row(y);
     for (size_t g = 0; g < groups; ++g) {

@@ -83,8 +83,7 @@ class KeypointGrid {
     const __m128i octave = _mm_unpacklo_epi16(_mm_unpacklo_epi8(_mm_cvtsi32_si128(octaves), zero), zero);
     const __m128i off_octave = _mm_or_si128(_mm_cmplt_epi32(octave, _mm_set1_epi32(place.least_octave)),
                                             _mm_cmpgt_epi32(octave, _mm_set1_epi32(place.most_octave)));
-    return static_cast<uint32_t>(
-        _mm_movemask_ps(_mm_andnot_ps(_mm_castsi128_ps(off_octave), _mm_and_ps(in_x, in_y))));
+    return static_cast<uint32_t>(_mm_movemask_ps(_mm_andnot_ps(_mm_castsi128_ps(off_octave), _mm_and_ps(in_x, in_y))));
 #else
     uint32_t within = 0;
     for (size_t i = 0; i < kGroup; ++i) {
@@ -100,8 +99,8 @@ class KeypointGrid {
 
   static constexpr size_t kGroup = 4;  // points compared at once
   int columns_ = 0, rows_ = 0;
-  std::vector<int32_t> first_;  // point of each cell
-  std::vector<float> x_, y_;      // by cells, with room for a group more
+  std::vector<int32_t> first_;   // point of each cell
+  std::vector<float> x_, y_;     // by cells, with room for a group more
   std::vector<uint8_t> octave_;  // the same
   std::vector<int32_t> index_;
 };

@@ -65,27 +65,27 @@ CornerDepths::Depth CornerDepths::at(float x, float y) const {
 
 float CornerDepths::nearest_around(int cx, int cy) const {
   float nearest = kFar;
-  run_vectorised(simd_, [first = &depth_(cx - kReach, cy - kReach), stride = depth_.width(),
-                         to = &nearest]() DKB_KERNEL_BODY {
-    // Nine columns as two times eight, so that a row is two registers.
-    static_assert(kAcross == 9);
-    using Eight = float __attribute__((vector_size(32)));
-    const Eight far = Eight{} + kFar;
-    Eight left = far, right = far;
-    for (int y = 0; y < kAcross; ++y) {
-      Eight here, beside;
-      __builtin_memcpy(&here, first + y * stride, sizeof here);
-      __builtin_memcpy(&beside, first + y * stride + 1, sizeof beside);
-      here = here > 0 ? here : far;
-      beside = beside > 0 ? beside : far;
-      left = here < left ? here : left;
-      right = beside < right ? beside : right;
-    }
-    left = left < right ? left : right;
-    float least = left[0];
-    for (int k = 1; k < 8; ++k) least = left[k] < least ? left[k] : least;
-    *to = least;
-  });
+  run_vectorised(simd_,
+                 [first = &depth_(cx - kReach, cy - kReach), stride = depth_.width(), to = &nearest]() DKB_KERNEL_BODY {
+                   // Nine columns as two times eight, so that a row is two registers.
+                   static_assert(kAcross == 9);
+                   using Eight = float __attribute__((vector_size(32)));
+                   const Eight far = Eight{} + kFar;
+                   Eight left = far, right = far;
+                   for (int y = 0; y < kAcross; ++y) {
+                     Eight here, beside;
+                     __builtin_memcpy(&here, first + y * stride, sizeof here);
+                     __builtin_memcpy(&beside, first + y * stride + 1, sizeof beside);
+                     here = here > 0 ? here : far;
+                     beside = beside > 0 ? beside : far;
+                     left = here < left ? here : left;
+                     right = beside < right ? beside : right;
+                   }
+                   left = left < right ? left : right;
+                   float least = left[0];
+                   for (int k = 1; k < 8; ++k) least = left[k] < least ? left[k] : least;
+                   *to = least;
+                 });
   return nearest;
 }
 

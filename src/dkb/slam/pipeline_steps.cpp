@@ -11,7 +11,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kFeatureShare = 2;  // by which the features are cut in a real-time run that is late
+constexpr int kFeatureShare = 2;         // by which the features are cut in a real-time run that is late
 constexpr double kUsualFeatures = 1000;  // of a frame, that the numbers of keyframe rules are meant for
 
 std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {

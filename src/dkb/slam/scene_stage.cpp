@@ -34,12 +34,13 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
   if (!segments_motion_) options_.motion.cell = kSupportCell;
   if (segments_motion_ || supports) {
     motion_.emplace(camera, noise, options_.motion);
-    segmenting_.emplace("motion segmentation", [this] { segmentation_ = segment_motion(segmentation_task_); },
-                        threaded);
+    segmenting_.emplace(
+        "motion segmentation", [this] { segmentation_ = segment_motion(segmentation_task_); }, threaded);
   }
   for (const auto& detector : prompt_) detector->reset();
   if (slow_ != nullptr || (rival_ && rival_->needs_pyramid()))
-    carrying_.emplace("carrying detections", [this] { carried_ = carry(carry_task_); }, threaded);
+    carrying_.emplace(
+        "carrying detections", [this] { carried_ = carry(carry_task_); }, threaded);
   if (slow_ == nullptr) return;
   slow_->reset();
   slow_stage_.emplace(*slow_, camera, schedule_, threaded, realtime);
@@ -110,7 +111,7 @@ Carried SceneStage::carry(const CarryTask& task) {
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
   }
   if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
-  if (!objects_.mask().empty()) made.mask = objects_.mover_mask();
+  made.mask = objects_.mover_mask();
   made.pyramid = std::move(pyramid);
   made.ms = watch.ms();
   return made;

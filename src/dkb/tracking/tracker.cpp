@@ -10,8 +10,8 @@
 namespace dkb {
 namespace {
 
-// [s] since its birth until a point may be found where a mover is suspected: as long as the motion segmentation takes to
-// trust a view in full, by which what moved at its birth is known.
+// [s] since its birth until a point may be found where a mover is suspected: as long as the motion segmentation takes
+// to trust a view in full, by which what moved at its birth is known.
 constexpr double kEstablishedAfter = 0.5;
 constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map points is renewed at least so often
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
