@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "dkb/features/vectorised.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 
@@ -45,6 +46,7 @@ MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptio
   camera_.check();
   columns_ = (camera_.width + kCell - 1) / kCell;
   rows_ = (camera_.height + kCell - 1) / kCell;
+  parts_ = DepthParts(columns_, rows_);
   rays_.reserve(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
   for (int y = 0; y < rows_; ++y)
     for (int x = 0; x < columns_; ++x) {
@@ -54,7 +56,7 @@ MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptio
 }
 
 // Cells whose middle lies in the box, widened by a share of its size.
-MoverObserver::CellRange MoverObserver::cells_in(const Box& b, double margin) const {
+CellBounds MoverObserver::cells_in(const Box& b, double margin) const {
   const auto first = [&](double edge, int n) {
     return static_cast<int>(std::clamp(std::ceil(edge / kCell - 0.5), 0.0, static_cast<double>(n)));
   };
@@ -65,7 +67,7 @@ MoverObserver::CellRange MoverObserver::cells_in(const Box& b, double margin) co
 }
 
 template <class Function>
-void MoverObserver::for_each_cell(const CellRange& r, const Function& function) const {
+void MoverObserver::for_each_cell(const CellBounds& r, const Function& function) const {
   for (int y = r.y0; y < r.y1; ++y)
     for (int x = r.x0; x < r.x1; ++x)
       function(static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x), x, y);
@@ -162,9 +164,9 @@ float MoverObserver::main_layer(const std::vector<float>& depths) const {
 // Depth [m] of the object in each box; 0 = not known. The cells that a box alone has tell it; for a box within others,
 // the cells that these do not explain.
 std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
-                                             const std::vector<CellRange>& ranges) const {
+                                             const std::vector<CellBounds>& ranges) const {
   std::vector<int> count(rays_.size(), 0);
-  for (const CellRange& r : ranges) for_each_cell(r, [&](size_t i, int, int) { ++count[i]; });
+  for (const CellBounds& r : ranges) for_each_cell(r, [&](size_t i, int, int) { ++count[i]; });
   std::vector<size_t> by_area(boxes.size());
   std::iota(by_area.begin(), by_area.end(), size_t{0});
   std::stable_sort(by_area.begin(), by_area.end(),
@@ -189,7 +191,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
 }
 
 std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detection> boxes) const {
-  std::vector<CellRange> ranges;
+  std::vector<CellBounds> ranges;
   for (const Detection& d : boxes) ranges.push_back(cells_in(d.box, 0));
   const std::vector<float> depths = box_depths(boxes, ranges);
   const float half = kLayer;
@@ -229,47 +231,16 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
 }
 
 // Parts of the mask outside all boxes that hang together in depth.
-std::vector<MoverObserver::Region> MoverObserver::find_regions(const std::vector<char>& claimed) const {
-  std::vector<char> free(rays_.size());
-  for (size_t i = 0; i < free.size(); ++i) free[i] = depth_[i] > 0 && !claimed[i];
-  std::vector<Region> parts;
-  const auto width = static_cast<uint32_t>(columns_), size = static_cast<uint32_t>(rays_.size());
-  std::vector<uint32_t> part_of(size, 0);  // seed + 1
-  std::vector<uint32_t> cells;
-  for (uint32_t seed = 0; seed < size; ++seed) {
-    if (!free[seed]) continue;
-    free[seed] = 0;
-    part_of[seed] = seed + 1;
-    cells.assign(1, seed);
-    CellRange bounds{columns_, rows_, 0, 0};
-    for (size_t k = 0; k < cells.size(); ++k) {
-      const uint32_t i = cells[k];
-      const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
-      bounds = {std::min(bounds.x0, x), std::min(bounds.y0, y), std::max(bounds.x1, x + 1), std::max(bounds.y1, y + 1)};
-      const float d = depth_[i];
-      const auto visit = [&](bool there, uint32_t j) {
-        if (!there || !free[j] || std::abs(depth_[j] - d) > static_cast<float>(options_.depth_jump) * d) return;
-        free[j] = 0;
-        part_of[j] = seed + 1;
-        cells.push_back(j);
-      };
-      visit(x > 0, i - 1);
-      visit(x + 1 < columns_, i + 1);
-      visit(y > 0, i - width);
-      visit(y + 1 < rows_, i + width);
-    }
+std::vector<MoverObserver::Region> MoverObserver::find_regions(std::span<const Detection> boxes) {
+  free_depth_ = depth_;
+  for (const Detection& d : boxes) for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { free_depth_[i] = 0; });
+  std::vector<Region> regions;
+  for (DepthPart& part : parts_.find(free_depth_, static_cast<float>(options_.depth_jump))) {
     // The mask's rim lies on what is behind the movers: a ring one or two cells wide is no object, nor are specks.
-    size_t inner = 0;
-    for (const uint32_t i : cells) {
-      const uint32_t x = i % width, y = i / width;
-      const auto mine = [&](uint32_t j) { return part_of[j] == seed + 1; };
-      inner += (x == 0 || mine(i - 1)) && (x + 1 == width || mine(i + 1)) && (y == 0 || mine(i - width)) &&
-               (i + width >= size || mine(i + width));
-    }
-    if (static_cast<double>(inner) < kInnerShare * static_cast<double>(cells.size())) continue;
-    for (Region& region : divide({bounds, cells, -1})) parts.push_back(std::move(region));
+    if (static_cast<double>(part.inner) < kInnerShare * static_cast<double>(part.cells.size())) continue;
+    for (Region& region : divide({part.bounds, std::move(part.cells), -1})) regions.push_back(std::move(region));
   }
-  return join(std::move(parts));
+  return join(std::move(regions));
 }
 
 // Holes of the depth image and arms held out cut bodies into parts.
@@ -295,7 +266,7 @@ std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts
   };
   const auto of_one_body = [&](size_t a, size_t b) {
     if (parts[a].expected >= 0 || parts[b].expected >= 0) return parts[a].expected == parts[b].expected;
-    const CellRange &p = parts[a].bounds, &q = parts[b].bounds;
+    const CellBounds &p = parts[a].bounds, &q = parts[b].bounds;
     const int gap = std::max({p.x0 - q.x1, q.x0 - p.x1, p.y0 - q.y1, q.y0 - p.y1});
     const Eigen::Vector2f off = (middles[a] - middles[b]).cwiseAbs();
     return gap <= kGap && off.x() <= kMergeAcross && off.y() <= kMergeDepth;
@@ -337,20 +308,28 @@ std::vector<MoverObserver::Footprint> MoverObserver::footprints(std::span<const 
   return result;
 }
 
-// The expected mover that a cell fits best; -1 = none.
-int MoverObserver::owner_of(uint32_t cell) const {
-  const Eigen::Vector2f p = from_above(cell);
-  int owner = -1;
-  float least = std::numeric_limits<float>::max();
-  for (size_t e = 0; e < footprints_.size(); ++e) {
-    const Footprint& f = footprints_[e];
-    const Eigen::Vector2f off = p - f.middle;
-    const float distance = off.dot(f.information * off), cost = distance + f.width;
-    if (distance > kBodyReach * kBodyReach || cost >= least) continue;
-    least = cost;
-    owner = static_cast<int>(e);
+// The expected mover that each cell fits best; their number = none.
+std::vector<uint16_t> MoverObserver::owners_of(std::span<const uint32_t> cells) const {
+  std::vector<float> across(cells.size()), deep(cells.size()), least(cells.size(), std::numeric_limits<float>::max());
+  for (size_t k = 0; k < cells.size(); ++k) {
+    deep[k] = depth_[cells[k]];
+    across[k] = deep[k] * rays_[cells[k]].x();
   }
-  return owner;
+  std::vector<uint16_t> owners(cells.size(), static_cast<uint16_t>(footprints_.size()));
+  for (size_t e = 0; e < footprints_.size(); ++e)
+    run_vectorised(best_simd(), [f = footprints_[e], e = static_cast<uint16_t>(e), n = cells.size(), x = across.data(),
+                                 z = deep.data(), least = least.data(), to = owners.data()]() DKB_KERNEL_BODY {
+      const float xx = f.information(0, 0), xz = 2 * f.information(0, 1), zz = f.information(1, 1);
+      DKB_INDEPENDENT_STEPS
+      for (size_t k = 0; k < n; ++k) {
+        const float u = x[k] - f.middle.x(), v = z[k] - f.middle.y();
+        const float distance = u * u * xx + u * v * xz + v * v * zz, cost = distance + f.width;
+        const bool better = (distance <= kBodyReach * kBodyReach) & (cost < least[k]);
+        least[k] = better ? cost : least[k];
+        to[k] = better ? e : to[k];
+      }
+    });
+  return owners;
 }
 
 // A part that hangs together in depth goes to the mover that most of it fits, and is divided where others, or somebody
@@ -363,12 +342,8 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
   }
   const size_t owners = footprints_.size() + 1, nobody = owners - 1;
   std::vector<size_t> count(owners, 0);
-  std::vector<uint16_t> owner(part.cells.size());
-  for (size_t k = 0; k < part.cells.size(); ++k) {
-    const int e = owner_of(part.cells[k]);
-    owner[k] = static_cast<uint16_t>(e < 0 ? nobody : static_cast<size_t>(e));
-    ++count[owner[k]];
-  }
+  const std::vector<uint16_t> owner = owners_of(part.cells);
+  for (const uint16_t o : owner) ++count[o];
   const auto most = static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
   const double enough =
       std::max(static_cast<double>(kMinRegion), kOthersShare * static_cast<double>(part.cells.size()));
@@ -383,6 +358,11 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
     if (!apart) continue;
     region_of[o] = static_cast<int>(result.size());
     result.emplace_back().expected = expected(o);
+  }
+  if (result.size() == 1) {
+    result[0].bounds = part.bounds;
+    result[0].cells = std::move(part.cells);
+    return result;
   }
   for (Region& r : result) r.bounds = {columns_, rows_, 0, 0};
   for (size_t k = 0; k < part.cells.size(); ++k) {
@@ -417,13 +397,11 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   world_from_cam_ = world_from_cam;
   take_masked_depth(depth, mask);
   footprints_ = footprints(expected);
-  std::vector<char> claimed(rays_.size(), 0);  // by a box or its rim
-  for (const Detection& d : boxes) for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { claimed[i] = 1; });
   std::vector<MoverObservation> observations = observe_boxes(boxes);
   std::vector<float> depths;
-  for (const Region& r : find_regions(claimed)) {
+  for (const Region& r : find_regions(boxes)) {
     depths.clear();
-    for (size_t i : r.cells) depths.push_back(depth_[i]);
+    for (size_t k = 0; k < r.cells.size(); k += stride_through(r.cells)) depths.push_back(depth_[r.cells[k]]);
     const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dkb/detection/detection.h"
+#include "dkb/dynamics/depth_parts.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/dynamics/mover_surface.h"
 #include "dkb/geometry/camera.h"
@@ -50,11 +51,8 @@ class MoverObserver {
                                         std::span<const ExpectedMover> expected = {});
 
  private:
-  struct CellRange {
-    int x0, y0, x1, y1;  // half open
-  };
   struct Region {
-    CellRange bounds;
+    CellBounds bounds;
     std::vector<uint32_t> cells;
     int expected = -1;
   };
@@ -64,32 +62,34 @@ class MoverObserver {
     Eigen::Matrix2f information;  // [1 / m^2]
     float width;                  // logarithm of the determinant of its inverse
   };
-  CellRange cells_in(const Box& box, double margin) const;
+  CellBounds cells_in(const Box& box, double margin) const;
   template <class Function>
-  void for_each_cell(const CellRange& range, const Function& function) const;
+  void for_each_cell(const CellBounds& range, const Function& function) const;
   float depth_near(const DepthImage& depth, int x, int y) const;
   Eigen::Vector3d median_position(std::span<const uint32_t> cells) const;
   Eigen::Vector3d size_of(std::span<const uint32_t> cells) const;
   MoverSurface surface_of(std::span<const uint32_t> cells) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
-  std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellRange>& ranges) const;
+  std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellBounds>& ranges) const;
   std::vector<MoverObservation> observe_boxes(std::span<const Detection> boxes) const;
-  std::vector<Region> find_regions(const std::vector<char>& claimed) const;
+  std::vector<Region> find_regions(std::span<const Detection> boxes);
   std::vector<Footprint> footprints(std::span<const ExpectedMover> expected) const;
   Eigen::Vector2f from_above(uint32_t cell) const { return {depth_[cell] * rays_[cell].x(), depth_[cell]}; }
-  int owner_of(uint32_t cell) const;
+  std::vector<uint16_t> owners_of(std::span<const uint32_t> cells) const;
   std::vector<Region> divide(Region part) const;
   std::vector<Region> join(std::vector<Region> parts) const;
 
   CameraModel camera_;
   MoverObserverOptions options_;
   int columns_ = 0, rows_ = 0;
+  DepthParts parts_{0, 0};
   std::vector<Eigen::Vector2f> rays_;  // per cell: x/z, y/z of its middle
 
   // Of the frame looked at.
   Rigid3 world_from_cam_;
-  std::vector<float> depth_;  // [m] per cell; 0 = not in the mask, or no depth
+  std::vector<float> depth_;       // [m] per cell; 0 = not in the mask, or no depth
+  std::vector<float> free_depth_;  // the same without what is in a box or at its rim
   std::vector<Footprint> footprints_;
 };
 

@@ -49,6 +49,7 @@ std::array<BriefTest, kTests> make_brief_tests() {
   struct Candidate {
     BriefTest test;
     double deviation = 0;
+    size_t checked = 0;  // against so many of the chosen it passed; a limit once raised does not fall again
   };
   std::vector<Candidate> candidates;
   const auto draw = [&random](float& x, float& y) {
@@ -73,12 +74,13 @@ std::array<BriefTest, kTests> make_brief_tests() {
   for (double limit = 0.1; chosen.size() < kTests; limit += 0.05)
     for (size_t i = 0; i < kCandidates && chosen.size() < kTests; ++i) {
       if (taken[i]) continue;
-      const Candidate& candidate = candidates[i];
-      const bool independent = std::all_of(chosen.begin(), chosen.end(), [&](const Candidate* other) {
+      Candidate& candidate = candidates[i];
+      const auto independent = [&](const Candidate* other) {
         return std::abs(model.covariance(candidate.test, other->test)) <=
                limit * candidate.deviation * other->deviation;
-      });
-      if (!independent) continue;
+      };
+      while (candidate.checked < chosen.size() && independent(chosen[candidate.checked])) ++candidate.checked;
+      if (candidate.checked < chosen.size()) continue;
       taken[i] = true;
       chosen.push_back(&candidate);
     }

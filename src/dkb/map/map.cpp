@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "dkb/util/radix_sort.h"
+
 namespace dkb {
 namespace {
 
@@ -106,7 +108,7 @@ std::vector<PointId> Map::points_of(const std::vector<KeyframeId>& keyframes) co
   for (KeyframeId k : keyframes)
     for (PointId p : keyframe(k)->points)
       if (p != kNoPoint) ids.push_back(p);
-  std::sort(ids.begin(), ids.end());
+  radix_sort(ids);
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   return ids;
 }

@@ -2,10 +2,12 @@
 #include "dkb/mapping/local_mapper.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include "dkb/matching/candidates.h"
-#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -19,6 +21,29 @@ constexpr int kFusionKeyframes = 10;     // covisible keyframes whose points are
 constexpr double kFusionRadius = 3.0;    // [px] at the finest level
 constexpr double kSeamTolerance = 2.0;   // factor on radius and error limit of fusion where a loop was just closed
 constexpr size_t kCompared = 48;         // descriptors of a point that are compared, each with each
+
+// The first of the descriptors, at most kCompared, whose median distance to all of them is least.
+size_t central_descriptor(std::span<const Descriptor> descriptors) {
+  const size_t n = descriptors.size();
+  if (n <= 2) return 0;
+  std::array<std::array<int, kCompared>, kCompared> distances;
+  for (size_t i = 0; i < n; ++i) {
+    distances[i][i] = 0;
+    for (size_t j = 0; j < i; ++j) distances[i][j] = distances[j][i] = hamming_distance(descriptors[i], descriptors[j]);
+  }
+  size_t chosen = 0;
+  int least = std::numeric_limits<int>::max();
+  for (size_t i = 0; i < n; ++i) {
+    const std::span<int> of_i(distances[i].data(), n);
+    // The median is below the least so far if so many are, which takes no sorting.
+    const auto below = std::count_if(of_i.begin(), of_i.end(), [least](int d) { return d < least; });
+    if (static_cast<size_t>(below) <= n / 2) continue;
+    std::nth_element(of_i.begin(), of_i.begin() + static_cast<std::ptrdiff_t>(n / 2), of_i.end());
+    least = of_i[n / 2];
+    chosen = i;
+  }
+  return chosen;
+}
 
 }  // namespace
 
@@ -253,27 +278,15 @@ void refresh_point(Map& map, PointId id, double scale_factor) {
   // The descriptor with the least median distance to the others stands for all; of many, some from all the time.
   const size_t seen = old.observations.size(), compared = std::min(seen, kCompared);
   const auto observation = [&](size_t i) -> const Observation& { return old.observations[i * seen / compared]; };
-  std::vector<const Descriptor*> descriptors;
+  std::array<Descriptor, kCompared> descriptors;
   for (size_t i = 0; i < compared; ++i) {
     const Observation& o = observation(i);
-    descriptors.push_back(&map.keyframe(o.keyframe)->features->descriptors[static_cast<size_t>(o.feature)]);
+    descriptors[i] = map.keyframe(o.keyframe)->features->descriptors[static_cast<size_t>(o.feature)];
   }
-  size_t chosen = 0;
-  if (descriptors.size() > 2) {
-    int min_median = 257;
-    std::vector<int> distances(descriptors.size());
-    for (size_t i = 0; i < descriptors.size(); ++i) {
-      for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
-      const int median = upper_median(distances);
-      if (median < min_median) {
-        min_median = median;
-        chosen = i;
-      }
-    }
-  }
+  const size_t chosen = central_descriptor({descriptors.data(), compared});
   const Observation source = observation(chosen);
   const Keyframe& k = *map.keyframe(source.keyframe);
-  const Descriptor descriptor = *descriptors[chosen];
+  const Descriptor descriptor = descriptors[chosen];
   const float distance = static_cast<float>((centre_in_world(k.cam_from_world) - old.position).norm());
   const float scale =
       static_cast<float>(std::pow(scale_factor, k.features->keypoints[static_cast<size_t>(source.feature)].octave));

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dkb/matching/pose_observation.h"
+#include "dkb/util/radix_sort.h"
 
 namespace dkb {
 namespace {
@@ -210,7 +211,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       taken[f] = 1;
       matched.push_back(points[f]);
     }
-  std::sort(matched.begin(), matched.end());
+  radix_sort(matched);
   std::vector<Candidate> candidates;
   candidates.reserve(candidates_.size() + provisional_.size());
   const auto is_matched = [&](PointId id) { return std::binary_search(matched.begin(), matched.end(), id); };

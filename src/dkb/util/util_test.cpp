@@ -15,6 +15,7 @@
 #include "dkb/util/log.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/quantile.h"
+#include "dkb/util/radix_sort.h"
 #include "dkb/util/random.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
@@ -22,6 +23,19 @@
 namespace dkb {
 namespace {
 namespace fs = std::filesystem;
+
+TEST(RadixSort, AsByComparing) {
+  Random random(5);
+  for (const size_t n : {0, 1, 255, 256, 1000, 5000})
+    for (const uint32_t range : {1u, 2000u, 1u << 22, 0xFFFFFFFFu}) {
+      std::vector<uint32_t> values(n);
+      for (uint32_t& v : values) v = static_cast<uint32_t>(random.uniform() * range) + (range < 3000 ? 1u << 30 : 0);
+      std::vector<uint32_t> expected = values;
+      std::sort(expected.begin(), expected.end());
+      radix_sort(values);
+      ASSERT_EQ(values, expected) << n << " below " << range;
+    }
+}
 
 TEST(Random, SameSeedGivesTheSameNumbers) {
   Random a(7), b(7), c(8);
