@@ -83,6 +83,8 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   BaOptions ba;
   ba.rounds = {4, 6};               // [steps] before and after outliers are told apart
   ba.prefilter = options.weighted;  // DKB section 3.3 leaves gross errors out beforehand
+  // Of a cost of some thousands, one for each degree of freedom: a step that saves half of one is within the noise.
+  ba.relative_tolerance = 1e-4;
   problem.asked = window.camera_of(newest);
   const BaResult result = bundle_adjust(problem, ba);
 

@@ -16,6 +16,30 @@ namespace {
 constexpr int kMinObservers = 4;
 constexpr double kMinTheta = 1e-8;  // [m^2]
 
+struct Observers {
+  std::vector<int> cameras, first;  // of point p: cameras[first[p]] ... cameras[first[p + 1] - 1], rising
+};
+
+// A keyframe counts once for a point, however often it observes it.
+Observers observers_of(const BaProblem& problem) {
+  Observers all;
+  std::vector<int> next(problem.points.size() + 1, 0);
+  for (const BaObservation& o : problem.observations) ++next[static_cast<size_t>(o.point) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<int> cameras(problem.observations.size());
+  const std::vector<int> begin = next;
+  for (const BaObservation& o : problem.observations)
+    cameras[static_cast<size_t>(next[static_cast<size_t>(o.point)]++)] = o.camera;
+  all.first.push_back(0);
+  for (size_t p = 0; p + 1 < begin.size(); ++p) {
+    const auto from = cameras.begin() + begin[p], to = cameras.begin() + begin[p + 1];
+    std::sort(from, to);
+    all.cameras.insert(all.cameras.end(), from, std::unique(from, to));
+    all.first.push_back(static_cast<int>(all.cameras.size()));
+  }
+  return all;
+}
+
 double smallest_eigenvalue(std::span<const Eigen::Vector3d> centres, std::span<const int> observers) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const int c : observers) mean += centres[c];
@@ -26,7 +50,9 @@ double smallest_eigenvalue(std::span<const Eigen::Vector3d> centres, std::span<c
     covariance += d * d.transpose();
   }
   covariance /= static_cast<double>(observers.size());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  // In closed form, which is off by 1e-8 of the largest at worst.
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
   return std::max(0.0, eigen.eigenvalues()[0]);
 }
 
@@ -120,22 +146,13 @@ GeometricWeights classify_points(std::span<const Eigen::Vector3d> centres_in_wor
 GeometricWeights set_geometric_weights(BaProblem& problem, const GeometricWeightOptions& options) {
   std::vector<Eigen::Vector3d> centres;
   for (const Rigid3& pose : problem.cam_from_world) centres.push_back(centre_in_world(pose));
-  // A keyframe counts once for a point, however often it observes it.
-  std::vector<std::vector<int>> cameras(problem.points.size());
-  for (const BaObservation& o : problem.observations) {
-    if (o.point < 0 || o.point >= static_cast<int>(cameras.size()) || o.camera < 0 ||
+  for (const BaObservation& o : problem.observations)
+    if (o.point < 0 || o.point >= static_cast<int>(problem.points.size()) || o.camera < 0 ||
         o.camera >= static_cast<int>(centres.size())) {
       throw InputError("geometric weights: an observation names camera " + std::to_string(o.camera) + " and point " +
                        std::to_string(o.point) + ", which do not both exist");
     }
-    cameras[o.point].push_back(o.camera);
-  }
-  std::vector<int> observers, first{0};
-  for (std::vector<int>& own : cameras) {
-    std::sort(own.begin(), own.end());
-    observers.insert(observers.end(), own.begin(), std::unique(own.begin(), own.end()));
-    first.push_back(static_cast<int>(observers.size()));
-  }
+  const auto [observers, first] = observers_of(problem);
   GeometricWeights weights = classify_points(centres, observers, first, options);
   if (options.adaptive) weights.edge_weight = adaptive_edge_weight(problem, weights.shape, options);
   for (BaObservation& o : problem.observations) o.weight = weights.weight(o.point);
