@@ -52,6 +52,29 @@ class SlamTest : public ::testing::Test {
   std::vector<Frame> frames;
 };
 
+// Rows of the first frame are sheared by a turn that only the second frame tells.
+TEST(SlamStart, AMapThatStartsInATurnIsNotSheared) {
+  const TempFolder folder;
+  const auto spin = simulated(folder / "spin", {"--scene", "spin", "--seed", "1", "--frames", "6", "--people", "0"});
+  const auto source = open_folder(spin);
+  Camera camera = source->camera();
+  camera.readout = 0.018;  // the simulator's
+  Slam slam(camera);
+  for (SourceFrame next = source->next(); next.state == SourceState::frame; next = source->next())
+    slam.process(next.frame);
+  slam.finish();
+  const auto truth = read_trajectory(spin / "groundtruth.txt");
+  for (const auto& poses : {slam.online_trajectory(), slam.trajectory()}) {
+    ASSERT_EQ(poses.size(), 6u);
+    for (size_t i = 1; i < poses.size(); ++i) {
+      const Rigid3 turned = poses[0].world_from_cam.inverse() * poses[i].world_from_cam;
+      const Rigid3 turns = truth[0].world_from_cam.inverse() * truth[i].world_from_cam;
+      EXPECT_GT(turns.rotation.angularDistance(Eigen::Quaterniond::Identity()), 0.04 * static_cast<double>(i));
+      EXPECT_LT(turned.rotation.angularDistance(turns.rotation), 0.005) << "frame " << i;  // 0.037 as it was seen
+    }
+  }
+}
+
 TEST_F(SlamTest, ThreadsDoNotChangeABit) {
   Options one_thread;
   one_thread.threaded = false;

@@ -28,7 +28,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
   const KeyframeDecision decision = decide(scene, tracked);  // DKB 3.2
-  if (decision.insert) insert_keyframe(scene, tracked);      // DKB 3.3 happens there
+  if (decision.insert) insert_keyframe(scene, usable, tracked);  // DKB 3.3 happens there
   result.features = report_features(scene, usable, tracked);
   publish(scene, tracked, decision, result);
   result.tracking_ms = working.ms();
@@ -39,6 +39,7 @@ FrameResult Pipeline::process(const Frame& frame) {
 }
 
 void Pipeline::finish() {
+  if (start_) push_start(nullptr);
   const FrameIndex due = mapping_due();
   KeyframePacket report = tracker_.make_report();
   if (next_keyframe_ > 0 && !localize_only_) mapping_.push(std::move(report), due);

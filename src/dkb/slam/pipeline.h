@@ -81,7 +81,8 @@ class Pipeline {
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
   KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
   std::shared_ptr<const PlaneView> find_planes(const Scene& scene);
-  void insert_keyframe(const Scene& scene, TrackedFrame& tracked);
+  void insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked);
+  void push_start(const TrackedFrame* next);
   void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
   void note(Event::Kind kind, std::string text = "", int keyframe = -1);
   void note_changes(const TrackedFrame& tracked);
@@ -112,6 +113,14 @@ class Pipeline {
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   std::optional<FrameOutcome> outcome_;
+  // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
+  struct MapStart {
+    Scene scene;
+    UsableFeatures usable;
+    KeyframePacket packet;
+    FrameIndex due;
+  };
+  std::optional<MapStart> start_;
   TrackingState last_state_ = TrackingState::initialising;
   struct LastKeyframe {
     KeyframeId id = kNoKeyframe;  // the newest one where the camera is

@@ -189,13 +189,19 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
   ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
+  std::optional<ExtractedFeatures> start;
+  if (start_)
+    start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,
+                  options_.depth);
   TrackedFrame tracked = tracker_.track({.index = next_frame_,
                                          .timestamp = image.timestamp,
                                          .features = features,
                                          .appearance = &appearance,
                                          .prior = frame.prior() ? &*frame.prior() : nullptr,
                                          .step = scene.step ? &*scene.step : nullptr,
+                                         .start = start ? &*start : nullptr,
                                          .may_start_map = !localize_only_});
+  if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
   return tracked;
@@ -296,18 +302,30 @@ std::shared_ptr<const PlaneView> Pipeline::find_planes(const Scene& scene) {
   return planes;
 }
 
-void Pipeline::insert_keyframe(const Scene& scene, TrackedFrame& tracked) {
+// `next`: the frame after it; may be null.
+void Pipeline::push_start(const TrackedFrame* next) {
+  MapStart start = std::move(*start_);
+  start_.reset();
+  if (next != nullptr && next->start_features) tracker_.remake(*next, start.packet);
+  if (options_.mapping.planes) start.packet.planes = find_planes(start.scene);
+  mapping_.push(std::move(start.packet), std::max(start.due, mapping_due_));
+}
+
+void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked) {
   const KeyframeId id = next_keyframe_++;
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);
   if (since_keyframe_) packet.motion = std::make_shared<const KeyframeMotion>(*since_keyframe_);
-  if (options_.mapping.planes) packet.planes = find_planes(scene);
+  if (options_.mapping.planes && !tracked.starts_map) packet.planes = find_planes(scene);
   since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
   for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;
   recent_keyframes_.push_back({tracked.index, id, tracked.features});
   while (recent_keyframes_.front().frame < tracked.index - 2 * scenes_.memory()) recent_keyframes_.pop_front();
-  mapping_.push(std::move(packet), mapping_due());
+  if (tracked.starts_map)
+    start_ = MapStart{scene, usable, std::move(packet), mapping_due()};
+  else
+    mapping_.push(std::move(packet), mapping_due());
   tracked.reference = id;
   tracked.cam_from_reference = {};
   if (dense_) {

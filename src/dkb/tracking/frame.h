@@ -44,6 +44,8 @@ struct PosePrediction {
 struct TrackedFrame {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
+  // Of the frame before, which its map starts with: made again at the velocity that only this frame tells.
+  std::shared_ptr<const RgbdFeatures> start_features;
   TrackingState state = TrackingState::initialising;
   bool starts_map = false;                  // it wants to be a map's first keyframe
   std::optional<PosePrediction> predicted;  // by the step from the frame before
@@ -75,6 +77,7 @@ struct TrackingInput {
       nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
   const MotionPrior* prior = nullptr;  // by something beside the camera; may be null
   const MotionPrior* step = nullptr;   // the same motion as the surfaces in view show it as well; may be null
+  const FrameFeatures* start = nullptr;  // of the frame before, if a map starts with it
   bool may_start_map = true;           // else a frame that finds no map stays without a pose
 };
 

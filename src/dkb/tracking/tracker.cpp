@@ -478,6 +478,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     const bool seen_before = last_->state != TrackingState::predicted;
     const Vector6d step = seen_before || !velocity_ ? velocity_to(frame) : *velocity_;
     const Vector6d before = velocity_.value_or(step);
+    if (input.start != nullptr && last_->starts_map) remake_start(input.start->at(step), frame);
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
     velocity_ = seen_before ? velocity_to(frame) : step;
     const double seconds = frame.timestamp - last_->timestamp;

@@ -62,6 +62,8 @@ class Tracker {
 
   // Makes the packet of a new keyframe from the frame just tracked; its points are known to tracking from now on.
   KeyframePacket make_keyframe(KeyframeId id, const TrackedFrame& frame);
+  // The first keyframe of a map as it is after TrackedFrame::start_features.
+  void remake(const TrackedFrame& next, KeyframePacket& packet) const;
   // What is left to report when no keyframe follows.
   KeyframePacket make_report();
 
@@ -128,6 +130,7 @@ class Tracker {
   void refresh_candidates(const std::vector<PointId>& points, double now);
   Vector6d velocity_to(const TrackedFrame& frame) const;
   void refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
+  void remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next);
   bool established(PointId id, double now) const;
   static void drop_unmatched_suspects(TrackedFrame& frame);
   void finish(TrackedFrame& frame);
