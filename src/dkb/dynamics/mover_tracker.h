@@ -17,8 +17,9 @@ namespace dkb {
 // Deterministic: the same frames in the same order give the same movers.
 class MoverTracker {
  public:
-  explicit MoverTracker(const CameraModel& camera, const MoverObserverOptions& options = {})
-      : camera_(camera), observer_(camera, options) {}
+  explicit MoverTracker(const CameraModel& camera, const SensorNoise& noise = {},
+                        const MoverObserverOptions& options = {})
+      : camera_(camera), noise_(noise), observer_(camera, options) {}
 
   // The movers that are seen in the frame, by id; also those who have moved and stand still, for as long as nothing is
   // seen through where they are, and those of whom but a box without depth is left. `mask`: silhouettes of the boxes,

@@ -13,15 +13,13 @@ FrameResult Pipeline::process(const Frame& frame) {
   rate_.add(last_stamp_ns_);
   if (load_) shed_load();
   FrameResult result;
-  const Stopwatch waiting;
-  take_due_map();
+  const Stopwatch whole;
   std::vector<DueDetections> detections = scenes_.exchange(next_frame_, frame);
-  result.waiting_ms = waiting.ms();
-
-  const Stopwatch working;
+  result.waiting_ms = whole.ms();
   const Expectation expected = expect(frame);
   scenes_.begin(next_frame_, frame, std::move(detections), expected, outcome_);
   const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
+  result.waiting_ms += take_due_map();  // as late as it may come: nothing before needs it
   follow_motion(scene);
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene);
@@ -31,7 +29,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   if (decision.insert) insert_keyframe(scene, usable, tracked);  // DKB 3.3 happens there
   result.features = report_features(scene, usable, tracked);
   publish(scene, tracked, decision, result);
-  result.tracking_ms = working.ms();
+  result.tracking_ms = whole.ms() - result.waiting_ms;
   record_.add_time("tracking", result.tracking_ms);
   result.stages = record_.take_news();
   if (load_) load_->end(steady_ns());

@@ -70,7 +70,7 @@ class Pipeline {
   void shed_load();
   bool late_for_features() const { return load_ && load_->level() >= LoadShedding::kFeatures; }
   void follow_motion(const Scene& scene);  // since the last keyframe
-  void take_due_map();
+  double take_due_map();
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
   int features_wanted() const;
@@ -113,6 +113,7 @@ class Pipeline {
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   std::optional<FrameOutcome> outcome_;
+  Rigid3 new_world_from_old_;  // how the map was corrected in this frame, after the scene was looked at
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {
     Scene scene;

@@ -43,7 +43,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
       readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
-      movers_(context.camera),
+      movers_(context.camera, options_.noise),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
       camera_at_readout_(context.camera),
@@ -92,8 +92,10 @@ void Pipeline::shed_load() {
   if (std::string warning = load_->take_warning(); !warning.empty()) note(Event::Kind::warning, std::move(warning));
 }
 
-void Pipeline::take_due_map() {
+// Returns the time that it took [ms].
+double Pipeline::take_due_map() {
   const Stopwatch watch;
+  new_world_from_old_ = {};
   const bool wait = !options_.pipeline.realtime;
   const auto view = mapping_.take_due(next_frame_, wait);
   if (view) take_view(*view);
@@ -102,14 +104,16 @@ void Pipeline::take_due_map() {
     if (view && has_time && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, rate_, !wait);
     correct(loop_.take_due(next_frame_, wait), mapping_due());
   }
-  record_.add_time("wait_mapper", watch.ms());
+  const double ms = watch.ms();
+  record_.add_time("wait_mapper", ms);
+  return ms;
 }
 
 void Pipeline::take_view(const MapView& view) {
   const Rigid3 moved = tracker_.take_view(view);
   odometry_.move_world(moved);
   movers_.rebase(moved);
-  if (outcome_) outcome_->new_world_from_old = moved * outcome_->new_world_from_old;
+  new_world_from_old_ = moved * new_world_from_old_;
   record_.set_map(tracker_.map());
 }
 
@@ -350,6 +354,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.detections = scene.boxes;
   result.mask = scene.mask;
   FrameOutcome outcome;
+  outcome.new_world_from_old = new_world_from_old_;
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
     outcome.cam_from_world = tracked.cam_from_world;

@@ -55,6 +55,7 @@ std::vector<DueDetections> SceneStage::exchange(FrameIndex index, const Frame& f
 
 void SceneStage::learn(const FrameOutcome& before) {
   if (motion_) {
+    motion_->move_world(before.new_world_from_old);
     motion_->move_world(before.found_world_from_guessed);
     motion_->commit(before.cam_from_world);
   }
@@ -62,7 +63,6 @@ void SceneStage::learn(const FrameOutcome& before) {
     past_.back().keyframe = true;
     if (motion_) past_.back().still_score = motion_->score();
   }
-  if (motion_) motion_->move_world(before.new_world_from_old);
 }
 
 // `boxes` grows by all that were found, `unmasked` by those whose detector gave no mask with them.

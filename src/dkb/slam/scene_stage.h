@@ -59,10 +59,10 @@ struct CarryTask {
 
 // What became of the frame before: what the stage learns by it.
 struct FrameOutcome {
-  std::optional<Rigid3> cam_from_world;  // in the world of that time; nothing when lost
+  Rigid3 new_world_from_old;             // how the map was corrected after the stage looked at it
+  std::optional<Rigid3> cam_from_world;  // in the new world; nothing when lost
   Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
-  Rigid3 new_world_from_old;  // how the map was corrected since
 };
 
 // Says what of a frame moves (DKB section 3.1): detections made beside tracking are carried to the frame by flow,
