@@ -7,11 +7,12 @@
 namespace dkb {
 namespace {
 constexpr int kMinMatches = 30;
-// [s] standard deviation of a readout before anything is seen of it: sensors are read within 0 to 33 ms.
-constexpr double kPriorSd = 0.015;
 // Errors of one point in one frame and in the next go together; MotionNoise has the same figure for poses.
 constexpr double kTogether = 4;
-constexpr double kMaxReadout = 0.033;  // [s] largest readout believed in: a frame's time at 30 Hz
+// [s] largest readout believed in: a frame's time at 30 Hz. Before anything is seen of it each below is as likely.
+constexpr double kMaxReadout = 0.033;
+constexpr double kExpectedReadout = kMaxReadout / 2;
+constexpr double kExpectedVariance = kMaxReadout * kMaxReadout / 12;
 }  // namespace
 
 ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
@@ -19,9 +20,9 @@ ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNo
     : camera_(camera),
       noise_(noise),
       scale_factor_(scale_factor),
-      readout_(camera.readout),
       known_(camera.readout > 0 || !options.estimate),
-      information_(1 / (kPriorSd * kPriorSd)) {}
+      readout_(known_ ? camera.readout : kExpectedReadout),
+      information_(1 / kExpectedVariance) {}
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
                              const std::vector<std::optional<Eigen::Vector3d>>& positions) {

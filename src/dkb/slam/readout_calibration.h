@@ -37,8 +37,8 @@ class ReadoutCalibration {
   CameraModel camera_;
   SensorNoise noise_;
   double scale_factor_;
-  double readout_;
   bool known_;
+  double readout_;
   double information_;  // [1/s^2] of the readout
 };
 

@@ -47,6 +47,10 @@ TEST(ReadoutCalibration, KnowsMostOfItAfterHalfASecond) {
   EXPECT_NEAR(calibrated(0.02, {}, 0, 15), 0.02, 3e-3);
 }
 
+TEST(ReadoutCalibration, BeforeAnythingIsSeenAllReadoutsAreAsLikely) {
+  EXPECT_DOUBLE_EQ(calibrated(0.02, {}, 0, 0), 0.0165);
+}
+
 TEST(ReadoutCalibration, ACameraThatTellsItsReadoutIsBelieved) {
   EXPECT_EQ(calibrated(0.02, {}, 0.01), 0.01);
 }
