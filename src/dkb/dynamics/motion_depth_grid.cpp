@@ -164,7 +164,7 @@ void MotionView::set(const MotionDepthGrid& grid) {
   cam_from_world = grid.cam_from_world;
   cells.resize(grid.depth.size());
   for (size_t i = 0; i < cells.size(); ++i)
-    cells[i] = {{grid.nearest.data()[i], grid.farthest.data()[i]}, grid.depth.data()[i], grid.score.data()[i]};
+    cells[i] = {grid.nearest.data()[i], grid.farthest.data()[i], grid.depth.data()[i], grid.score.data()[i]};
 }
 
 }  // namespace dkb

@@ -72,12 +72,8 @@ struct MotionDepthGrid {
 
 // A grid that later ones are compared with, cell by cell: what is known of a cell lies together.
 struct MotionView {
-  struct Bounds {
-    float nearest, farthest;
-  };
   struct Cell {
-    Bounds bounds;
-    float depth, score;
+    float nearest, farthest, depth, score;  // as in MotionDepthGrid
   };
 
   double time = 0;

@@ -20,23 +20,17 @@ constexpr double kViewAge = 15;        // [s] older views are dropped, so that a
 constexpr float kSlope = 1;            // share of a view's depth range over 3 x 3 cells added to the tolerance
 constexpr double kSettle = 0.5;        // [s] agreement with a view counts in proportion to its age up to this
 constexpr double kHoleMemory = 1;      // [s] the memory of what is too near for the sensor
-constexpr float kRevision = 0.1f;      // share of its own verdict that a view gives up for today's on the same surface
 
 // Weights of evidence beside that of an intrusion into space seen empty, which is 1.
-constexpr float kContour = 0.3f;  // an outline that is where a view had it: still
-constexpr float kInterior =
-    0.1f;                        // a surface that is where a view had it: still, but so is the inside of one that sways
+constexpr float kThere = 0.1f;   // a surface that is where a view had it: still, but so is the inside of one that sways
 constexpr float kState = 0.02f;  // what the cell was before
 constexpr float kPrior = 0.015f;        // nothing moves until something says so
 constexpr float kHolePrior = 0.02f;     // the same where depth is missing
 constexpr float kFullEvidence = 0.05f;  // mean weight around a cell at which one frame says all it can
-constexpr double kLoneHole =
-    0.05;  // share of the image from which missing depth moves though no measured mover touches it
 
 constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
-constexpr int kAcross = 2;       // [cells] `farthest` is that of the cells beside
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
 constexpr int kHoleRadius = 2;   // [cells] half the width up to which missing depth is a strip
 constexpr size_t kBlock = 640;   // [cells] worked at together
@@ -67,11 +61,10 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
-  for (Image<float>* i : {&tolerance_, &intrusions_, &agreements_, &still_, &missing_, &weighted_, &weights_})
-    *i = Image<float>(width, height);
-  known_ = open_ = intruding_ = outline_ = Image<uint8_t>(width, height);
+  for (Image<float>* i : {&tolerance_, &still_, &missing_, &weighted_, &weights_}) *i = Image<float>(width, height);
+  known_ = open_ = intruding_ = Image<uint8_t>(width, height);
   verdict_.resize(kBlock);
-  bounds_.resize(kBlock);
+  for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlock);
 }
 
 void MotionSegmenter::reset() {
@@ -120,7 +113,8 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     const CellRange block{first, std::min(kBlock, score().size() - first)};
     find_tolerances(block);
     carry_scores(block);
-    for (Image<float>* votes : {&intrusions_, &agreements_, &still_}) clear(*votes, block);
+    clear(still_, block);
+    std::fill_n(intruding_.data() + block.first, block.count, uint8_t{0});
     for (const ChosenView& view : chosen_) compare(view, block);
     find_openings(block);
   }
@@ -165,14 +159,8 @@ void MotionSegmenter::choose_views() {
 
 void MotionSegmenter::find_tolerances(CellRange block) {
   run_vectorised(simd_, [count = block.count, depth = current_->depth.data() + block.first,
-                         farthest = current_->farthest.data() + block.first,
-                         tolerance = tolerance_.data() + block.first, outline = outline_.data() + block.first,
-                         noise = noise_, across = kAcross * options_.cell, focal = camera_.fx]() DKB_KERNEL_BODY {
-    for (size_t i = 0; i < count; ++i) {
-      const double z = depth[i];
-      tolerance[i] = static_cast<float>(noise.surface_tolerance(z));
-      outline[i] = farthest[i] > depth[i] + static_cast<float>(noise.max_depth_jump(z, across, focal)) ? 1 : 0;
-    }
+                         tolerance = tolerance_.data() + block.first, noise = noise_]() DKB_KERNEL_BODY {
+    for (size_t i = 0; i < count; ++i) tolerance[i] = static_cast<float>(noise.surface_tolerance(depth[i]));
   });
 }
 
@@ -228,63 +216,37 @@ void MotionSegmenter::carry_scores(CellRange block) {
 
 // What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
 void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
-  enum Verdict : uint8_t { nothing, missing, before, same };
   rays_.project(current_->depth, kTooNear, chosen.there_from_here, block, projection_, simd_);
   const std::vector<int32_t>& cells = projection_.cell;
-  MotionView::Cell* const view = chosen.view->cells.data();
+  const std::vector<MotionView::Cell>& view = chosen.view->cells;
   // Views come from far down the memory: some way ahead, they are asked for early.
-  const size_t last = chosen.view->cells.size() - 1;
+  const size_t last = view.size() - 1;
   for (size_t i = 0; i < block.count; ++i) {
     const auto at = static_cast<size_t>(std::max(cells[i], 0));
-    bounds_[i] = view[at].bounds;
-    if (i % 4 == 0) __builtin_prefetch(view + std::min(at + kBlock, last));
+    const MotionView::Cell& cell = view[at];
+    there_.nearest[i] = cell.nearest, there_.farthest[i] = cell.farthest;
+    there_.depth[i] = cell.depth, there_.score[i] = cell.score;
+    if (i % 4 == 0) __builtin_prefetch(view.data() + std::min(at + kBlock, last));
   }
-  const float* const tolerances = tolerance_.data() + block.first;
-  run_vectorised(simd_, [=, count = block.count, cell = cells.data(), there = projection_.depth.data(),
-                         depth = current_->depth.data() + block.first, bounds = bounds_.data(),
-                         verdict = verdict_.data()]() DKB_KERNEL_BODY {
+  run_vectorised(simd_, [count = block.count, cell = cells.data(), depth_there = projection_.depth.data(),
+                         depth = current_->depth.data() + block.first, tolerance = tolerance_.data() + block.first,
+                         nearest = there_.nearest.data(), farthest = there_.farthest.data(),
+                         depth_then = there_.depth.data(), score_then = there_.score.data(),
+                         intruding = intruding_.data() + block.first, still = still_.data() + block.first,
+                         weight = chosen.trust * kThere, noise = noise_]() DKB_KERNEL_BODY {
     DKB_INDEPENDENT_STEPS
     for (size_t i = 0; i < count; ++i) {
-      const float near = bounds[i].nearest, far = bounds[i].farthest;
-      const bool seen = cell[i] >= 0, hole = !(depth[i] > 0), known = far > 0;
-      const bool stands_before = there[i] + tolerances[i] < near, not_behind = there[i] < far + tolerances[i];
-      const int32_t of_surface = stands_before ? before : not_behind ? same : nothing;
-      const int32_t of_known = known ? of_surface : nothing, of_seen = hole ? missing : of_known;
-      verdict[i] = static_cast<uint8_t>(seen ? of_seen : nothing);
+      const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
+      const bool seen = cell[i] >= 0, hole = !(depth[i] > 0), known = seen & !hole & (far > 0);
+      const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
+      const float margin =
+          std::max(tolerated, static_cast<float>(noise.surface_tolerance(near))) + kSlope * (far - near);
+      const bool in_empty = known & before & (depth_then[i] > 0) & (z + margin < near);
+      const bool before_hole = seen & hole & (depth_then[i] > z);
+      intruding[i] |= in_empty | before_hole ? 1 : 0;
+      still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
     }
   });
-  const float trust = chosen.trust, contour_weight = trust * kContour, interior_weight = trust * kInterior;
-  // From this much farther on, the surface behind does not hang together with the one in front.
-  const auto beyond = [this](float z) {
-    return z + static_cast<float>(noise_.max_depth_jump(z, kAcross * options_.cell, camera_.fx));
-  };
-  const float* const scores = current_->score.data() + block.first;
-  const uint8_t* const outlines = outline_.data() + block.first;
-  float* const intrusions = intrusions_.data() + block.first;
-  float* const agreements = agreements_.data() + block.first;
-  float* const still = still_.data() + block.first;
-  for (size_t i = 0; i < block.count; ++i) {
-    const uint8_t verdict = verdict_[i];
-    if (verdict == nothing) continue;
-    MotionView::Cell& seen = view[cells[i]];
-    const auto [nearest, farthest] = bounds_[i];
-    const float depth_there = projection_.depth[i];
-    if (verdict == same) {
-      seen.score += kRevision * (scores[i] - seen.score);
-      if (seen.score >= kMayMove) continue;
-      agreements[i] += trust;
-      if (outlines[i] == 0)
-        still[i] += interior_weight;
-      else if (farthest > beyond(depth_there))
-        still[i] += contour_weight;
-    } else if (verdict == before) {
-      const float tolerance = std::max(tolerances[i], static_cast<float>(noise_.surface_tolerance(nearest)));
-      const float margin = tolerance + kSlope * (farthest - nearest);
-      if (seen.depth > 0 && depth_there + margin < nearest) intrusions[i] += 1.0f;
-    } else {
-      intrusions[i] += seen.depth > depth_there ? 1.0f : 0.0f;
-    }
-  }
 }
 
 // Depth that is missing where a view had some, but not always missing (as at the image's border).
@@ -293,14 +255,14 @@ void MotionSegmenter::find_openings(CellRange block) {
   const float gain = 1.0f / static_cast<float>(frames_);
   run_vectorised(simd_,
                  [gain, count = block.count, depth = current_->depth.data() + block.first,
-                  share = missing_.data() + block.first, intrusions = intrusions_.data() + block.first,
-                  open = open_.data() + block.first, intruding = intruding_.data() + block.first]() DKB_KERNEL_BODY {
+                  share = missing_.data() + block.first, open = open_.data() + block.first,
+                  intruding = intruding_.data() + block.first]() DKB_KERNEL_BODY {
                    for (size_t i = 0; i < count; ++i) {
                      const bool hole = !(depth[i] > 0);
                      const float now = share[i] + gain * ((hole ? 1.0f : 0.0f) - share[i]);
                      share[i] = now;
-                     open[i] = hole & (intrusions[i] > 0) & (now < kAlways) ? 255 : 0;
-                     intruding[i] = !hole & (intrusions[i] > 0) ? 1 : 0;
+                     open[i] = hole & (intruding[i] != 0) & (now < kAlways) ? 255 : 0;
+                     intruding[i] = hole ? 0 : intruding[i];
                    }
                  });
 }
@@ -308,18 +270,18 @@ void MotionSegmenter::find_openings(CellRange block) {
 void MotionSegmenter::weigh() {
   const int width = rays_.width(), height = rays_.height();
   const Image<float>& depth = current_->depth;
-  const auto weigh_cell = [](float moves, float still, float score, float z, float& weighted,
+  const auto weigh_cell = [](bool moves, float still, float score, float z, float& weighted,
                              float& weights) DKB_KERNEL_BODY {
-    const float stands = moves > 0 ? 0.0f : std::min(1.0f, still);
+    const float comes = moves ? 1.0f : 0.0f, stands = moves ? 0.0f : std::min(1.0f, still);
     const float state = std::max(-1.0f, std::min(score, 1.0f)), weight = kState * std::abs(state);
     const float doubt = z > 0 ? kPrior : kHolePrior;
-    weighted = moves - stands + weight * state - doubt;
-    weights = moves + stands + weight + doubt;
+    weighted = comes - stands + weight * state - doubt;
+    weights = comes + stands + weight + doubt;
   };
   run_vectorised(
       simd_, [weigh_cell, count = depth.size(), z = depth.data(), still = still_.data(), score = current_->score.data(),
               weighted = weighted_.data(), weights = weights_.data()]() DKB_KERNEL_BODY {
-        for (size_t i = 0; i < count; ++i) weigh_cell(0.0f, still[i], score[i], z[i], weighted[i], weights[i]);
+        for (size_t i = 0; i < count; ++i) weigh_cell(false, still[i], score[i], z[i], weighted[i], weights[i]);
       });
   for (int y = 1; y + 1 < height; ++y) {
     const std::array<const uint8_t*, 3> rows{intruding_.row(y - 1), intruding_.row(y), intruding_.row(y + 1)};
@@ -327,10 +289,8 @@ void MotionSegmenter::weigh() {
       if (rows[1][x] == 0) continue;
       int support = 0;
       for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
-      const float votes = intrusions_(x, y);
       if (support >= kSupport)
-        weigh_cell(votes / (votes + agreements_(x, y)), still_(x, y), current_->score(x, y), depth(x, y),
-                   weighted_(x, y), weights_(x, y));
+        weigh_cell(true, still_(x, y), current_->score(x, y), depth(x, y), weighted_(x, y), weights_(x, y));
     }
   }
 }
@@ -357,37 +317,6 @@ void MotionSegmenter::clear_thin_holes(MoverMask& mask) const {
     if (!(current_->depth.data()[i] > 0) && broad.cells.data()[i] == 0) mask.cells.data()[i] = 0;
 }
 
-// Depth goes missing on screens and at edges as well. It speaks of a mover only where it hangs together with one that
-// was measured, or is large: somebody too near for the sensor.
-void MotionSegmenter::clear_lone_holes(Image<uint8_t>& marked) {
-  const int width = marked.width(), height = marked.height();
-  const auto enough = static_cast<size_t>(kLoneHole * static_cast<double>(marked.size()));
-  const auto hole = [&](size_t i) { return !(current_->depth.data()[i] > 0); };
-  Image<uint8_t> seen(width, height);
-  std::vector<size_t> region;
-  for (size_t start = 0; start < marked.size(); ++start) {
-    if (marked.data()[start] == 0 || seen.data()[start] != 0 || !hole(start)) continue;
-    region.assign(1, start);
-    seen.data()[start] = 1;
-    bool measured = false;
-    for (size_t k = 0; k < region.size(); ++k) {
-      const int x = static_cast<int>(region[k]) % width, y = static_cast<int>(region[k]) / width;
-      for (const auto& [u, v] : {std::pair(x - 1, y), std::pair(x + 1, y), std::pair(x, y - 1), std::pair(x, y + 1)}) {
-        if (!marked.contains(u, v) || marked(u, v) == 0) continue;
-        const size_t i = static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
-        if (!hole(i)) {
-          measured = true;
-        } else if (seen.data()[i] == 0) {
-          seen.data()[i] = 1;
-          region.push_back(i);
-        }
-      }
-    }
-    if (!measured && region.size() < enough)
-      for (size_t i : region) marked.data()[i] = 0;
-  }
-}
-
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
 MoverMask MotionSegmenter::mask() {
   MoverMask result;
@@ -405,7 +334,6 @@ MoverMask MotionSegmenter::mask() {
     }
   });
   clear_thin_holes(result);
-  clear_lone_holes(result.cells);
   return result;
 }
 

@@ -61,7 +61,7 @@ class MotionSegmenter {
   };
 
   struct ChosenView {  // that the image last given is compared with
-    MotionView* view;
+    const MotionView* view;
     Rigid3 there_from_here;
     float trust;
   };
@@ -76,7 +76,6 @@ class MotionSegmenter {
   void weigh();
   void update_scores();
   void clear_thin_holes(MoverMask& mask) const;
-  void clear_lone_holes(Image<uint8_t>& marked);
   MoverMask mask();
   void keep_as_view(const MotionDepthGrid& grid);
 
@@ -99,16 +98,18 @@ class MotionSegmenter {
   int frames_ = 0;
   MotionProjection projection_;
   const Image<float> nothing_;
-  Image<float> tolerance_;                        // [m] by cell
-  Image<float> intrusions_, agreements_, still_;  // votes of the views
-  Image<float> missing_;                          // share of the frames without depth there
+  Image<float> tolerance_;  // [m] by cell
+  Image<float> still_;      // votes of the views that had the surface where it is
+  Image<float> missing_;    // share of the frames without depth there
   Image<float> weighted_, weights_;
   Image<uint8_t> known_, open_;
   Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty
-  Image<uint8_t> outline_;    // 1 where a surface behind begins beside
   std::vector<ChosenView> chosen_;
-  std::vector<uint8_t> verdict_;  // of the block at work
-  std::vector<MotionView::Bounds> bounds_;
+  // Of the block at work: which cells have moved on, and what a view has where they are.
+  std::vector<uint8_t> verdict_;
+  struct {
+    std::vector<float> nearest, farthest, depth, score;
+  } there_;
 };
 
 }  // namespace dkb
