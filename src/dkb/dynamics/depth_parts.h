@@ -22,10 +22,10 @@ struct DepthPart {
   size_t inner = 0;             // of them whose neighbours in the grid are all linked to them
 };
 
-// Finds what hangs together in a grid of depths. Neighbours, of which a cell has four, are linked if both have depth and
-// it differs by no more than a share of the smaller one. Rows are cut into runs of linked cells, and runs that a link
-// joins to the row above are united (Rosenfeld, Pfaltz 1966, "Sequential operations in digital picture processing").
-// Deterministic; the bits do not depend on `simd`.
+// Finds what hangs together in a grid of depths. Neighbours, of which a cell has four, are linked if both have depth
+// and it differs by no more than a share of the smaller one. Rows are cut into runs of linked cells, and runs that a
+// link joins to the row above are united (Rosenfeld, Pfaltz 1966, "Sequential operations in digital picture
+// processing"). Deterministic; the bits do not depend on `simd`.
 class DepthParts {
  public:
   DepthParts(int columns, int rows, Simd simd = best_simd());

@@ -17,7 +17,7 @@ using Cells = std::vector<uint32_t>;
 TEST(DepthParts, StepsInDepthAndHolesDivide) {
   // A step of 10%, then a hole; the row below joins the two sides of the hole.
   const std::vector<float> depth = {
-      1, 1, 1.1F, 0, 1.1F,  //
+      1, 1, 1.1F, 0,    1.1F,  //
       0, 0, 1.1F, 1.1F, 1.1F,
   };
   const auto parts = DepthParts(5, 2).find(depth, 0.05F);

@@ -13,6 +13,7 @@ namespace dkb {
 namespace {
 
 constexpr float kTooNear = 0.45f;      // [m] taken for the depth of what is too near for the sensor
+constexpr float kNearRange = 0.55f;    // [m] a surface nearer than this may be gone on with where depth is missing
 constexpr size_t kMaxViews = 8;        // past views kept
 constexpr size_t kViewsPerFrame = 4;   // of them compared with each frame, in turn
 constexpr double kViewInterval = 0.2;  // [s] between views when they are taken; with age they thin out
@@ -32,9 +33,7 @@ constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or 
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
-constexpr int kHoleRadius = 2;   // [cells] half the width up to which missing depth is a strip
 constexpr size_t kBlock = 640;   // [cells] worked at together
-constexpr int kLongRun = 300;    // [frames] over which missing depth is averaged
 
 template <class T>
 std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
@@ -61,8 +60,8 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
-  for (Image<float>* i : {&tolerance_, &still_, &missing_, &weighted_, &weights_}) *i = Image<float>(width, height);
-  known_ = open_ = intruding_ = Image<uint8_t>(width, height);
+  for (Image<float>* i : {&tolerance_, &still_, &weighted_, &weights_}) *i = Image<float>(width, height);
+  known_ = intruding_ = Image<uint8_t>(width, height);
   verdict_.resize(kBlock);
   for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlock);
 }
@@ -107,7 +106,6 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   find_pose(step_covariance);
   choose_views();
-  frames_ = std::min(frames_ + 1, kLongRun);
   // Some cells through all steps before the next: what they read and write stays in the nearest cache.
   for (size_t first = 0; first < score().size(); first += kBlock) {
     const CellRange block{first, std::min(kBlock, score().size() - first)};
@@ -116,9 +114,8 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     clear(still_, block);
     std::fill_n(intruding_.data() + block.first, block.count, uint8_t{0});
     for (const ChosenView& view : chosen_) compare(view, block);
-    find_openings(block);
   }
-  smoothing_.set_surface(current_->depth, open_);
+  smoothing_.set_surface(current_->depth);
   weigh();
   smoothing_.smooth(weighted_, weights_);
   update_scores();
@@ -179,23 +176,23 @@ void MotionSegmenter::carry_scores(CellRange block) {
   const float* const tolerances = tolerance_.data() + block.first;
   float* const scores = current_->score.data() + block.first;
   uint8_t* const knowns = known_.data() + block.first;
-  run_vectorised(simd_, [=, count = block.count, cells = projection_.cell.data(), there = projection_.depth.data(),
-                         depth = current_->depth.data() + block.first, depth_before = before.data(),
-                         score_before = previous_->score.data(), verdict = verdict_.data(),
-                         near = static_cast<float>(kNearRange)]() DKB_KERNEL_BODY {
-    DKB_INDEPENDENT_STEPS
-    for (size_t i = 0; i < count; ++i) {
-      const int32_t cell = cells[i], at = cell < 0 ? 0 : cell;
-      const float then = depth_before[at], carried = score_before[at];
-      const bool seen = cell >= 0, hole = !(depth[i] > 0);
-      const bool too_near = seen & hole & (then < near);
-      const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + kMotionPerFrame);
-      const float score_if_near = too_near ? keep_hole * std::max(0.0f, carried) : 0.0f;
-      scores[i] = same ? keep * carried : score_if_near;
-      knowns[i] = too_near | same ? 1 : 0;
-      verdict[i] = seen & !hole & !same ? 1 : 0;
-    }
-  });
+  run_vectorised(
+      simd_, [=, count = block.count, cells = projection_.cell.data(), there = projection_.depth.data(),
+              depth = current_->depth.data() + block.first, depth_before = before.data(),
+              score_before = previous_->score.data(), verdict = verdict_.data(), near = kNearRange]() DKB_KERNEL_BODY {
+        DKB_INDEPENDENT_STEPS
+        for (size_t i = 0; i < count; ++i) {
+          const int32_t cell = cells[i], at = cell < 0 ? 0 : cell;
+          const float then = depth_before[at], carried = score_before[at];
+          const bool seen = cell >= 0, hole = !(depth[i] > 0);
+          const bool too_near = seen & hole & (then < near);
+          const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + kMotionPerFrame);
+          const float score_if_near = too_near ? keep_hole * std::max(0.0f, carried) : 0.0f;
+          scores[i] = same ? keep * carried : score_if_near;
+          knowns[i] = too_near | same ? 1 : 0;
+          verdict[i] = seen & !hole & !same ? 1 : 0;
+        }
+      });
   for (size_t i = 0; i < block.count; ++i) {
     if (verdict_[i] == 0) continue;
     const int at = projection_.cell[i];
@@ -228,43 +225,23 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
     there_.depth[i] = cell.depth, there_.score[i] = cell.score;
     if (i % 4 == 0) __builtin_prefetch(view.data() + std::min(at + kBlock, last));
   }
-  run_vectorised(simd_, [count = block.count, cell = cells.data(), depth_there = projection_.depth.data(),
-                         depth = current_->depth.data() + block.first, tolerance = tolerance_.data() + block.first,
-                         nearest = there_.nearest.data(), farthest = there_.farthest.data(),
-                         depth_then = there_.depth.data(), score_then = there_.score.data(),
-                         intruding = intruding_.data() + block.first, still = still_.data() + block.first,
-                         weight = chosen.trust * kThere, noise = noise_]() DKB_KERNEL_BODY {
-    DKB_INDEPENDENT_STEPS
-    for (size_t i = 0; i < count; ++i) {
-      const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
-      const bool seen = cell[i] >= 0, hole = !(depth[i] > 0), known = seen & !hole & (far > 0);
-      const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
-      const float margin =
-          std::max(tolerated, static_cast<float>(noise.surface_tolerance(near))) + kSlope * (far - near);
-      const bool in_empty = known & before & (depth_then[i] > 0) & (z + margin < near);
-      const bool before_hole = seen & hole & (depth_then[i] > z);
-      intruding[i] |= in_empty | before_hole ? 1 : 0;
-      still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
-    }
-  });
-}
-
-// Depth that is missing where a view had some, but not always missing (as at the image's border).
-void MotionSegmenter::find_openings(CellRange block) {
-  constexpr float kAlways = 0.9f;
-  const float gain = 1.0f / static_cast<float>(frames_);
-  run_vectorised(simd_,
-                 [gain, count = block.count, depth = current_->depth.data() + block.first,
-                  share = missing_.data() + block.first, open = open_.data() + block.first,
-                  intruding = intruding_.data() + block.first]() DKB_KERNEL_BODY {
-                   for (size_t i = 0; i < count; ++i) {
-                     const bool hole = !(depth[i] > 0);
-                     const float now = share[i] + gain * ((hole ? 1.0f : 0.0f) - share[i]);
-                     share[i] = now;
-                     open[i] = hole & (intruding[i] != 0) & (now < kAlways) ? 255 : 0;
-                     intruding[i] = hole ? 0 : intruding[i];
-                   }
-                 });
+  run_vectorised(
+      simd_, [count = block.count, cell = cells.data(), depth_there = projection_.depth.data(),
+              depth = current_->depth.data() + block.first, tolerance = tolerance_.data() + block.first,
+              nearest = there_.nearest.data(), farthest = there_.farthest.data(), depth_then = there_.depth.data(),
+              score_then = there_.score.data(), intruding = intruding_.data() + block.first,
+              still = still_.data() + block.first, weight = chosen.trust * kThere, noise = noise_]() DKB_KERNEL_BODY {
+        DKB_INDEPENDENT_STEPS
+        for (size_t i = 0; i < count; ++i) {
+          const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
+          const bool known = (cell[i] >= 0) & (depth[i] > 0) & (far > 0);
+          const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
+          const float margin =
+              std::max(tolerated, static_cast<float>(noise.surface_tolerance(near))) + kSlope * (far - near);
+          intruding[i] |= known & before & (depth_then[i] > 0) & (z + margin < near) ? 1 : 0;
+          still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
+        }
+      });
 }
 
 void MotionSegmenter::weigh() {
@@ -308,15 +285,6 @@ void MotionSegmenter::update_scores() {
   });
 }
 
-// Along the edges of things depth goes missing too, in strips; what stands too near for the sensor is broad.
-void MotionSegmenter::clear_thin_holes(MoverMask& mask) const {
-  MoverMask broad = mask;
-  erode(broad, kHoleRadius);
-  dilate(broad, kHoleRadius);
-  for (size_t i = 0; i < mask.cells.size(); ++i)
-    if (!(current_->depth.data()[i] > 0) && broad.cells.data()[i] == 0) mask.cells.data()[i] = 0;
-}
-
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
 MoverMask MotionSegmenter::mask() {
   MoverMask result;
@@ -333,7 +301,6 @@ MoverMask MotionSegmenter::mask() {
       marked[i] = (cell >= 0) & (there > threshold) ? 255 : 0;
     }
   });
-  clear_thin_holes(result);
   return result;
 }
 

@@ -72,10 +72,8 @@ class MotionSegmenter {
   void find_tolerances(CellRange block);
   void carry_scores(CellRange block);
   void compare(const ChosenView& view, CellRange block);
-  void find_openings(CellRange block);
   void weigh();
   void update_scores();
-  void clear_thin_holes(MoverMask& mask) const;
   MoverMask mask();
   void keep_as_view(const MotionDepthGrid& grid);
 
@@ -95,14 +93,12 @@ class MotionSegmenter {
   double image_time_ = 0;
   std::optional<MotionPrior> aligned_step_;
   size_t turn_ = 0;
-  int frames_ = 0;
   MotionProjection projection_;
   const Image<float> nothing_;
   Image<float> tolerance_;  // [m] by cell
   Image<float> still_;      // votes of the views that had the surface where it is
-  Image<float> missing_;    // share of the frames without depth there
   Image<float> weighted_, weights_;
-  Image<uint8_t> known_, open_;
+  Image<uint8_t> known_;
   Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty
   std::vector<ChosenView> chosen_;
   // Of the block at work: which cells have moved on, and what a view has where they are.

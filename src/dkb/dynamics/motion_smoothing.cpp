@@ -47,23 +47,21 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
   }
 }
 
-void MotionSmoothing::set_surface(const Image<float>& depth, const Image<uint8_t>& open) {
+void MotionSmoothing::set_surface(const Image<float>& depth) {
   find_creases(depth);
   // Link of each cell from `first` on to the one `step` cells before it.
   const auto link = [&](size_t first, size_t step, Image<float>& links) {
-    run_vectorised(simd_, [first, step, count = depth.size(), depth = depth.data(), open = open.data(),
-                           damping = damping_.data(), links = links.data(), near = static_cast<float>(kNearRange),
-                           noise = noise_, cell = cell_, focal = focal_, fade = fade_]() DKB_KERNEL_BODY {
-      for (size_t i = first; i < count; ++i) {
-        const size_t k = i - step;
-        const float za = depth[i], zb = depth[k];
-        const float low = std::min(za, zb), high = std::max(za, zb);
-        const bool joined = high - low < static_cast<float>(noise.max_depth_jump(low, cell, focal));
-        const bool too_near = (high < near) & ((za > 0) | (open[i] != 0)) & ((zb > 0) | (open[k] != 0));
-        const float of_surface = joined ? std::min(damping[i], damping[k]) : 0.0f, of_hole = too_near ? 1.0f : 0.0f;
-        links[i] = (low > 0 ? of_surface : of_hole) / (1.0f + fade * std::max(high, 0.5f * near));
-      }
-    });
+    run_vectorised(
+        simd_, [first, step, count = depth.size(), depth = depth.data(), damping = damping_.data(),
+                links = links.data(), noise = noise_, cell = cell_, focal = focal_, fade = fade_]() DKB_KERNEL_BODY {
+          for (size_t i = first; i < count; ++i) {
+            const size_t k = i - step;
+            const float za = depth[i], zb = depth[k];
+            const float low = std::min(za, zb), high = std::max(za, zb);
+            const bool joined = (low > 0) & (high - low < static_cast<float>(noise.max_depth_jump(low, cell, focal)));
+            links[i] = joined ? std::min(damping[i], damping[k]) / (1.0f + fade * high) : 0.0f;
+          }
+        });
   };
   link(1, 1, left_);
   link(static_cast<size_t>(depth.width()), static_cast<size_t>(depth.width()), up_);
@@ -118,14 +116,12 @@ DKB_KERNEL_BODY inline void sweep_columns(Image<float>& weighted, Image<float>& 
 
 void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
   const int width = weighted.width(), height = weighted.height();
-  for (int pass = 0; pass < 2; ++pass) {
-    int y = 0;
-    for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
-    for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
-    run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
-      for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
-    });
-  }
+  int y = 0;
+  for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
+  for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
+  run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
+    for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
+  });
 }
 
 }  // namespace dkb

@@ -8,9 +8,6 @@
 
 namespace dkb {
 
-// [m] a surface nearer than this may go on where depth is missing, being too near for the sensor
-constexpr double kNearRange = 0.55;
-
 struct MotionSmoothingOptions {
   double distance = 0.4;  // [m] along the surface over which cells of one object speak for each other, > 0
 };
@@ -24,9 +21,8 @@ class MotionSmoothing {
   MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, const MotionSmoothingOptions& options,
                   Simd simd = best_simd());
 
-  // `depth`: of the cells' middles [m], 0 = none. `open`: 255 where missing depth may be a surface too near for the
-  // sensor. Sets what smooth() stops at.
-  void set_surface(const Image<float>& depth, const Image<uint8_t>& open);
+  // `depth`: of the cells' middles [m], 0 = none. Sets what smooth() stops at.
+  void set_surface(const Image<float>& depth);
   // Smooths both in place: sum of weight times evidence, and sum of weights.
   void smooth(Image<float>& weighted, Image<float>& weights) const;
 

@@ -46,15 +46,6 @@ void dilate(MoverMask& mask, int radius) {
     }
 }
 
-void erode(MoverMask& mask, int radius) {
-  const auto invert = [&] {
-    for (size_t i = 0; i < mask.cells.size(); ++i) mask.cells.data()[i] = mask.cells.data()[i] != 0 ? 0 : 255;
-  };
-  invert();
-  dilate(mask, radius);
-  invert();
-}
-
 bool is_on(const MoverMask& mask, const Eigen::Vector2f& corner, const CornerDepths& depths) {
   if (mask.at(corner.x(), corner.y())) return true;
   constexpr auto reach = static_cast<float>(CornerDepths::kReach);

@@ -11,8 +11,6 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height);
 
 // Grows the marked area by `radius` cells in all eight directions.
 void dilate(MoverMask& mask, int radius);
-// Shrinks it likewise; what lies outside the image counts as marked.
-void erode(MoverMask& mask, int radius);
 
 // Whether a corner [px] is on what is marked. One without a depth of its own is where the surface is that lends it one:
 // the outline of a mover shows in the colour image a pixel or two beside its depth.

@@ -81,20 +81,6 @@ TEST(MoverMask, DilationStopsAtTheBorder) {
   EXPECT_EQ(marked(mask), 4);
 }
 
-TEST(MoverMask, ErosionUndoesDilationAndTakesWhatIsOutsideForMarked) {
-  MoverMask mask = one_cell(10, 10, 5, 5);
-  dilate(mask, 2);
-  erode(mask, 2);
-  EXPECT_EQ(marked(mask), 1);
-  EXPECT_NE(mask.cells(5, 5), 0);
-  erode(mask, 1);
-  EXPECT_EQ(marked(mask), 0);
-  MoverMask corner = one_cell(10, 10, 0, 9);
-  dilate(corner, 2);
-  erode(corner, 2);
-  EXPECT_EQ(marked(corner), 1);
-}
-
 // Somebody at 2 m before a wall at 3 m, whose depth begins at x = 100 and whose outline shows at 98.
 TEST(MoverMask, ACornerWithoutDepthOfItsOwnIsOnTheSurfaceThatLendsItOne) {
   CameraModel camera;

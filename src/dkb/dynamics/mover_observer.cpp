@@ -233,7 +233,8 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
 // Parts of the mask outside all boxes that hang together in depth.
 std::vector<MoverObserver::Region> MoverObserver::find_regions(std::span<const Detection> boxes) {
   free_depth_ = depth_;
-  for (const Detection& d : boxes) for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { free_depth_[i] = 0; });
+  for (const Detection& d : boxes)
+    for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { free_depth_[i] = 0; });
   std::vector<Region> regions;
   for (DepthPart& part : parts_.find(free_depth_, static_cast<float>(options_.depth_jump))) {
     // The mask's rim lies on what is behind the movers: a ring one or two cells wide is no object, nor are specks.

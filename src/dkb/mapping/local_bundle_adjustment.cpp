@@ -91,8 +91,9 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
   for (size_t c = 0; c < window.keyframes.size(); ++c)
     if (!problem.fixed[c]) map.set_pose(window.keyframes[c], problem.cam_from_world[c]);
   if (result.covariance)
-    map.set_covariance(newest, *result.covariance + carried_to(problem.cam_from_world[static_cast<size_t>(problem.asked)],
-                                                               common_error(map, window, result)));
+    map.set_covariance(newest,
+                       *result.covariance + carried_to(problem.cam_from_world[static_cast<size_t>(problem.asked)],
+                                                       common_error(map, window, result)));
   for (size_t p = 0; p < window.points.size(); ++p) map.edit_point(window.points[p]).position = problem.points[p];
   for (size_t o = 0; o < window.sources.size(); ++o)
     if (result.outlier[o])

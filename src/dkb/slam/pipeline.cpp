@@ -25,7 +25,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   const UsableFeatures usable = usable_features(scene);
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
-  const KeyframeDecision decision = decide(scene, tracked);  // DKB 3.2
+  const KeyframeDecision decision = decide(scene, tracked);      // DKB 3.2
   if (decision.insert) insert_keyframe(scene, usable, tracked);  // DKB 3.3 happens there
   result.features = report_features(scene, usable, tracked);
   publish(scene, tracked, decision, result);

@@ -17,8 +17,8 @@ struct ReadoutOptions {
 
 // Learns how long a rolling shutter takes from the first row to the last, while the camera is in use. Rows that are
 // exposed early or late show their points off by the image's motion times the row's delay; what a pose cannot explain
-// of that pattern tells the delay. Recursive least squares with the pose of each frame eliminated. The map was made from
-// the same sheared images, so that each frame tells less than all that is missing; the next ones make up for it.
+// of that pattern tells the delay. Recursive least squares with the pose of each frame eliminated. The map was made
+// from the same sheared images, so that each frame tells less than all that is missing; the next ones make up for it.
 // Deterministic.
 class ReadoutCalibration {
  public:

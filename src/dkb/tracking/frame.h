@@ -74,11 +74,11 @@ struct TrackingInput {
   double timestamp = 0;  // [s]
   const FrameFeatures& features;
   PointAppearance* appearance =
-      nullptr;                         // tells places that look alike apart when a lost camera is sought; may be null
-  const MotionPrior* prior = nullptr;  // by something beside the camera; may be null
-  const MotionPrior* step = nullptr;   // the same motion as the surfaces in view show it as well; may be null
+      nullptr;                           // tells places that look alike apart when a lost camera is sought; may be null
+  const MotionPrior* prior = nullptr;    // by something beside the camera; may be null
+  const MotionPrior* step = nullptr;     // the same motion as the surfaces in view show it as well; may be null
   const FrameFeatures* start = nullptr;  // of the frame before, if a map starts with it
-  bool may_start_map = true;           // else a frame that finds no map stays without a pose
+  bool may_start_map = true;             // else a frame that finds no map stays without a pose
 };
 
 }  // namespace dkb
