@@ -78,7 +78,7 @@ int main(int argc, char** argv) {
   // asked for again: together 8 MB and a twentieth of all processor time.
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_MMAP_THRESHOLD, 4 << 20);
-  mallopt(M_TRIM_THRESHOLD, 16 << 20);
+  mallopt(M_TRIM_THRESHOLD, 6 << 20);
 #endif
   CLI::App app("Real-time RGB-D SLAM that withstands people in the picture (DKB-SLAM)", "dkb-slam");
   app.set_version_flag("--version", "dkb-slam " DKB_SLAM_VERSION);

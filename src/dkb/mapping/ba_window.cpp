@@ -31,6 +31,13 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
 
   const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
   window.points = std::move(points);
+  // Room for what comes and no more: in a large map half of it again would be some megabytes.
+  size_t observed = 0;
+  for (const PointId p : window.points)
+    for (const Observation& o : map.point(p)->observations) observed += camera_of[static_cast<size_t>(o.keyframe)] >= 0;
+  problem.points.reserve(window.points.size());
+  problem.observations.reserve(observed);
+  window.sources.reserve(observed);
   for (size_t p = 0; p < window.points.size(); ++p) {
     const MapPoint& point = *map.point(window.points[p]);
     problem.points.push_back(point.position);
