@@ -116,12 +116,14 @@ DKB_KERNEL_BODY inline void sweep_columns(Image<float>& weighted, Image<float>& 
 
 void MotionSmoothing::smooth(Image<float>& weighted, Image<float>& weights) const {
   const int width = weighted.width(), height = weighted.height();
-  int y = 0;
-  for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
-  for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
-  run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
-    for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
-  });
+  for (int pass = 0; pass < 2; ++pass) {
+    int y = 0;
+    for (; y + 4 <= height; y += 4) sweep_rows<4>(weighted, weights, left_, y);
+    for (; y < height; ++y) sweep_rows<1>(weighted, weights, left_, y);
+    run_vectorised(simd_, [this, width, &weighted, &weights]() DKB_KERNEL_BODY {
+      for (int x = 0; x < width; x += kStrip) sweep_columns(weighted, weights, up_, x, std::min(kStrip, width - x));
+    });
+  }
 }
 
 }  // namespace dkb
