@@ -46,7 +46,7 @@ class DepthParts {
 
   int columns_, rows_;
   Simd simd_;
-  // Kept so that a frame allocates nothing. Per cell: 1 = linked to its neighbour to the right, and below.
+  // Buffers, kept from grid to grid. Per cell: 1 = linked to its neighbour to the right, and below.
   std::vector<uint8_t> right_, down_;
   std::vector<Run> runs_;
   std::vector<size_t> run_above_;  // per column: the run of the row above

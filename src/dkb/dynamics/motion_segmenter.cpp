@@ -12,9 +12,10 @@
 namespace dkb {
 namespace {
 
-constexpr float kTooNear = 0.45f;      // [m] taken for the depth of what is too near for the sensor
-constexpr float kNearRange = 0.55f;    // [m] a surface nearer than this may be gone on with where depth is missing
-constexpr size_t kMaxViews = 8;        // past views kept
+constexpr float kTooNear = 0.45f;  // [m] taken for the depth of what is too near for the sensor
+constexpr float kNearRange =
+    0.55f;                       // [m] where depth is missing now, a surface seen nearer than this may still be there
+constexpr size_t kMaxViews = 8;  // past views kept
 constexpr size_t kViewsPerFrame = 4;   // of them compared with each frame, in turn
 constexpr double kViewInterval = 0.2;  // [s] between views when they are taken; with age they thin out
 constexpr double kViewAge = 15;        // [s] older views are dropped, so that a parked chair becomes part of the room
@@ -238,7 +239,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
           const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
           const float margin =
               std::max(tolerated, static_cast<float>(noise.surface_tolerance(near))) + kSlope * (far - near);
-          intruding[i] |= known & before & (depth_then[i] > 0) & (z + margin < near) ? 1 : 0;
+          intruding[i] |= known & (depth_then[i] > 0) & (z + margin < near) ? 1 : 0;
           still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
         }
       });

@@ -22,7 +22,7 @@ constexpr double kFusionRadius = 3.0;    // [px] at the finest level
 constexpr double kSeamTolerance = 2.0;   // factor on radius and error limit of fusion where a loop was just closed
 constexpr size_t kCompared = 48;         // descriptors of a point that are compared, each with each
 
-// The first of the descriptors, at most kCompared, whose median distance to all of them is least.
+// The first of the descriptors, at most kCompared, whose upper median distance to all of them is least.
 size_t central_descriptor(std::span<const Descriptor> descriptors) {
   const size_t n = descriptors.size();
   if (n <= 2) return 0;

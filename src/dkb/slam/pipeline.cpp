@@ -17,7 +17,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   std::vector<DueDetections> detections = scenes_.exchange(next_frame_, frame);
   result.waiting_ms = whole.ms();
   const Expectation expected = expect(frame);
-  scenes_.begin(next_frame_, frame, std::move(detections), expected, outcome_);
+  scenes_.begin(next_frame_, frame, std::move(detections), expected, std::exchange(outcome_, std::nullopt));
   const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
   result.waiting_ms += take_due_map();  // as late as it may come: nothing before needs it
   follow_motion(scene);

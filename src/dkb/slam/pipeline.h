@@ -113,7 +113,7 @@ class Pipeline {
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   std::optional<FrameOutcome> outcome_;
-  Rigid3 new_world_from_old_;  // how the map was corrected in this frame, after the scene was looked at
+  Rigid3 new_world_from_old_;  // how the map was corrected after the scene was looked at
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {
     Scene scene;

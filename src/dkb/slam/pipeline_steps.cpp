@@ -95,7 +95,6 @@ void Pipeline::shed_load() {
 // Returns the time that it took [ms].
 double Pipeline::take_due_map() {
   const Stopwatch watch;
-  new_world_from_old_ = {};
   const bool wait = !options_.pipeline.realtime;
   const auto view = mapping_.take_due(next_frame_, wait);
   if (view) take_view(*view);
@@ -354,7 +353,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.detections = scene.boxes;
   result.mask = scene.mask;
   FrameOutcome outcome;
-  outcome.new_world_from_old = new_world_from_old_;
+  outcome.new_world_from_old = std::exchange(new_world_from_old_, {});
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
     outcome.cam_from_world = tracked.cam_from_world;
