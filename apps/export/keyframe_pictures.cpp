@@ -19,7 +19,7 @@ namespace {
 // names is left out.
 GreyImage still_world(const FrameResult& result, const DepthImage& depth, const Camera& camera) {
   MoverMask movers = result.mask;
-  unite(movers, silhouettes(depth, result.detections, camera, {}), depth.width(), depth.height());
+  unite(movers, silhouettes(depth, result.detections, camera, {}).mask, depth.width(), depth.height());
   GreyImage mask(depth.width(), depth.height(), 255);
   for (int y = 0; y < mask.height(); ++y)
     for (int x = 0; x < mask.width(); ++x)

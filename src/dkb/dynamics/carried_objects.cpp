@@ -22,20 +22,6 @@ void box_regions(Detections& detections) {
 
 }  // namespace
 
-void clear_still(MoverMask& mask, const Image<float>& score, int score_cell) {
-  constexpr float kStill = -0.3f;  // the score runs from -1 to 3
-  if (mask.cell == score_cell && mask.cells.width() == score.width() && mask.cells.height() == score.height()) {
-    for (size_t i = 0; i < mask.cells.size(); ++i)
-      mask.cells.data()[i] = score.data()[i] < kStill ? 0 : mask.cells.data()[i];
-    return;
-  }
-  for (int y = 0; y < mask.cells.height(); ++y)
-    for (int x = 0; x < mask.cells.width(); ++x) {
-      const int sx = (x * mask.cell + mask.cell / 2) / score_cell, sy = (y * mask.cell + mask.cell / 2) / score_cell;
-      if (score.contains(sx, sy) && score(sx, sy) < kStill) mask.cells(x, y) = 0;
-    }
-}
-
 CarriedObjects::CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options)
     : camera_(camera), noise_(noise), options_(options), flow_(options.flow) {}
 
@@ -98,7 +84,7 @@ MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {
 }
 
 std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, FrameIndex now,
-                                              const PastFrames& past, const ImagePyramid& pyramid, int score_cell) {
+                                              const PastFrames& past, const ImagePyramid& pyramid) {
   std::vector<LateMask> late;
   Detections detections = answer;
   box_regions(detections);
@@ -108,9 +94,10 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
     for (const PastFrame& p : past) {
       if (!p.keyframe || detections.boxes.empty()) continue;
       const Detections there = carry_to(*source, *p.pyramid, detections, std::abs(p.frame - from));
-      LateMask mask{p.frame, silhouettes(p.image->depth, there.mask.empty() ? there.boxes : std::vector<Detection>(),
-                                         camera_, noise_, options_.silhouette)};
-      if (!p.still_score.empty()) clear_still(mask.mask, p.still_score, score_cell);
+      const auto unmasked = there.mask.empty() ? there.boxes : std::vector<Detection>();
+      LateMask mask{
+          p.frame,
+          without_still(silhouettes(p.image->depth, unmasked, camera_, noise_, options_.silhouette), p.still).mask};
       unite(mask.mask, with_rim(there.mask), camera_.width, camera_.height);
       late.push_back(std::move(mask));
     }

@@ -34,9 +34,9 @@ class CarriedObjects {
   void follow(const PastFrames& past, const ImagePyramid& pyramid);
   // Works in what was detected in frame `from`, and counts in frame `now` from here on. The masks of the keyframes
   // since `from`, which may have let movers into the map: the detector's own, or else silhouettes of its boxes, without
-  // what was seen to stand still (score by cells of `score_cell` px).
+  // what was seen to stand still.
   std::vector<LateMask> receive(FrameIndex from, const Detections& detections, FrameIndex now, const PastFrames& past,
-                                const ImagePyramid& pyramid, int score_cell);
+                                const ImagePyramid& pyramid);
 
   std::vector<Detection> boxes() const;
   const GreyImage& mask() const { return mask_; }  // empty when the detector gives none
@@ -61,8 +61,5 @@ class CarriedObjects {
   std::vector<Carried> carried_;
   GreyImage mask_;
 };
-
-// Takes out of `mask` what the motion segmentation saw standing still before the object came: it is no part of it.
-void clear_still(MoverMask& mask, const Image<float>& score, int score_cell);
 
 }  // namespace dkb

@@ -56,7 +56,7 @@ class CarriedObjectsTest : public ::testing::Test {
     }
   }
   std::vector<LateMask> receive(FrameIndex from, const Detections& detections) {
-    return carried.receive(from, detections, now.frame, past, *now.pyramid, options_cell);
+    return carried.receive(from, detections, now.frame, past, *now.pyramid);
   }
   static void expect_near(const Box& box, const Box& truth, float tolerance) {
     EXPECT_NEAR(box.x, truth.x, tolerance);
@@ -76,7 +76,6 @@ class CarriedObjectsTest : public ::testing::Test {
     return {inside / all, outside / (static_cast<double>(truth.size()) - all)};
   }
 
-  static constexpr int options_cell = 4;
   SquareWorld world{320, 240, 300, 8};
   Camera camera;
   CarriedObjectsOptions options;
@@ -162,7 +161,7 @@ TEST_F(CarriedObjectsTest, LateMasksAreTheDetectorsOwnWhereItGivesMasks) {
 
 TEST_F(CarriedObjectsTest, WhatStoodStillBeforeIsNoPartOfALateMask) {
   see(4, {2});
-  past[2].still_score = Image<float>(80, 60, -1.0f);
+  past[2].still = {4, Image<uint8_t>(80, 60, StillCells::witnessed)};
   const auto late = receive(1, {{{"person", person(1), 1}}, {}});
   ASSERT_EQ(late.size(), 1U);
   for (size_t i = 0; i < late[0].mask.cells.size(); ++i) ASSERT_EQ(late[0].mask.cells.data()[i], 0);

@@ -32,6 +32,7 @@ constexpr float kFullEvidence = 0.05f;  // mean weight around a cell at which on
 
 constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
+constexpr float kStill = -0.3f;                       // below it nothing speaks for motion
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
 constexpr size_t kBlock = 640;   // [cells] worked at together
@@ -303,6 +304,28 @@ MoverMask MotionSegmenter::mask() {
     }
   });
   return result;
+}
+
+StillCells MotionSegmenter::still() const {
+  StillCells still{options_.cell, {}};
+  const Image<float>& scores = score();
+  still.kinds = Image<uint8_t>(scores.width(), scores.height());
+  for (size_t i = 0; i < scores.size(); ++i) {
+    if (scores.data()[i] >= kStill) continue;
+    still.kinds.data()[i] = still_.data()[i] >= kThere ? StillCells::witnessed : StillCells::unrefuted;
+  }
+  return still;
+}
+
+void MotionSegmenter::take_bodies(const MoverMask& bodies) {
+  if (!current_) return;
+  Image<float>& score = current_->score;
+  for (int y = 0; y < bodies.cells.height(); ++y)
+    for (int x = 0; x < bodies.cells.width(); ++x) {
+      const auto cell_of = [&](int v) { return (v * bodies.cell + bodies.cell / 2) / options_.cell; };
+      const int u = cell_of(x), v = cell_of(y);
+      if (bodies.cells(x, y) != 0 && score.contains(u, v)) score(u, v) = std::max(score(u, v), kMayMove);
+    }
 }
 
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {

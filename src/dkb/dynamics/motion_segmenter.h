@@ -10,6 +10,7 @@
 #include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
+#include "dkb/dynamics/still_cells.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
@@ -42,6 +43,11 @@ class MotionSegmenter {
   MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
   // The same for those who want score() alone.
   void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
+  // What is known to stand still in the image last given.
+  StillCells still() const;
+  // Bodies that a detector found in it: they carry a score from which no view of them testifies later that they are
+  // part of the room, though they stand.
+  void take_bodies(const MoverMask& bodies);
   // The colour camera's motion since the frame committed last as depth shows it beside what was expected, of the image
   // last given; nothing when there was no view to hold it against.
   const std::optional<MotionPrior>& aligned_step() const { return aligned_step_; }

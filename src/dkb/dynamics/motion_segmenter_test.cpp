@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "dkb/detection/mask_folder.h"
 #include "dkb/geometry/motion_model.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
@@ -116,7 +117,8 @@ void run(const World& world, int frames, const std::function<std::vector<Panel>(
     const Picture p = world.render(f, movers(f));
     Vector6d error;
     for (int i = 0; i < 6; ++i) error[i] = (i < 3 ? 0.002 : 0.0017) * random.normal();
-    const MoverMask mask = segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f), kStepCovariance);
+    const MoverMask mask =
+        segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f), kStepCovariance);
     look(f, mask, judge(mask, p.truth));
     segmenter.commit(world.cam_from_world(f));
   }
@@ -303,6 +305,40 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   RgbdImage image;
   image.depth = DepthImage(64, 48);
   EXPECT_THROW(segmenter.segment(image, Rigid3(), kStepCovariance), InputError);
+}
+
+TEST(MotionSegmenter, WhoStandsInABoxFromTheStartStaysMarked) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {});
+  for (int f = 0; f < 60; ++f) {
+    const Picture p = world.render(f, {box_at(0)});
+    segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
+    const Detection box{"person", region_boxes(p.truth, 100).front(), 1};
+    const Silhouettes left =
+        without_still(silhouettes(p.image.depth, std::vector{box}, world.camera, {}), segmenter.still());
+    segmenter.take_bodies(left.body);
+    const Figures figures = judge(left.mask, p.truth);
+    EXPECT_GT(figures.covered, 0.9) << f;
+    EXPECT_LT(figures.wrong, 0.01) << f;
+    segmenter.commit(world.cam_from_world(f));
+  }
+}
+
+TEST(MotionSegmenter, WhatStoodThereBeforeABoxCameIsNoPartOfIt) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {});
+  for (int f = 0; f < 40; ++f) {
+    Picture p = world.render(f, {});
+    segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
+    if (f >= 30) {  // a detector takes the pillar for a person
+      for (size_t i = 0; i < p.truth.size(); ++i) p.truth.data()[i] = p.image.depth.data()[i] < 2.6f ? 255 : 0;
+      const Detection box{"person", region_boxes(p.truth, 100).front(), 1};
+      const Silhouettes boxed = silhouettes(p.image.depth, std::vector{box}, world.camera, {});
+      EXPECT_GT(judge(boxed.body, p.truth).covered, 0.9) << f;
+      EXPECT_LT(judge(without_still(boxed, segmenter.still()).mask, p.truth).covered, 0.02) << f;
+    }
+    segmenter.commit(world.cam_from_world(f));
+  }
 }
 
 TEST(MotionSegmenter, FindsTheSameScoresWithEveryInstructionSet) {

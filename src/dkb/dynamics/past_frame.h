@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "dkb/dynamics/still_cells.h"
 #include "dkb/features/image_pyramid.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/ids.h"
@@ -17,7 +18,7 @@ struct PastFrame {
   std::shared_ptr<const RgbdImage> image;
   std::shared_ptr<const ImagePyramid> pyramid;
   std::vector<Eigen::Vector2f> corners;  // [px] of the image as read
-  Image<float> still_score;              // MotionSegmenter::score() when it became a keyframe; empty without it
+  StillCells still;                      // when it became a keyframe; empty without motion segmentation
   bool keyframe = false;
 };
 using PastFrames = std::deque<PastFrame>;  // newest last

@@ -14,6 +14,8 @@ constexpr int kMaskCell = 4;       // [px] grid on which depth is looked at
 constexpr double kCore = 0.5;      // share of the box's width and height around its centre where the object is sought
 constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
 constexpr double kRelativeLayer = 0.15;  // [1] half-width of that layer relative to its depth
+constexpr double kHalfDepth = 0.3;       // [m] and no more than half of what a body takes up along the line of sight
+constexpr double kMiddle = 0.1;          // share of the box's width and height in which its body is sure to be
 constexpr double kWidening = 0.05;       // share of the box's size by which it is widened
 
 struct CellRange {
@@ -64,13 +66,15 @@ float object_depth(const Image<float>& grid, const CellRange& core) {
     }
   if (samples.empty()) return 0;
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.depth < b.depth; });
-  // Slide a window of the layer's relative width from near to far; the first local maximum that is heavy enough wins.
+  // Slide a window of the layer's width from near to far; the first local maximum that is heavy enough wins.
   const float ratio = static_cast<float>((1 + kRelativeLayer) / (1 - kRelativeLayer));
+  const auto far_side = [&](float d) { return std::min(d * ratio, d + static_cast<float>(2 * kHalfDepth)); };
   const float needed = static_cast<float>(kMinShare) * total;
   float weight = 0, best_weight = 0, best_depth = samples[samples.size() / 2].depth;
   size_t end = 0;
   for (size_t begin = 0; begin < samples.size(); ++begin) {
-    while (end < samples.size() && samples[end].depth <= samples[begin].depth * ratio) weight += samples[end++].weight;
+    while (end < samples.size() && samples[end].depth <= far_side(samples[begin].depth))
+      weight += samples[end++].weight;
     if (weight > best_weight) {
       best_weight = weight;
       best_depth = 0.5f * (samples[begin].depth + samples[end - 1].depth);
@@ -86,6 +90,10 @@ struct Cell {
   int x, y;
 };
 
+bool is_in(const CellRange& r, int x, int y) {
+  return x >= r.x0 && y >= r.y0 && x < r.x1 && y < r.y1;
+}
+
 // What hangs together in depth within a range of cells. Each cell is given out once.
 class Surfaces {
  public:
@@ -100,16 +108,18 @@ class Surfaces {
       const float d = depth_(x, y);
       for (const auto& [dx, dy] : kBeside) {
         const Cell n{x + dx, y + dy};
-        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y)) continue;
-        const double z = depth_(n.x, n.y);
-        if (std::abs(z - d) > noise_.max_depth_jump(std::min<double>(z, d), kMaskCell, focal_)) continue;
+        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || !joined(d, depth_(n.x, n.y))) continue;
         seen_(n.x, n.y) = 1;
         cells.push_back(n);
       }
     }
     return cells;
   }
-  bool inside(const Cell& c) const { return c.x >= range.x0 && c.y >= range.y0 && c.x < range.x1 && c.y < range.y1; }
+  // Whether one surface goes on from a cell to the next.
+  bool joined(float a, float b) const {
+    return std::abs(a - b) <= noise_.max_depth_jump(std::min(a, b), kMaskCell, focal_);
+  }
+  bool inside(const Cell& c) const { return is_in(range, c.x, c.y); }
   bool seen(int x, int y) const { return seen_(x, y) != 0; }
 
   static constexpr std::array<Cell, 4> kBeside{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
@@ -147,15 +157,45 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
   for (const Cell& c : limbs) mine(c.x, c.y) = 255;
 }
 
+// Cells of `box` that are reached sooner from its middle, along what is `near_layer`, than from the cells around it.
+void add_body(const Image<float>& grid, const Surfaces& surfaces, const CellRange& box, const CellRange& middle,
+              const auto& near_layer, Image<uint8_t>& body) {
+  const CellRange with_ring{std::max(box.x0 - 1, 0), std::max(box.y0 - 1, 0), std::min(box.x1 + 1, grid.width()),
+                            std::min(box.y1 + 1, grid.height())};
+  enum Owner : uint8_t { nobody, object, surroundings };
+  Image<uint8_t> owners(grid.width(), grid.height());
+  std::vector<Cell> cells;
+  for (int y = with_ring.y0; y < with_ring.y1; ++y)
+    for (int x = with_ring.x0; x < with_ring.x1; ++x) {
+      const bool around = !is_in(box, x, y) && grid(x, y) > 0;
+      if (!around && !(is_in(middle, x, y) && near_layer(x, y))) continue;
+      owners(x, y) = around ? surroundings : object;
+      cells.push_back({x, y});
+    }
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const auto [x, y] = cells[i];
+    const uint8_t owner = owners(x, y);
+    if (owner == object) body(x, y) = 255;
+    for (const auto& [dx, dy] : Surfaces::kBeside) {
+      const Cell n{x + dx, y + dy};
+      if (!is_in(box, n.x, n.y) || owners(n.x, n.y) != nobody || !(grid(n.x, n.y) > 0)) continue;
+      if (!surfaces.joined(grid(x, y), grid(n.x, n.y)) || (owner == object && !near_layer(n.x, n.y))) continue;
+      owners(n.x, n.y) = owner;
+      cells.push_back(n);
+    }
+  }
+}
+
 }  // namespace
 
-MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
-                      const SensorNoise& noise, const SilhouetteOptions& options) {
-  MoverMask mask;
-  mask.cell = kMaskCell;
-  if (boxes.empty()) return mask;
+Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
+                        const SensorNoise& noise, const SilhouetteOptions& options) {
+  Silhouettes made;
+  MoverMask& mask = made.mask;
+  mask.cell = made.body.cell = kMaskCell;
+  if (boxes.empty()) return made;
   const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
-  mask.cells = Image<uint8_t>(columns, rows);
+  mask.cells = made.body.cells = Image<uint8_t>(columns, rows);
   constexpr float kNotLookedAt = -1;
   constexpr int kAround = 3;  // [cells] to all sides that a hole's neighbours lie
   std::vector<int> sides;
@@ -163,8 +203,8 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
   for (const Detection& detection : boxes) {
     const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
     const CellRange core = cells_of(scaled(detection.box, kCore), kMaskCell, columns, rows);
-    for (int y = range.y0; y < range.y1; ++y)
-      for (int x = range.x0; x < range.x1; ++x)
+    for (int y = std::max(range.y0 - 1, 0); y < std::min(range.y1 + 1, rows); ++y)
+      for (int x = std::max(range.x0 - 1, 0); x < std::min(range.x1 + 1, columns); ++x)
         if (grid(x, y) == kNotLookedAt) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
     const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
@@ -181,9 +221,14 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (near_layer(x, y, kRelativeLayer * layer)) seeds.push_back({x, y});
+        if (near_layer(x, y, std::min(kRelativeLayer * layer, kHalfDepth))) seeds.push_back({x, y});
     for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
+    add_body(
+        grid, surfaces, cells_of(detection.box, kMaskCell, columns, rows),
+        cells_of(scaled(detection.box, kMiddle), kMaskCell, columns, rows),
+        [&](int x, int y) { return near_layer(x, y, std::min(kHalfDepth, options.max_depth_offset)); },
+        made.body.cells);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.
     sides.assign(static_cast<size_t>(range.x1 - range.x0) + 2 * kAround, 0);
@@ -204,10 +249,10 @@ MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes,
     }
     for (int y = range.y0; y < range.y1; ++y)
       for (int x = range.x0; x < range.x1; ++x)
-        if (mine(x, y)) mask.cells(x, y) = 255;
+        if (mine(x, y) || made.body.cells(x, y)) mask.cells(x, y) = 255;
   }
   dilate(mask, options.rim);
-  return mask;
+  return made;
 }
 
 }  // namespace dkb

@@ -15,11 +15,18 @@ struct SilhouetteOptions {
   int rim = 1;                    // [cells] the silhouette is widened by, >= 0
 };
 
-// What in each box belongs to the detected object rather than to what is seen beside it: the nearest depth layer that
-// fills a good part of the box's core, all that hangs together with it in depth within the box, and limbs: surfaces in
-// reach beside it that end within the box. Cells without depth follow their neighbours. A box whose core has no depth
-// at all is taken whole.
-MoverMask silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
-                      const SensorNoise& noise, const SilhouetteOptions& options = {});
+// What in each box belongs to the detected object rather than to what is seen beside it.
+struct Silhouettes {
+  // The nearest depth layer that fills a good part of the box's core, all that hangs together with it in depth within
+  // the box, and limbs: surfaces in reach beside it that end within the box. Cells without depth follow their
+  // neighbours. A box whose core has no depth at all is taken whole.
+  MoverMask mask;
+  // The part of it that is surely the object's: what hangs together with the middle of the box and lies nearer to it,
+  // along the surfaces, than to what is around the box. A desk at the object's depth goes on beyond the box.
+  MoverMask body;
+};
+
+Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
+                        const SensorNoise& noise, const SilhouetteOptions& options = {});
 
 }  // namespace dkb

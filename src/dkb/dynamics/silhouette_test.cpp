@@ -21,7 +21,7 @@ DepthImage person_before_wall() {
 }
 
 MoverMask silhouette_in(const DepthImage& depth, const Box& box, const SilhouetteOptions& options = {}) {
-  return silhouettes(depth, std::vector<Detection>{{"person", box, 1}}, {}, {}, options);
+  return silhouettes(depth, std::vector<Detection>{{"person", box, 1}}, {}, {}, options).mask;
 }
 
 TEST(Silhouette, HoldsThePersonAndARimButNotTheWallBesideIt) {
@@ -100,6 +100,26 @@ TEST(Silhouette, TheNearerOfTwoHeavyLayersIsTheObject) {
   EXPECT_FALSE(mask.at(100, 60));
 }
 
+// At 6 m a layer of 15% of the depth would hold the wall as well, and lie between the two.
+TEST(Silhouette, WhoStandsFarAwayIsToldFromTheWallBehind) {
+  DepthImage depth(160, 120, 7.2f);
+  fill(&depth, 70, 20, 90, 100, 6.0f);
+  const MoverMask mask = silhouette_in(depth, {62, 16, 40, 88});
+  EXPECT_TRUE(mask.at(80, 30));
+  EXPECT_TRUE(mask.at(80, 90));
+  EXPECT_FALSE(mask.at(98, 60));
+}
+
+TEST(Silhouette, ABodyIsWhatLiesNearerToTheMiddleThanToTheSurroundings) {
+  DepthImage depth = person_before_wall();
+  fill(&depth, 84, 70, 160, 90, 1.5f);  // a table at the person's depth, from his hip to beyond the box
+  const Silhouettes found = silhouettes(depth, std::vector<Detection>{{"person", {40, 10, 80, 100}, 1}}, {}, {});
+  EXPECT_TRUE(found.body.at(80, 30));
+  EXPECT_TRUE(found.body.at(80, 90));
+  EXPECT_TRUE(found.mask.at(114, 80)) << "no depth tells the table from the person";
+  EXPECT_FALSE(found.body.at(114, 80));
+}
+
 TEST(Silhouette, AThinThingInFrontIsNotTheObject) {
   DepthImage depth = person_before_wall();
   fill(&depth, 80, 0, 83, 120, 0.7f);  // a pole
@@ -126,7 +146,7 @@ TEST(Silhouette, ABoxWithoutDepthIsTakenWhole) {
 }
 
 TEST(Silhouette, NoBoxesNoMask) {
-  EXPECT_TRUE(silhouettes(person_before_wall(), {}, {}, {}).empty());
+  EXPECT_TRUE(silhouettes(person_before_wall(), {}, {}, {}).mask.empty());
 }
 
 TEST(Silhouette, BoxesBeyondTheImageAreHarmless) {
@@ -140,7 +160,7 @@ TEST(Silhouette, TheMasksOfSeveralBoxesAreUnited) {
   DepthImage depth = person_before_wall();
   fill(&depth, 110, 20, 140, 100, 2.0f);
   const std::vector<Detection> boxes = {{"person", {60, 20, 40, 80}, 1}, {"person", {110, 20, 30, 80}, 1}};
-  const MoverMask mask = silhouettes(depth, boxes, {}, {});
+  const MoverMask mask = silhouettes(depth, boxes, {}, {}).mask;
   EXPECT_TRUE(mask.at(80, 60));
   EXPECT_TRUE(mask.at(125, 60));
   EXPECT_FALSE(mask.at(30, 60));

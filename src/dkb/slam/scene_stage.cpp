@@ -61,7 +61,7 @@ void SceneStage::learn(const FrameOutcome& before) {
   }
   if (before.keyframe && !past_.empty()) {
     past_.back().keyframe = true;
-    if (motion_) past_.back().still_score = motion_->score();
+    if (motion_) past_.back().still = motion_->still();
   }
 }
 
@@ -107,7 +107,7 @@ Carried SceneStage::carry(const CarryTask& task) {
   pyramid->build(image.grey);
   if (slow_stage_) objects_.follow(past_, *pyramid);
   for (const DueDetections& d : task.due) {
-    auto late = objects_.receive(d.frame, d.detections, task.index, past_, *pyramid, options_.motion.cell);
+    auto late = objects_.receive(d.frame, d.detections, task.index, past_, *pyramid);
     if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
   }
   if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
@@ -150,7 +150,7 @@ MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
   return moving;
 }
 
-MoverMask SceneStage::silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const {
+Silhouettes SceneStage::silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const {
   return silhouettes(image.depth, boxes, camera_, noise_, options_.carried.silhouette);
 }
 
@@ -195,9 +195,14 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
-    scene.mask = silhouettes_of(image, unmasked);
-    unite(scene.mask, carried.silhouettes, camera_.width, camera_.height);
-    if (motion_) clear_still(scene.mask, motion_->score(), options_.motion.cell);
+    Silhouettes boxed = silhouettes_of(image, unmasked);
+    unite(boxed.mask, carried.silhouettes.mask, camera_.width, camera_.height);
+    unite(boxed.body, carried.silhouettes.body, camera_.width, camera_.height);
+    if (motion_ && !boxed.mask.empty()) {
+      boxed = without_still(std::move(boxed), motion_->still());
+      motion_->take_bodies(boxed.body);
+    }
+    scene.mask = std::move(boxed.mask);
     unite(scene.mask, given, camera_.width, camera_.height);
     if (segments_motion_) unite(scene.mask, moving, camera_.width, camera_.height);
     const CornerDepths depths(image.depth, camera_, noise_);

@@ -47,8 +47,8 @@ struct SegmentationTask {
 struct Carried {
   std::shared_ptr<const ImagePyramid> pyramid;  // of the image
   std::vector<LateMask> late_masks;
-  MoverMask silhouettes;  // of boxes without a mask
-  MoverMask mask;         // that the detector gave
+  Silhouettes silhouettes;  // of boxes without a mask
+  MoverMask mask;           // that the detector gave
   double ms = 0;
 };
 struct CarryTask {
@@ -106,7 +106,7 @@ class SceneStage {
   Segmentation segment_motion(const SegmentationTask& task);
   MoverMask take_motion(std::vector<Detection>& boxes);
   Carried carry(const CarryTask& task);
-  MoverMask silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const;
+  Silhouettes silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
 
   Camera camera_;
