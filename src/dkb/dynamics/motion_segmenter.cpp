@@ -35,6 +35,7 @@ constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a sti
 constexpr float kStill = -0.3f;                       // below it nothing speaks for motion
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
+constexpr double kWalk = 1.5;    // [m/s] somebody walks
 constexpr size_t kBlock = 640;   // [cells] worked at together
 
 template <class T>
@@ -63,7 +64,7 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &still_, &weighted_, &weights_}) *i = Image<float>(width, height);
-  known_ = intruding_ = Image<uint8_t>(width, height);
+  known_ = intruding_ = vacated_ = Image<uint8_t>(width, height);
   verdict_.resize(kBlock);
   for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlock);
 }
@@ -117,6 +118,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     std::fill_n(intruding_.data() + block.first, block.count, uint8_t{0});
     for (const ChosenView& view : chosen_) compare(view, block);
   }
+  find_vacated();
   smoothing_.set_surface(current_->depth);
   weigh();
   smoothing_.smooth(weighted_, weights_);
@@ -246,8 +248,55 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
       });
 }
 
+namespace {
+
+// Cells of `marks` with kSupport others of 3 x 3, itself among them.
+template <class Visit>
+void for_supported(const Image<uint8_t>& marks, const Visit& visit) {
+  for (int y = 1; y + 1 < marks.height(); ++y) {
+    const std::array<const uint8_t*, 3> rows{marks.row(y - 1), marks.row(y), marks.row(y + 1)};
+    for (int x = 1; x + 1 < marks.width(); ++x) {
+      if (rows[1][x] == 0) continue;
+      int support = 0;
+      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
+      if (support >= kSupport) visit(x, y);
+    }
+  }
+}
+
+}  // namespace
+
+// Who comes from where the camera has not looked yet stands in no space seen empty. But what was behind him comes to
+// light where the frame before had a surface: whatever is as far away beside it, no farther than one walks in the time
+// between, is that surface gone on.
+void MotionSegmenter::find_vacated() {
+  if (!previous_) return;
+  const Image<float>& depth = current_->depth;
+  const int width = depth.width(), height = depth.height();
+  rays_.project(previous_->depth, kTooNear, current_->cam_from_world * previous_->cam_from_world.inverse(),
+                rays_.all_cells(), projection_, simd_);
+  for (size_t i = 0; i < vacated_.size(); ++i) {
+    vacated_.data()[i] = 0;
+    if (projection_.cell[i] < 0 || !(previous_->depth.data()[i] > 0)) continue;
+    const auto at = static_cast<size_t>(projection_.cell[i]);
+    const float z = projection_.depth[i], near = current_->nearest.data()[at], far = current_->farthest.data()[at];
+    if (!(far > 0) || near <= z) continue;
+    const auto tolerance = static_cast<float>(std::max(noise_.surface_tolerance(z), noise_.surface_tolerance(near)));
+    vacated_.data()[i] = z + tolerance + kSlope * (far - near) < near ? 1 : 0;
+  }
+  const double reach = kWalk * (current_->time - previous_->time) * camera_.fx / options_.cell;  // [cells] at 1 m
+  for_supported(vacated_, [&](int x, int y) {
+    const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+    const int at = projection_.cell[i], u0 = at % width, v0 = at / width;
+    const float z = projection_.depth[i], bound = static_cast<float>(noise_.surface_tolerance(z)) + kMotionPerFrame;
+    const int radius = 1 + static_cast<int>(std::clamp(reach / z, 0.0, static_cast<double>(width)));
+    for (int v = std::max(0, v0 - radius); v <= std::min(height - 1, v0 + radius); ++v)
+      for (int u = std::max(0, u0 - radius); u <= std::min(width - 1, u0 + radius); ++u)
+        if (depth(u, v) > 0 && std::abs(depth(u, v) - z) < bound) intruding_(u, v) = 1;
+  });
+}
+
 void MotionSegmenter::weigh() {
-  const int width = rays_.width(), height = rays_.height();
   const Image<float>& depth = current_->depth;
   const auto weigh_cell = [](bool moves, float still, float score, float z, float& weighted,
                              float& weights) DKB_KERNEL_BODY {
@@ -262,16 +311,9 @@ void MotionSegmenter::weigh() {
               weighted = weighted_.data(), weights = weights_.data()]() DKB_KERNEL_BODY {
         for (size_t i = 0; i < count; ++i) weigh_cell(false, still[i], score[i], z[i], weighted[i], weights[i]);
       });
-  for (int y = 1; y + 1 < height; ++y) {
-    const std::array<const uint8_t*, 3> rows{intruding_.row(y - 1), intruding_.row(y), intruding_.row(y + 1)};
-    for (int x = 1; x + 1 < width; ++x) {
-      if (rows[1][x] == 0) continue;
-      int support = 0;
-      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
-      if (support >= kSupport)
-        weigh_cell(true, still_(x, y), current_->score(x, y), depth(x, y), weighted_(x, y), weights_(x, y));
-    }
-  }
+  for_supported(intruding_, [&](int x, int y) {
+    weigh_cell(true, still_(x, y), current_->score(x, y), depth(x, y), weighted_(x, y), weights_(x, y));
+  });
 }
 
 void MotionSegmenter::update_scores() {

@@ -78,6 +78,7 @@ class MotionSegmenter {
   void find_tolerances(CellRange block);
   void carry_scores(CellRange block);
   void compare(const ChosenView& view, CellRange block);
+  void find_vacated();
   void weigh();
   void update_scores();
   MoverMask mask();
@@ -105,7 +106,8 @@ class MotionSegmenter {
   Image<float> still_;      // votes of the views that had the surface where it is
   Image<float> weighted_, weights_;
   Image<uint8_t> known_;
-  Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty
+  Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty, or went on from where it was
+  Image<uint8_t> vacated_;    // of the frame before: 1 where its surface is no more
   std::vector<ChosenView> chosen_;
   // Of the block at work: which cells have moved on, and what a view has where they are.
   std::vector<uint8_t> verdict_;

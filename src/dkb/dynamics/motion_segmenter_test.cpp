@@ -42,7 +42,8 @@ class World {
   }
 
   Rigid3 cam_from_world(int frame) const {
-    const double t = still_camera ? 0.0 : frame / 30.0;
+    if (turn != 0) return Rigid3(rotation_from_vector({0, turn * frame, 0}), Eigen::Vector3d::Zero()).inverse();
+    const double t = still_camera ? 0.0 : frame / rate;
     const Rigid3 world_from_cam(rotation_from_vector({0.03 * std::sin(2.0 * t), 0.05 * std::sin(1.5 * t), 0}),
                                 {0.15 * std::sin(1.2 * t), 0.05 * std::sin(1.7 * t), 0.1 * std::sin(0.8 * t)});
     return world_from_cam.inverse();
@@ -52,7 +53,7 @@ class World {
     std::vector<Panel> panels{{-9, -9, 9, 9, 3.0}, {-1.0, -2, -0.7, 2, 2.2}};
     panels.insert(panels.end(), movers.begin(), movers.end());
     Picture p;
-    p.image.timestamp = p.image.depth_timestamp = frame / 30.0;
+    p.image.timestamp = p.image.depth_timestamp = frame / rate;
     p.image.grey = GreyImage(kWidth, kHeight);
     p.image.depth = DepthImage(kWidth, kHeight);
     p.truth = GreyImage(kWidth, kHeight);
@@ -79,6 +80,8 @@ class World {
 
   CameraModel camera;
   bool still_camera = false;
+  double turn = 0;   // [rad] to the right from frame to frame, in the place of the swaying
+  double rate = 30;  // [Hz]
   double holes = 0;  // share of the pixels without depth
 };
 
@@ -305,6 +308,20 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   RgbdImage image;
   image.depth = DepthImage(64, 48);
   EXPECT_THROW(segmenter.segment(image, Rigid3(), kStepCovariance), InputError);
+}
+
+// Nobody saw empty what he walks into, since the camera turns after him.
+TEST(MotionSegmenter, FindsWhoWalksWhereTheCameraHasNotLookedYet) {
+  World world;
+  world.turn = -5 * M_PI / 180;
+  world.rate = 10;
+  run(
+      world, 9, [](int f) { return std::vector{box_at(-0.75 - 0.12 * f)}; },
+      [](int f, const MoverMask&, const Figures& figures) {
+        if (f < 3) return;
+        EXPECT_GT(figures.covered, 0.9) << f;
+        EXPECT_LT(figures.wrong, 0.01) << f;
+      });
 }
 
 TEST(MotionSegmenter, WhoStandsInABoxFromTheStartStaysMarked) {
