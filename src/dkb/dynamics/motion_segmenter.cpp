@@ -364,9 +364,10 @@ void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   Image<float>& score = current_->score;
   for (int y = 0; y < bodies.cells.height(); ++y)
     for (int x = 0; x < bodies.cells.width(); ++x) {
+      if (bodies.cells(x, y) == 0) continue;
       const auto cell_of = [&](int v) { return (v * bodies.cell + bodies.cell / 2) / options_.cell; };
       const int u = cell_of(x), v = cell_of(y);
-      if (bodies.cells(x, y) != 0 && score.contains(u, v)) score(u, v) = std::max(score(u, v), kMayMove);
+      if (score.contains(u, v)) score(u, v) = std::max(score(u, v), kMayMove);
     }
 }
 

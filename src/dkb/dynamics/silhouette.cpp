@@ -94,30 +94,32 @@ bool is_in(const CellRange& r, int x, int y) {
   return x >= r.x0 && y >= r.y0 && x < r.x1 && y < r.y1;
 }
 
+// Whether one surface goes on between two cells of depths `a` and `b`, which allow for the jumps given [m].
+bool joined(float a, float b, float jump_a, float jump_b) {
+  return std::abs(a - b) <= std::min(jump_a, jump_b);  // that of the nearer one
+}
+
 // What hangs together in depth within a range of cells. Each cell is given out once.
 class Surfaces {
  public:
-  Surfaces(const Image<float>& depth, const CellRange& cells, const Camera& camera, const SensorNoise& noise)
-      : range(cells), depth_(depth), focal_(camera.fx), noise_(noise), seen_(depth.width(), depth.height()) {}
+  Surfaces(const Image<float>& depth, const Image<float>& jump, const CellRange& cells)
+      : range(cells), depth_(depth), jump_(jump), seen_(depth.width(), depth.height()) {}
 
   // The seeds and all that hangs together with them and is `wanted`.
   std::vector<Cell> grow(std::vector<Cell> cells, const auto& wanted) {
     for (const Cell& c : cells) seen_(c.x, c.y) = 1;
     for (size_t i = 0; i < cells.size(); ++i) {
       const auto [x, y] = cells[i];
-      const float d = depth_(x, y);
+      const float d = depth_(x, y), jump = jump_(x, y);
       for (const auto& [dx, dy] : kBeside) {
         const Cell n{x + dx, y + dy};
-        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y) || !joined(d, depth_(n.x, n.y))) continue;
+        if (!inside(n) || seen_(n.x, n.y) || !wanted(n.x, n.y)) continue;
+        if (!joined(d, depth_(n.x, n.y), jump, jump_(n.x, n.y))) continue;
         seen_(n.x, n.y) = 1;
         cells.push_back(n);
       }
     }
     return cells;
-  }
-  // Whether one surface goes on from a cell to the next.
-  bool joined(float a, float b) const {
-    return std::abs(a - b) <= noise_.max_depth_jump(std::min(a, b), kMaskCell, focal_);
   }
   bool inside(const Cell& c) const { return is_in(range, c.x, c.y); }
   bool seen(int x, int y) const { return seen_(x, y) != 0; }
@@ -127,8 +129,7 @@ class Surfaces {
 
  private:
   const Image<float>& depth_;
-  double focal_;
-  SensorNoise noise_;
+  const Image<float>& jump_;
   Image<uint8_t> seen_;
 };
 
@@ -158,30 +159,41 @@ void add_limbs(Surfaces& surfaces, const auto& within_depth, Image<uint8_t>& min
 }
 
 // Cells of `box` that are reached sooner from its middle, along what is `near_layer`, than from the cells around it.
-void add_body(const Image<float>& grid, const Surfaces& surfaces, const CellRange& box, const CellRange& middle,
+void add_body(const Image<float>& grid, const Image<float>& jump, const CellRange& box, const CellRange& middle,
               const auto& near_layer, Image<uint8_t>& body) {
-  const CellRange with_ring{std::max(box.x0 - 1, 0), std::max(box.y0 - 1, 0), std::min(box.x1 + 1, grid.width()),
-                            std::min(box.y1 + 1, grid.height())};
-  enum Owner : uint8_t { nobody, object, surroundings };
-  Image<uint8_t> owners(grid.width(), grid.height());
-  std::vector<Cell> cells;
-  for (int y = with_ring.y0; y < with_ring.y1; ++y)
-    for (int x = with_ring.x0; x < with_ring.x1; ++x) {
-      const bool around = !is_in(box, x, y) && grid(x, y) > 0;
-      if (!around && !(is_in(middle, x, y) && near_layer(x, y))) continue;
-      owners(x, y) = around ? surroundings : object;
-      cells.push_back({x, y});
+  enum Owner : uint8_t { nobody, object, surroundings, no_depth };
+  const int width = box.x1 - box.x0 + 2, height = box.y1 - box.y0 + 2;  // with a ring around the box
+  std::vector<uint8_t> owners(static_cast<size_t>(width) * static_cast<size_t>(height), no_depth);
+  std::vector<float> depths(owners.size()), jumps(owners.size());
+  std::vector<int> reached;
+  int waiting = 0;  // cells of the object among them that are still to be gone on from
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u) {
+      const int x = box.x0 + u - 1, y = box.y0 + v - 1, i = v * width + u;
+      if (!grid.contains(x, y) || !(grid(x, y) > 0)) continue;
+      uint8_t& owner = owners[static_cast<size_t>(i)];
+      depths[static_cast<size_t>(i)] = grid(x, y);
+      jumps[static_cast<size_t>(i)] = jump(x, y);
+      owner = !is_in(box, x, y) ? surroundings : is_in(middle, x, y) && near_layer(grid(x, y)) ? object : nobody;
+      if (owner != nobody) reached.push_back(i);
+      waiting += owner == object ? 1 : 0;
     }
-  for (size_t i = 0; i < cells.size(); ++i) {
-    const auto [x, y] = cells[i];
-    const uint8_t owner = owners(x, y);
-    if (owner == object) body(x, y) = 255;
-    for (const auto& [dx, dy] : Surfaces::kBeside) {
-      const Cell n{x + dx, y + dy};
-      if (!is_in(box, n.x, n.y) || owners(n.x, n.y) != nobody || !(grid(n.x, n.y) > 0)) continue;
-      if (!surfaces.joined(grid(x, y), grid(n.x, n.y)) || (owner == object && !near_layer(n.x, n.y))) continue;
-      owners(n.x, n.y) = owner;
-      cells.push_back(n);
+  const std::array<int, 4> beside{-1, 1, -width, width};
+  for (size_t k = 0; waiting > 0; ++k) {
+    const int i = reached[k];
+    const auto here = static_cast<size_t>(i);
+    const uint8_t owner = owners[here];
+    const int u = i % width, v = i / width;
+    const bool in_ring = u == 0 || v == 0 || u + 1 == width || v + 1 == height;
+    if (owner == object) --waiting, body(box.x0 + u - 1, box.y0 + v - 1) = 255;
+    for (const int step : beside) {
+      if (in_ring && (i + step < 0 || i + step >= width * height)) continue;
+      const auto n = static_cast<size_t>(i + step);
+      if (owners[n] != nobody || !joined(depths[here], depths[n], jumps[here], jumps[n])) continue;
+      if (owner == object && !near_layer(depths[n])) continue;
+      owners[n] = owner;
+      reached.push_back(static_cast<int>(n));
+      waiting += owner == object ? 1 : 0;
     }
   }
 }
@@ -199,13 +211,16 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
   constexpr float kNotLookedAt = -1;
   constexpr int kAround = 3;  // [cells] to all sides that a hole's neighbours lie
   std::vector<int> sides;
-  Image<float> grid(columns, rows, kNotLookedAt);
+  Image<float> grid(columns, rows, kNotLookedAt), jump(columns, rows);
   for (const Detection& detection : boxes) {
     const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
     const CellRange core = cells_of(scaled(detection.box, kCore), kMaskCell, columns, rows);
     for (int y = std::max(range.y0 - 1, 0); y < std::min(range.y1 + 1, rows); ++y)
       for (int x = std::max(range.x0 - 1, 0); x < std::min(range.x1 + 1, columns); ++x)
-        if (grid(x, y) == kNotLookedAt) grid(x, y) = cell_depth(depth, x, y, kMaskCell);
+        if (grid(x, y) == kNotLookedAt) {
+          grid(x, y) = cell_depth(depth, x, y, kMaskCell);
+          jump(x, y) = static_cast<float>(noise.max_depth_jump(grid(x, y), kMaskCell, camera.fx));
+        }
     const float layer = object_depth(grid, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
@@ -213,7 +228,7 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
       continue;
     }
     Image<uint8_t> mine(columns, rows);
-    Surfaces surfaces{grid, range, camera, noise};
+    Surfaces surfaces{grid, jump, range};
     const auto near_layer = [&](int x, int y, double tolerance) {
       return grid(x, y) > 0 && std::fabs(grid(x, y) - layer) <= static_cast<float>(tolerance);
     };
@@ -224,23 +239,26 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
         if (near_layer(x, y, std::min(kRelativeLayer * layer, kHalfDepth))) seeds.push_back({x, y});
     for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
+    const double half_depth = std::min(kHalfDepth, options.max_depth_offset);
     add_body(
-        grid, surfaces, cells_of(detection.box, kMaskCell, columns, rows),
+        grid, jump, cells_of(detection.box, kMaskCell, columns, rows),
         cells_of(scaled(detection.box, kMiddle), kMaskCell, columns, rows),
-        [&](int x, int y) { return near_layer(x, y, std::min(kHalfDepth, options.max_depth_offset)); },
-        made.body.cells);
+        [&](float z) { return std::abs(z - layer) <= half_depth; }, made.body.cells);
     // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
     // What is too near for the camera has no depth at all, and in a box that is the object.
     sides.assign(static_cast<size_t>(range.x1 - range.x0) + 2 * kAround, 0);
+    // Known cells of each column around the row at work: those of the object less the others.
+    const auto add_row = [&](int v, int sign) {
+      if (v < range.y0 || v >= range.y1) return;
+      int* const side = sides.data() + kAround;
+      const float* const known = grid.row(v) + range.x0;
+      const uint8_t* const object = mine.row(v) + range.x0;
+      for (int k = 0; k < range.x1 - range.x0; ++k) side[k] += known[k] > 0 ? (object[k] != 0 ? sign : -sign) : 0;
+    };
+    for (int v = range.y0; v < range.y0 + kAround; ++v) add_row(v, 1);
     for (int y = range.y0; y < range.y1; ++y) {
-      // Known cells of each column around this row: those of the object less the others.
-      std::fill(sides.begin(), sides.end(), 0);
-      for (int v = std::max(range.y0, y - kAround); v <= std::min(range.y1 - 1, y + kAround); ++v) {
-        int* const side = sides.data() + kAround;
-        const float* const known = grid.row(v) + range.x0;
-        const uint8_t* const object = mine.row(v) + range.x0;
-        for (int k = 0; k < range.x1 - range.x0; ++k) side[k] += known[k] > 0 ? (object[k] != 0 ? 1 : -1) : 0;
-      }
+      add_row(y + kAround, 1);
+      add_row(y - kAround - 1, -1);
       for (int x = range.x0; x < range.x1; ++x) {
         if (grid(x, y) > 0 || mine(x, y)) continue;
         const int* const first = sides.data() + (x - range.x0);

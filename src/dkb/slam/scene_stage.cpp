@@ -195,9 +195,10 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     for (size_t i = 0; i < corners.size(); ++i)
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
-    Silhouettes boxed = silhouettes_of(image, unmasked);
-    unite(boxed.mask, carried.silhouettes.mask, camera_.width, camera_.height);
-    unite(boxed.body, carried.silhouettes.body, camera_.width, camera_.height);
+    Silhouettes boxed = std::move(carried.silhouettes);
+    const Silhouettes prompt = silhouettes_of(image, unmasked);
+    unite(boxed.mask, prompt.mask, camera_.width, camera_.height);
+    unite(boxed.body, prompt.body, camera_.width, camera_.height);
     if (motion_ && !boxed.mask.empty()) {
       boxed = without_still(std::move(boxed), motion_->still());
       motion_->take_bodies(boxed.body);
