@@ -40,7 +40,7 @@ class DKB_SLAM_API Options {
   struct Features {
     int count = 900;             ///< [features] wanted per image, at least 1
     int levels = 7;              ///< of the image pyramid, 1 ... 16
-    double scale = 1.25;         ///< size of a level over the next smaller one, above 1, at most 4
+    double scale = 1.2;          ///< size of a level over the next smaller one, above 1, at most 4
     int fast_threshold = 20;     ///< [grey levels] contrast of a corner, fast_threshold_min ... 254
     int fast_threshold_min = 7;  ///< [grey levels] the same where an image has no such corners, 1 ... 254
   } features;

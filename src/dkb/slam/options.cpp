@@ -227,7 +227,6 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   o.depth.model_time_offset = false;
   o.features.count = 1000;  // of every image, on as many levels as ORB-SLAM has
   o.features.levels = 8;
-  o.features.scale = 1.2;
   o.dynamics.filter = FilterKind::paper;
   o.adaptive_keyframes = paper_keyframe_options();
   o.mapping.ba.weights.adaptive = false;

@@ -30,7 +30,7 @@ struct PipelineOptions {
 
 // What the stages are made from.
 struct SlamOptions {
-  OrbOptions features{.count = 900, .scale = 1.25, .levels = 7};
+  OrbOptions features{.count = 900, .levels = 7};
   DepthOptions depth;
   SensorNoise noise;
   TrackingOptions tracking;
