@@ -46,6 +46,20 @@ std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
   return taken;
 }
 
+// Visits the cells of `marks` of whose 3 x 3 at least kSupport are marked.
+template <class Visit>
+void for_supported(const Image<uint8_t>& marks, const Visit& visit) {
+  for (int y = 1; y + 1 < marks.height(); ++y) {
+    const std::array<const uint8_t*, 3> rows{marks.row(y - 1), marks.row(y), marks.row(y + 1)};
+    for (int x = 1; x + 1 < marks.width(); ++x) {
+      if (rows[1][x] == 0) continue;
+      int support = 0;
+      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
+      if (support >= kSupport) visit(x, y);
+    }
+  }
+}
+
 void clear(Image<float>& image, CellRange range) {
   std::fill_n(image.data() + range.first, range.count, 0.0f);
 }
@@ -247,24 +261,6 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
         }
       });
 }
-
-namespace {
-
-// Cells of `marks` with kSupport others of 3 x 3, itself among them.
-template <class Visit>
-void for_supported(const Image<uint8_t>& marks, const Visit& visit) {
-  for (int y = 1; y + 1 < marks.height(); ++y) {
-    const std::array<const uint8_t*, 3> rows{marks.row(y - 1), marks.row(y), marks.row(y + 1)};
-    for (int x = 1; x + 1 < marks.width(); ++x) {
-      if (rows[1][x] == 0) continue;
-      int support = 0;
-      for (const uint8_t* row : rows) support += row[x - 1] + row[x] + row[x + 1];
-      if (support >= kSupport) visit(x, y);
-    }
-  }
-}
-
-}  // namespace
 
 // Who comes from where the camera has not looked yet stands in no space seen empty. But what was behind him comes to
 // light where the frame before had a surface: whatever is as far away beside it, no farther than one walks in the time

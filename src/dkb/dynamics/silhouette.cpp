@@ -183,11 +183,10 @@ void add_body(const Image<float>& grid, const Image<float>& jump, const CellRang
     const int i = reached[k];
     const auto here = static_cast<size_t>(i);
     const uint8_t owner = owners[here];
-    const int u = i % width, v = i / width;
-    const bool in_ring = u == 0 || v == 0 || u + 1 == width || v + 1 == height;
-    if (owner == object) --waiting, body(box.x0 + u - 1, box.y0 + v - 1) = 255;
+    if (owner == object) --waiting, body(box.x0 + i % width - 1, box.y0 + i / width - 1) = 255;
     for (const int step : beside) {
-      if (in_ring && (i + step < 0 || i + step >= width * height)) continue;
+      // A step to the left or right out of the ring ends in the ring, whose cells are given out.
+      if (i + step < 0 || i + step >= width * height) continue;
       const auto n = static_cast<size_t>(i + step);
       if (owners[n] != nobody || !joined(depths[here], depths[n], jumps[here], jumps[n])) continue;
       if (owner == object && !near_layer(depths[n])) continue;
