@@ -271,14 +271,26 @@ void MotionSegmenter::find_vacated() {
   const int width = depth.width(), height = depth.height();
   rays_.project(previous_->depth, kTooNear, current_->cam_from_world * previous_->cam_from_world.inverse(),
                 rays_.all_cells(), projection_, simd_);
+  for (size_t first = 0; first < vacated_.size(); first += kBlock) {
+    const size_t count = std::min(kBlock, vacated_.size() - first);
+    const int32_t* const cells = projection_.cell.data() + first;
+    for (size_t i = 0; i < count; ++i)
+      there_.nearest[i] = current_->nearest.data()[static_cast<size_t>(std::max(cells[i], 0))];
+    run_vectorised(
+        simd_, [count, cells, before = previous_->depth.data() + first, z = projection_.depth.data() + first,
+                nearest = there_.nearest.data(), vacated = vacated_.data() + first, noise = noise_]() DKB_KERNEL_BODY {
+          for (size_t i = 0; i < count; ++i) {
+            const float tolerance = static_cast<float>(noise.surface_tolerance(z[i]));
+            vacated[i] = (cells[i] >= 0) & (before[i] > 0) & (z[i] + tolerance < nearest[i]) ? 1 : 0;
+          }
+        });
+  }
   for (size_t i = 0; i < vacated_.size(); ++i) {
-    vacated_.data()[i] = 0;
-    if (projection_.cell[i] < 0 || !(previous_->depth.data()[i] > 0)) continue;
+    if (vacated_.data()[i] == 0) continue;
     const auto at = static_cast<size_t>(projection_.cell[i]);
     const float z = projection_.depth[i], near = current_->nearest.data()[at], far = current_->farthest.data()[at];
-    if (!(far > 0) || near <= z) continue;
     const auto tolerance = static_cast<float>(std::max(noise_.surface_tolerance(z), noise_.surface_tolerance(near)));
-    vacated_.data()[i] = z + tolerance + kSlope * (far - near) < near ? 1 : 0;
+    vacated_.data()[i] = far > 0 && z + tolerance + kSlope * (far - near) < near ? 1 : 0;
   }
   const double reach = kWalk * (current_->time - previous_->time) * camera_.fx / options_.cell;  // [cells] at 1 m
   for_supported(vacated_, [&](int x, int y) {
