@@ -264,7 +264,7 @@ TEST(PeopleControl, BoxesBesideThePeopleAreNoticed) {
   const PeopleRun run(temp / "out", {"--detector", "file", "--boxes", temp / "boxes.txt"});
   EXPECT_GT(run.ape, 0.012) << "[m]; beyond what right boxes may leave";
   EXPECT_GT(run.features.leak, 0.15);
-  EXPECT_GE(run.map_points_on_people, 40) << "twice what right boxes may leave";
+  EXPECT_GT(run.map_points_on_people, 33) << "right boxes may leave 20, and three standard deviations of a count";
 }
 
 TEST(PeopleControl, MasksOfEarlierFramesAreNoticed) {
