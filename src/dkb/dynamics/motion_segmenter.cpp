@@ -35,7 +35,7 @@ constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a sti
 constexpr float kStill = -0.3f;                       // below it nothing speaks for motion
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
-constexpr double kWalk = 1.5;    // [m/s] somebody walks
+constexpr double kWalk = 1.5;    // [m/s] people walk at their ease (1.3 to 1.5: Bohannon, Age and Ageing 1997)
 constexpr size_t kBlock = 640;   // [cells] worked at together
 
 template <class T>
@@ -285,6 +285,7 @@ void MotionSegmenter::find_vacated() {
           }
         });
   }
+  // Few are left for the whole margin, which asks for more than one gathers for all.
   for (size_t i = 0; i < vacated_.size(); ++i) {
     if (vacated_.data()[i] == 0) continue;
     const auto at = static_cast<size_t>(projection_.cell[i]);
@@ -373,8 +374,7 @@ void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   for (int y = 0; y < bodies.cells.height(); ++y)
     for (int x = 0; x < bodies.cells.width(); ++x) {
       if (bodies.cells(x, y) == 0) continue;
-      const auto cell_of = [&](int v) { return (v * bodies.cell + bodies.cell / 2) / options_.cell; };
-      const int u = cell_of(x), v = cell_of(y);
+      const int u = row_at_middle(x, bodies.cell, options_.cell), v = row_at_middle(y, bodies.cell, options_.cell);
       if (score.contains(u, v)) score(u, v) = std::max(score(u, v), kMayMove);
     }
 }

@@ -324,15 +324,19 @@ TEST(MotionSegmenter, FindsWhoWalksWhereTheCameraHasNotLookedYet) {
       });
 }
 
+// By the box of what the truth marks.
+Silhouettes boxed_in(const World& world, const Picture& p) {
+  const Detection box{"person", region_boxes(p.truth, 100).front(), 1};
+  return silhouettes(p.image.depth, std::vector{box}, world.camera, {});
+}
+
 TEST(MotionSegmenter, WhoStandsInABoxFromTheStartStaysMarked) {
   const World world;
   MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 60; ++f) {
     const Picture p = world.render(f, {box_at(0)});
     segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
-    const Detection box{"person", region_boxes(p.truth, 100).front(), 1};
-    const Silhouettes left =
-        without_still(silhouettes(p.image.depth, std::vector{box}, world.camera, {}), segmenter.still());
+    const Silhouettes left = without_still(boxed_in(world, p), segmenter.still());
     segmenter.take_bodies(left.body);
     const Figures figures = judge(left.mask, p.truth);
     EXPECT_GT(figures.covered, 0.9) << f;
@@ -349,8 +353,7 @@ TEST(MotionSegmenter, WhatStoodThereBeforeABoxCameIsNoPartOfIt) {
     segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
     if (f >= 30) {  // a detector takes the pillar for a person
       for (size_t i = 0; i < p.truth.size(); ++i) p.truth.data()[i] = p.image.depth.data()[i] < 2.6f ? 255 : 0;
-      const Detection box{"person", region_boxes(p.truth, 100).front(), 1};
-      const Silhouettes boxed = silhouettes(p.image.depth, std::vector{box}, world.camera, {});
+      const Silhouettes boxed = boxed_in(world, p);
       EXPECT_GT(judge(boxed.body, p.truth).covered, 0.9) << f;
       EXPECT_LT(judge(without_still(boxed, segmenter.still()).mask, p.truth).covered, 0.02) << f;
     }

@@ -9,6 +9,12 @@ namespace dkb {
 // Marks in `into` what `other` marks; an empty `into` takes its shape. Cells of `other` may be of another size.
 void unite(MoverMask& into, const MoverMask& other, int width, int height);
 
+// Of two grids over one image, with cells of `from` and `to` px: the row or column of the second at the middle of row
+// or column `i` of the first.
+inline int row_at_middle(int i, int from, int to) {
+  return (i * from + from / 2) / to;
+}
+
 // Grows the marked area by `radius` cells in all eight directions.
 void dilate(MoverMask& mask, int radius);
 

@@ -197,6 +197,31 @@ void add_body(const Image<float>& grid, const Image<float>& jump, const CellRang
   }
 }
 
+// Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not. What
+// is too near for the camera has no depth at all, and in a box that is the object.
+void add_holes(const Image<float>& grid, const Image<uint8_t>& mine, const CellRange& range, Image<uint8_t>& mask) {
+  constexpr int kAround = 3;  // [cells] to all sides that a hole's neighbours lie
+  // Known cells of each column around the row at work: those of the object less the others.
+  std::vector<int> sides(static_cast<size_t>(range.x1 - range.x0) + 2 * kAround);
+  const auto add_row = [&](int v, int sign) {
+    if (v < range.y0 || v >= range.y1) return;
+    int* const side = sides.data() + kAround;
+    const float* const known = grid.row(v) + range.x0;
+    const uint8_t* const object = mine.row(v) + range.x0;
+    for (int k = 0; k < range.x1 - range.x0; ++k) side[k] += known[k] > 0 ? (object[k] != 0 ? sign : -sign) : 0;
+  };
+  for (int v = range.y0; v < range.y0 + kAround; ++v) add_row(v, 1);
+  for (int y = range.y0; y < range.y1; ++y) {
+    add_row(y + kAround, 1);
+    add_row(y - kAround - 1, -1);
+    for (int x = range.x0; x < range.x1; ++x) {
+      if (grid(x, y) > 0 || mine(x, y)) continue;
+      const int* const first = sides.data() + (x - range.x0);
+      if (std::accumulate(first, first + 2 * kAround + 1, 0) >= 0) mask(x, y) = 255;
+    }
+  }
+}
+
 }  // namespace
 
 Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
@@ -208,8 +233,6 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
   const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
   mask.cells = made.body.cells = Image<uint8_t>(columns, rows);
   constexpr float kNotLookedAt = -1;
-  constexpr int kAround = 3;  // [cells] to all sides that a hole's neighbours lie
-  std::vector<int> sides;
   Image<float> grid(columns, rows, kNotLookedAt), jump(columns, rows);
   for (const Detection& detection : boxes) {
     const CellRange range = cells_of(scaled(detection.box, 1 + 2 * kWidening), kMaskCell, columns, rows);
@@ -228,42 +251,22 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
     }
     Image<uint8_t> mine(columns, rows);
     Surfaces surfaces{grid, jump, range};
-    const auto near_layer = [&](int x, int y, double tolerance) {
-      return grid(x, y) > 0 && std::fabs(grid(x, y) - layer) <= static_cast<float>(tolerance);
+    const auto near_layer = [&](float z, double tolerance) {
+      return z > 0 && std::fabs(z - layer) <= static_cast<float>(tolerance);
     };
-    const auto within_depth = [&](int x, int y) { return near_layer(x, y, options.max_depth_offset); };
+    const auto within_depth = [&](int x, int y) { return near_layer(grid(x, y), options.max_depth_offset); };
     std::vector<Cell> seeds;
     for (int y = core.y0; y < core.y1; ++y)
       for (int x = core.x0; x < core.x1; ++x)
-        if (near_layer(x, y, std::min(kRelativeLayer * layer, kHalfDepth))) seeds.push_back({x, y});
+        if (near_layer(grid(x, y), std::min(kRelativeLayer * layer, kHalfDepth))) seeds.push_back({x, y});
     for (const Cell& c : surfaces.grow(std::move(seeds), within_depth)) mine(c.x, c.y) = 255;
     add_limbs(surfaces, within_depth, mine);
     const double half_depth = std::min(kHalfDepth, options.max_depth_offset);
     add_body(
         grid, jump, cells_of(detection.box, kMaskCell, columns, rows),
         cells_of(scaled(detection.box, kMiddle), kMaskCell, columns, rows),
-        [&](float z) { return std::abs(z - layer) <= half_depth; }, made.body.cells);
-    // Holes of the depth image: a cell without depth belongs to the object unless most of its known neighbours do not.
-    // What is too near for the camera has no depth at all, and in a box that is the object.
-    sides.assign(static_cast<size_t>(range.x1 - range.x0) + 2 * kAround, 0);
-    // Known cells of each column around the row at work: those of the object less the others.
-    const auto add_row = [&](int v, int sign) {
-      if (v < range.y0 || v >= range.y1) return;
-      int* const side = sides.data() + kAround;
-      const float* const known = grid.row(v) + range.x0;
-      const uint8_t* const object = mine.row(v) + range.x0;
-      for (int k = 0; k < range.x1 - range.x0; ++k) side[k] += known[k] > 0 ? (object[k] != 0 ? sign : -sign) : 0;
-    };
-    for (int v = range.y0; v < range.y0 + kAround; ++v) add_row(v, 1);
-    for (int y = range.y0; y < range.y1; ++y) {
-      add_row(y + kAround, 1);
-      add_row(y - kAround - 1, -1);
-      for (int x = range.x0; x < range.x1; ++x) {
-        if (grid(x, y) > 0 || mine(x, y)) continue;
-        const int* const first = sides.data() + (x - range.x0);
-        if (std::accumulate(first, first + 2 * kAround + 1, 0) >= 0) mask.cells(x, y) = 255;
-      }
-    }
+        [&](float z) { return near_layer(z, half_depth); }, made.body.cells);
+    add_holes(grid, mine, range, mask.cells);
     for (int y = range.y0; y < range.y1; ++y)
       for (int x = range.x0; x < range.x1; ++x)
         if (mine(x, y) || made.body.cells(x, y)) mask.cells(x, y) = 255;
