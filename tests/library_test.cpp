@@ -85,6 +85,22 @@ TEST_F(Library, ARealTimeRunThatIsLateSaysWhatItLeavesOut) {
   EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const Event& e) { return e.kind == Kind::warning; }), 1);
 }
 
+// What is mapped becomes visible with the next frame's beginning, and in real time only if it is done by then.
+TEST_F(Library, AMapSavedInRealTimeHoldsWhatShouldHaveBeenMappedByNow) {
+  Options options;
+  options.realtime = true;
+  Slam slam = slam_with(nullptr, options);
+  const std::string file = testing::TempDir() + "dkb_saved_in_real_time.dkb";
+  for (const Frame& frame : world.walk(0, 4)) slam.process(frame);  // the first keyframe is due after 0.1 s
+  EXPECT_EQ(slam.statistics().keyframes, 0);
+  slam.save_map(file);
+  EXPECT_EQ(slam.statistics().keyframes, 1);
+  Slam other = slam_with();
+  other.load_map(file);
+  EXPECT_EQ(other.statistics().keyframes, 1);
+  std::filesystem::remove(file);
+}
+
 TEST_F(Library, ARunThatIsNotInRealTimeLeavesNothingOutHoweverLate) {
   Slam slam = slam_with();
   for (const Frame& frame : rush(world)) EXPECT_GT(slam.process(frame).features.size(), 700U);

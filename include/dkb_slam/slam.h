@@ -115,7 +115,8 @@ class DKB_SLAM_API Slam {
   /// Every frame's result then says which of the keyframe tests said what, with their numbers.
   void explain_keyframes(bool on);
 
-  /// Writes the map as it is now, by a temporary file and a rename. Throws InputError when it cannot.
+  /// Writes the map as it is now, by a temporary file and a rename. A real-time run waits for what mapping should have
+  /// done by now. Throws InputError when it cannot.
   void save_map(const std::filesystem::path& path) const;
   /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Throws
   /// InputError, and leaves all as it is, when the file is broken or was made with another camera or pyramid.

@@ -19,7 +19,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   const Expectation expected = expect(frame);
   scenes_.begin(next_frame_, frame, std::move(detections), expected, std::exchange(outcome_, std::nullopt));
   const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
-  result.waiting_ms += take_due_map();  // as late as it may come: nothing before needs it
+  result.waiting_ms += take_due_map(!options_.pipeline.realtime);  // as late as it may come: nothing before needs it
   follow_motion(scene);
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene);

@@ -47,6 +47,10 @@ class Pipeline {
   void check(const Frame& frame) const;
   // A frame that fits. Throws InputError for what failed in a stage's thread: the pipeline is of no use after that.
   FrameResult process(const Frame& frame);
+  // Waits for what mapping should have done by now, as a dataset run does at each frame anyway.
+  void catch_up() {
+    if (options_.pipeline.realtime) take_due_map(true);
+  }
   // Waits for all outstanding work and takes its result.
   void finish();
 
@@ -70,7 +74,7 @@ class Pipeline {
   void shed_load();
   bool late_for_features() const { return load_ && load_->level() >= LoadShedding::kFeatures; }
   void follow_motion(const Scene& scene);  // since the last keyframe
-  double take_due_map();
+  double take_due_map(bool wait);
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
   int features_wanted() const;

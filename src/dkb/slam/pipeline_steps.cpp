@@ -93,14 +93,14 @@ void Pipeline::shed_load() {
 }
 
 // Returns the time that it took [ms].
-double Pipeline::take_due_map() {
+double Pipeline::take_due_map(bool wait) {
   const Stopwatch watch;
-  const bool wait = !options_.pipeline.realtime;
   const auto view = mapping_.take_due(next_frame_, wait);
   if (view) take_view(*view);
   if (!localize_only_) {
     const bool has_time = !load_ || load_->level() < LoadShedding::kLoops;
-    if (view && has_time && mapping_.outstanding_corrections() == 0) loop_.offer(*view, next_frame_, rate_, !wait);
+    if (view && has_time && mapping_.outstanding_corrections() == 0)
+      loop_.offer(*view, next_frame_, rate_, options_.pipeline.realtime);
     correct(loop_.take_due(next_frame_, wait), mapping_due());
   }
   const double ms = watch.ms();

@@ -155,6 +155,7 @@ void Slam::explain_keyframes(bool on) {
 }
 
 void Slam::save_map(const std::filesystem::path& path) const {
+  if (!impl_->failure) impl_->guarded([&] { impl_->pipeline->catch_up(); });
   dkb::save_map(path, *impl_->shared_record()->map().map(), impl_->map_context());
 }
 
