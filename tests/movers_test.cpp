@@ -69,7 +69,8 @@ FollowedScene follow(const std::vector<SimulatedFrame>& frames, const CameraMode
       unite(mask, MoverMask{1, f.mask}, camera.width, camera.height);
     else
       mask = silhouettes(f.image.depth, boxes, camera, {}).mask;
-    for (Mover& m : tracker.update(f.image.timestamp, f.image.depth, mask, boxes, f.world_from_cam))
+    for (Mover& m : tracker.update(tracker.look(f.image.timestamp, f.image.depth, mask, boxes, f.world_from_cam),
+                                   f.image.depth, f.world_from_cam))
       scene.estimate.push_back({f.image.timestamp, f.stamp, std::move(m)});
     scene.cameras.push_back(f.world_from_cam.translation);
     scene.stamps.push_back(f.image.timestamp);

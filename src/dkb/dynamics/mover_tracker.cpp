@@ -61,28 +61,45 @@ void MoverTracker::predict(double seconds) {
   }
 }
 
-// Tracks whose place is known well enough to tell whose surface is whose.
-std::vector<ExpectedMover> MoverTracker::expected() {
-  std::vector<ExpectedMover> result;
-  expected_.clear();
+void MoverSighting::move_to(const Rigid3& world_from_cam_found) {
+  const Rigid3 found_from_expected = world_from_cam_found * world_from_cam.inverse();
+  world_from_cam = world_from_cam_found;
+  for (MoverObservation& o : observations) {
+    o.position_in_world = found_from_expected * o.position_in_world;
+    for (Eigen::Vector3d& p : o.surface.points_in_world) p = found_from_expected * p;
+  }
+}
+
+MoverSighting MoverTracker::look(double timestamp, const DepthImage& depth, const MoverMask& mask,
+                                 std::span<const Detection> boxes, const Rigid3& world_from_cam_expected) {
+  predict(std::max(0.0, timestamp - time_));
+  time_ = timestamp;
+  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
+  MoverSighting sighting;
+  // Tracks whose place is known well enough to tell whose surface is whose.
+  std::vector<ExpectedMover> expected;
   for (size_t i = 0; i < tracks_.size(); ++i) {
     if (time_ - tracks_[i].seen > kClaims) continue;
-    result.push_back({tracks_[i].state.head<3>(), tracks_[i].covariance.topLeftCorner<3, 3>()});
-    expected_.push_back(i);
+    expected.push_back({tracks_[i].state.head<3>(), tracks_[i].covariance.topLeftCorner<3, 3>()});
+    sighting.tracks.push_back(i);
   }
-  return result;
+  sighting.observations = observer_.observe(depth, mask, boxes, world_from_cam_expected, expected);
+  sighting.world_from_cam = world_from_cam_expected;
+  return sighting;
 }
 
 // Index of the observation of each track, -1 = none.
-std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& observations,
-                                         const Eigen::Matrix3d& noise, const Eigen::Vector3d& down) const {
+std::vector<int> MoverTracker::associate(const MoverSighting& sighting, const Eigen::Matrix3d& noise,
+                                         const Eigen::Vector3d& down) const {
+  const std::vector<MoverObservation>& observations = sighting.observations;
+  const auto track_of = [&](const MoverObservation& o) { return sighting.tracks[static_cast<size_t>(o.expected)]; };
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(tracks_.size()),
                                                    static_cast<Eigen::Index>(observations.size()), kUnassigned);
   Eigen::MatrixXd boxes_alone = cost;
   const double noise_determinant = noise.determinant();
   std::vector<char> has_region(tracks_.size(), 0);
   for (const MoverObservation& o : observations)
-    if (o.expected >= 0) has_region[expected_[static_cast<size_t>(o.expected)]] = 1;
+    if (o.expected >= 0) has_region[track_of(o)] = 1;
   for (size_t i = 0; i < tracks_.size(); ++i) {
     const Track& t = tracks_[i];
     const Eigen::Matrix3d spread = t.covariance.topLeftCorner<3, 3>() + noise;
@@ -93,8 +110,7 @@ std::vector<int> MoverTracker::associate(const std::vector<MoverObservation>& ob
     const double box_weight = kBoxWeight * std::max(0.0, 1 - unseen / kBoxMemory);
     for (size_t k = 0; k < observations.size(); ++k) {
       const MoverObservation& o = observations[k];
-      const bool region = o.class_name.empty(),
-                 own = o.expected >= 0 && expected_[static_cast<size_t>(o.expected)] == i;
+      const bool region = o.class_name.empty(), own = o.expected >= 0 && track_of(o) == i;
       if (region && !own && (o.expected >= 0 || has_region[i])) continue;
       if (!o.has_depth && (t.id == 0 || unseen > kBoxMemory || !left_of(t.box, o.box))) continue;
       const Eigen::Vector3d off = place(o, t) - t.state.head<3>();
@@ -143,19 +159,15 @@ void MoverTracker::correct(const MoverObservation& o, Eigen::Matrix3d noise, Tra
   if (++t->observations >= kMinObservations && t->id == 0) t->id = ++last_id_;
 }
 
-std::vector<Mover> MoverTracker::update(double timestamp, const DepthImage& depth, const MoverMask& mask,
-                                        std::span<const Detection> boxes, const Rigid3& world_from_cam) {
-  predict(std::max(0.0, timestamp - time_));
-  time_ = timestamp;
+std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage& depth, const Rigid3& world_from_cam) {
   world_from_cam_ = world_from_cam;
-  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
-
-  const std::vector<MoverObservation> observations = observer_.observe(depth, mask, boxes, world_from_cam, expected());
+  sighting.move_to(world_from_cam);
+  const std::vector<MoverObservation>& observations = sighting.observations;
   const Eigen::Vector3d sd(kSdAcross, kSdDown, kSdDeep);
   const Eigen::Matrix3d axes = world_from_cam.matrix3();
   const Eigen::Matrix3d noise = axes * sd.cwiseAbs2().asDiagonal() * axes.transpose();
 
-  const std::vector<int> observation_of = associate(observations, noise, axes.col(1));
+  const std::vector<int> observation_of = associate(sighting, noise, axes.col(1));
 
   std::vector<Mover> movers;
   std::vector<char> taken(observations.size(), 0);

@@ -11,6 +11,16 @@
 
 namespace dkb {
 
+// What of one frame may be movers, seen from where the camera was expected to be.
+struct MoverSighting {
+  std::vector<MoverObservation> observations;
+  std::vector<size_t> tracks;  // that were told to the observer: MoverObservation::expected is an index of these
+  Rigid3 world_from_cam;       // as expected
+
+  // The same from where the camera is.
+  void move_to(const Rigid3& world_from_cam_found);
+};
+
 // Follows movers through a sequence: obstacles with a place, a velocity and a lasting identity. Observations of
 // MoverObserver go to constant-velocity Kalman filters in the world by the smallest total cost over all of them, so
 // that identities last when one mover passes behind another. Ids count from 1 in the order of confirmation.
@@ -21,12 +31,15 @@ class MoverTracker {
                         const MoverObserverOptions& options = {})
       : camera_(camera), noise_(noise), observer_(camera, options) {}
 
-  // The movers that are seen in the frame, by id; also those who have moved and stand still, for as long as nothing is
-  // seen through where they are, and those of whom but a box without depth is left. `mask`: silhouettes of the boxes,
-  // regions that move, or both; empty when nothing moves. `boxes` may be empty: regions of the mask are the objects
-  // then. `timestamp` [s] must not go back. Frames whose pose is unknown are left out by the caller.
-  std::vector<Mover> update(double timestamp, const DepthImage& depth, const MoverMask& mask,
-                            std::span<const Detection> boxes, const Rigid3& world_from_cam);
+  // Looks for movers in a frame whose pose may be but expected. `mask`: silhouettes of the boxes, regions that move, or
+  // both; empty when nothing moves. `boxes` may be empty: regions of the mask are the objects then. `timestamp` [s]
+  // must not go back.
+  MoverSighting look(double timestamp, const DepthImage& depth, const MoverMask& mask, std::span<const Detection> boxes,
+                     const Rigid3& world_from_cam_expected);
+  // The movers that are seen in the frame looked at last, by id; also those who have moved and stand still, for as long
+  // as nothing is seen through where they are, and those of whom but a box without depth is left. Frames whose pose
+  // remains unknown are left out by the caller.
+  std::vector<Mover> update(MoverSighting sighting, const DepthImage& depth, const Rigid3& world_from_cam);
 
   // The estimated world has moved under the camera (a loop was closed): what was at p is at new_from_old * p.
   void rebase(const Rigid3& new_from_old);
@@ -53,8 +66,7 @@ class MoverTracker {
     int observations = 0;
   };
   void predict(double seconds);
-  std::vector<ExpectedMover> expected();
-  std::vector<int> associate(const std::vector<MoverObservation>& observations, const Eigen::Matrix3d& noise,
+  std::vector<int> associate(const MoverSighting& sighting, const Eigen::Matrix3d& noise,
                              const Eigen::Vector3d& down) const;
   Eigen::Vector3d place(const MoverObservation& observation, const Track& track) const;
   bool stands_behind(const Track& track, const DepthImage& depth) const;
@@ -65,7 +77,6 @@ class MoverTracker {
   SensorNoise noise_;
   MoverObserver observer_;
   std::vector<Track> tracks_;
-  std::vector<size_t> expected_;  // the tracks that were told to the observer
   double time_ = 0;
   Rigid3 world_from_cam_;
   int last_id_ = 0;

@@ -24,7 +24,8 @@ void add_person(double x, double z, MoverTestScene* scene, bool with_box = true)
 
 std::vector<Mover> show(MoverTracker* tracker, double time, const MoverTestScene& scene,
                         const Rigid3& world_from_cam = {}) {
-  return tracker->update(time, scene.depth, scene.mask, scene.boxes, world_from_cam);
+  return tracker->update(tracker->look(time, scene.depth, scene.mask, scene.boxes, world_from_cam), scene.depth,
+                         world_from_cam);
 }
 
 MoverTestScene one_person(double x, double z) {
@@ -86,6 +87,24 @@ void expect_ids_kept_through_a_crossing(bool with_boxes) {
   EXPECT_GT(hidden, 3);
   ASSERT_EQ(movers.size(), 2u);
   for (const Mover& m : movers) EXPECT_EQ(m.id, m.position_in_world.z() < 2.4 ? left_id : right_id);
+}
+
+TEST(MoverTracker, WhatIsSeenFromAnExpectedPoseMovesWithTheOneThatIsFound) {
+  const Rigid3 found(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY())), {1, 2, 3});
+  const Rigid3 expected =
+      found * Rigid3(Eigen::Quaterniond(Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitX())), {0.05, -0.04, 0.03});
+  MoverTracker tracker(MoverTestScene().camera, {}), told(MoverTestScene().camera, {});
+  for (int i = 0; i < 6; ++i) {
+    const MoverTestScene scene = one_person(-0.1 + 0.02 * i, 2);
+    const auto movers =
+        tracker.update(tracker.look(i * kStep, scene.depth, scene.mask, scene.boxes, expected), scene.depth, found);
+    const auto same = show(&told, i * kStep, scene, found);
+    ASSERT_EQ(movers.size(), same.size());
+    if (movers.empty()) continue;
+    EXPECT_EQ(movers[0].id, same[0].id);
+    EXPECT_LT((movers[0].position_in_world - same[0].position_in_world).norm(), 0.02);
+    EXPECT_LT((movers[0].velocity_in_world - same[0].velocity_in_world).norm(), 0.05);
+  }
 }
 
 TEST(MoverTracker, IdsAreKeptThroughACrossing) {

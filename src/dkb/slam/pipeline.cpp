@@ -23,6 +23,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   follow_motion(scene);
   retract_late(scene.late_masks);
   const UsableFeatures usable = usable_features(scene);
+  look_for_movers(scene, expected);
   TrackedFrame tracked = track(scene, usable);
   weigh_evidence(scene, tracked);
   const KeyframeDecision decision = decide(scene, tracked);      // DKB 3.2

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dkb/dense/dense_mapper.h"
-#include "dkb/dynamics/mover_tracker.h"
 #include "dkb/dynamics/point_evidence.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/features/plane_finder.h"
@@ -18,6 +17,7 @@
 #include "dkb/slam/load_shedding.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/mover_stage.h"
 #include "dkb/slam/odometry_frame.h"
 #include "dkb/slam/options.h"
 #include "dkb/slam/readout_calibration.h"
@@ -80,6 +80,7 @@ class Pipeline {
   int features_wanted() const;
   ExtractedFrame extract(const Frame& frame);
   Expectation expect(const Frame& frame) const;
+  void look_for_movers(const Scene& scene, const Expectation& expected);
   TrackedFrame track(const Scene& scene, const UsableFeatures& usable);
   void retract_late(const std::vector<LateMask>& masks);
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
@@ -103,7 +104,7 @@ class Pipeline {
   SceneStage scenes_;
   PointEvidence evidence_;
   ReadoutCalibration readout_;
-  MoverTracker movers_;
+  MoverStage movers_;
   OdometryFrame odometry_;
   std::optional<DenseMapper> dense_;
   std::optional<LoadShedding> load_;  // of a real-time run

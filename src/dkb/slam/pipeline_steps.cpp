@@ -43,7 +43,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
       readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
-      movers_(context.camera, options_.noise),
+      movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
       camera_at_readout_(context.camera),
@@ -183,6 +183,16 @@ void Pipeline::retract_late(const std::vector<LateMask>& masks) {
       tracker_.retract(points);
     }
   }
+}
+
+// The map may have moved since the camera's place was expected.
+void Pipeline::look_for_movers(const Scene& scene, const Expectation& expected) {
+  if (options_.dynamics.filter != FilterKind::standard) return;
+  const std::optional<MotionPrior>& step = scene.step ? scene.step : expected.step;
+  std::optional<Rigid3> world_from_cam;
+  if (const auto& last = tracker_.last_frame(); last && step)
+    world_from_cam = last->cam_from_world.inverse() * step->previous_from_current;
+  movers_.begin(scene, world_from_cam);
 }
 
 TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
@@ -378,9 +388,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     result.inliers = tracked.inliers;
     result.keyframe = decision.insert;
     if (explain_keyframes_) result.keyframe_explanation = explained(decision);
-    if (options_.dynamics.filter == FilterKind::standard)
-      result.movers =
-          movers_.update(frame.image()->timestamp, frame.image()->depth, scene.mask, scene.boxes, world_from_cam);
+    if (options_.dynamics.filter == FilterKind::standard) result.movers = movers_.finish(scene, world_from_cam);
   } else if (tracked.state == TrackingState::lost) {
     odometry_.lost();
   }

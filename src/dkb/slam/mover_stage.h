@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "dkb/dynamics/mover_tracker.h"
+#include "dkb/slam/scene.h"
+#include "dkb/util/side_task.h"
+
+namespace dkb {
+
+// Follows the movers of a frame. It looks for them beside tracking, from where the camera is expected; the pose that
+// tracking finds moves what was seen. Deterministic.
+class MoverStage {
+ public:
+  MoverStage(const Camera& camera, const SensorNoise& noise, bool threaded)
+      : movers_(camera, noise),
+        looking_(
+            "movers", [this] { look(); }, threaded) {}
+
+  // Begins to look at a frame where something moves.
+  void begin(const Scene& scene, const std::optional<Rigid3>& world_from_cam_expected) {
+    looking_.drop();
+    begun_ = world_from_cam_expected && !scene.mask.empty();
+    if (!begun_) return;
+    set_task(scene, *world_from_cam_expected);
+    looking_.begin();
+  }
+  // The movers of that frame; frames that are lost get none.
+  std::vector<Mover> finish(const Scene& scene, const Rigid3& world_from_cam) {
+    if (begun_) {
+      looking_.finish();
+    } else {
+      set_task(scene, world_from_cam);
+      look();
+    }
+    return movers_.update(std::move(sighting_), task_.frame.image()->depth, world_from_cam);
+  }
+  // The estimated world has moved under the camera, between two frames: what was at p is at new_from_old * p.
+  void rebase(const Rigid3& new_from_old) {
+    looking_.drop();
+    movers_.rebase(new_from_old);
+  }
+
+ private:
+  struct Task {
+    Frame frame;
+    MoverMask mask;
+    std::vector<Detection> boxes;
+    Rigid3 world_from_cam;
+  };
+  void set_task(const Scene& scene, const Rigid3& world_from_cam) {
+    task_ = {scene.extracted.frame, scene.mask, scene.boxes, world_from_cam};
+  }
+  void look() {
+    const RgbdImage& image = *task_.frame.image();
+    sighting_ = movers_.look(image.timestamp, image.depth, task_.mask, task_.boxes, task_.world_from_cam);
+  }
+
+  MoverTracker movers_;  // these three belong to looking_ while it is at work
+  Task task_;
+  MoverSighting sighting_;
+  bool begun_ = false;
+  SideTask looking_;  // last: its thread ends first
+};
+
+}  // namespace dkb
