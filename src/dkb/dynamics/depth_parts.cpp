@@ -7,6 +7,18 @@
 
 namespace dkb {
 
+void link_cells(std::span<const float> depth, std::span<const float> jump, size_t step, uint8_t* linked, Simd simd) {
+  if (depth.size() <= step) return;
+  run_vectorised(simd, [d = depth.data(), j = jump.data(), n = depth.size() - step, step, linked]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (size_t i = 0; i < n; ++i) {
+      const float a = d[i], b = d[i + step], low = a < b ? a : b, high = a < b ? b : a;
+      const float allowed = a < b ? j[i] : j[i + step];
+      linked[i] = (low > 0) & (high - low <= allowed);
+    }
+  });
+}
+
 DepthParts::DepthParts(int columns, int rows, Simd simd)
     : columns_(columns),
       rows_(rows),
@@ -14,22 +26,6 @@ DepthParts::DepthParts(int columns, int rows, Simd simd)
       right_(static_cast<size_t>(columns) * static_cast<size_t>(rows)),
       down_(right_.size()),
       run_above_(static_cast<size_t>(columns)) {}
-
-// The last cell of a row and the cells of the last row have links to cells that they have no neighbour in; nobody asks
-// for those.
-void DepthParts::link(std::span<const float> depth, float jump) {
-  const auto link_to = [&](size_t step, uint8_t* linked) {
-    run_vectorised(simd_, [d = depth.data(), n = depth.size() - step, step, jump, linked]() DKB_KERNEL_BODY {
-      DKB_INDEPENDENT_STEPS
-      for (size_t i = 0; i < n; ++i) {
-        const float a = d[i], b = d[i + step], low = a < b ? a : b, high = a < b ? b : a;
-        linked[i] = (low > 0) & (high - low <= jump * low);
-      }
-    });
-  };
-  link_to(1, right_.data());
-  if (rows_ > 1) link_to(static_cast<size_t>(columns_), down_.data());
-}
 
 size_t DepthParts::first_run(size_t run) {
   while (runs_[run].part != run) run = runs_[run].part = runs_[runs_[run].part].part;
@@ -76,8 +72,17 @@ size_t DepthParts::inner_of(const Run& run) const {
   return inner;
 }
 
-std::vector<DepthPart> DepthParts::find(std::span<const float> depth, float jump) {
-  link(depth, jump);
+std::vector<DepthPart> DepthParts::find(std::span<const float> depth, float share) {
+  jump_.resize(depth.size());
+  std::transform(depth.begin(), depth.end(), jump_.begin(), [share](float d) { return share * d; });
+  return find(depth, jump_);
+}
+
+// The last cell of a row and the cells of the last row have links to cells that they have no neighbour in; nobody asks
+// for those.
+std::vector<DepthPart> DepthParts::find(std::span<const float> depth, std::span<const float> jump) {
+  link_cells(depth, jump, 1, right_.data(), simd_);
+  link_cells(depth, jump, static_cast<size_t>(columns_), down_.data(), simd_);
   find_runs(depth);
   std::vector<DepthPart> parts;
   std::vector<size_t> number(runs_.size());  // of the part that a first run begins
