@@ -361,22 +361,28 @@ StillCells MotionSegmenter::still() const {
   StillCells still{options_.cell, {}};
   const Image<float>& scores = score();
   still.kinds = Image<uint8_t>(scores.width(), scores.height());
-  for (size_t i = 0; i < scores.size(); ++i) {
-    if (scores.data()[i] >= kStill) continue;
-    still.kinds.data()[i] = still_.data()[i] >= kThere ? StillCells::witnessed : StillCells::unrefuted;
-  }
+  run_vectorised(simd_, [n = scores.size(), score = scores.data(), there = still_.data(),
+                         kind = still.kinds.data()]() DKB_KERNEL_BODY {
+    DKB_INDEPENDENT_STEPS
+    for (size_t i = 0; i < n; ++i) {
+      const bool stands = score[i] < kStill, seen = there[i] >= kThere;
+      kind[i] = stands ? (seen ? StillCells::witnessed : StillCells::unrefuted) : StillCells::unknown;
+    }
+  });
   return still;
 }
 
 void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   if (!current_) return;
   Image<float>& score = current_->score;
-  for (int y = 0; y < bodies.cells.height(); ++y)
-    for (int x = 0; x < bodies.cells.width(); ++x) {
-      if (bodies.cells(x, y) == 0) continue;
-      const int u = row_at_middle(x, bodies.cell, options_.cell), v = row_at_middle(y, bodies.cell, options_.cell);
-      if (score.contains(u, v)) score(u, v) = std::max(score(u, v), kMayMove);
-    }
+  const std::vector<int> columns = rows_at_middle(bodies.cells.width(), bodies.cell, options_.cell);
+  for (int y = 0; y < bodies.cells.height(); ++y) {
+    const uint8_t* const body = bodies.cells.row(y);
+    const int v = row_at_middle(y, bodies.cell, options_.cell);
+    for (size_t x = 0; x < columns.size(); ++x)
+      if (body[x] != 0 && score.contains(columns[x], v))
+        score(columns[x], v) = std::max(score(columns[x], v), kMayMove);
+  }
 }
 
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "dkb/features/rgbd_features.h"
 #include "dkb/image/image.h"
 
@@ -13,6 +15,13 @@ void unite(MoverMask& into, const MoverMask& other, int width, int height);
 // or column `i` of the first.
 inline int row_at_middle(int i, int from, int to) {
   return (i * from + from / 2) / to;
+}
+
+// The same for the first `count` of them.
+inline std::vector<int> rows_at_middle(int count, int from, int to) {
+  std::vector<int> rows(static_cast<size_t>(count));
+  for (int i = 0; i < count; ++i) rows[static_cast<size_t>(i)] = row_at_middle(i, from, to);
+  return rows;
 }
 
 // Grows the marked area by `radius` cells in all eight directions.

@@ -5,14 +5,16 @@ namespace dkb {
 
 Silhouettes without_still(Silhouettes boxed, const StillCells& still) {
   MoverMask& mask = boxed.mask;
+  const std::vector<int> columns = rows_at_middle(mask.cells.width(), mask.cell, still.cell);
   for (int y = 0; y < mask.cells.height(); ++y) {
     const int v = row_at_middle(y, mask.cell, still.cell);
-    for (int x = 0; x < mask.cells.width(); ++x) {
-      if (mask.cells(x, y) == 0) continue;
-      const int u = row_at_middle(x, mask.cell, still.cell);
-      if (!still.kinds.contains(u, v)) continue;
-      uint8_t& body = boxed.body.cells(x, y);
-      if (still.kinds(u, v) >= (body != 0 ? StillCells::witnessed : StillCells::unrefuted)) mask.cells(x, y) = body = 0;
+    if (v >= still.kinds.height()) break;
+    uint8_t* const marked = mask.cells.row(y);
+    uint8_t* const body = boxed.body.cells.row(y);
+    const uint8_t* const kinds = still.kinds.row(v);
+    for (size_t x = 0; x < columns.size(); ++x) {
+      if (marked[x] == 0 || columns[x] >= still.kinds.width()) continue;
+      if (kinds[columns[x]] >= (body[x] != 0 ? StillCells::witnessed : StillCells::unrefuted)) marked[x] = body[x] = 0;
     }
   }
   return boxed;
