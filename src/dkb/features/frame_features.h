@@ -37,26 +37,26 @@ class FrameFeatures {
 // Those that the extractor found in an image. What it is made of must outlive it.
 class ExtractedFeatures final : public FrameFeatures {
  public:
-  ExtractedFeatures(const std::vector<Keypoint>& as_seen, const std::vector<Descriptor>& descriptors,
-                    const RgbdImage& image, const Camera& camera, const SensorNoise& noise, const DepthOptions& options)
-      : as_seen_(as_seen),
-        descriptors_(descriptors),
+  ExtractedFeatures(const OrbFeatures& orb, const RgbdImage& image, const Camera& camera,
+                    const UndistortionTable& undistort, const SensorNoise& noise, const DepthOptions& options)
+      : orb_(orb),
         image_(image),
         camera_(camera),
         noise_(noise),
-        options_(options) {}
+        options_(options),
+        as_seen_(keypoints_as_seen(orb, image, undistort, camera, noise)) {}
   std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
     return std::make_shared<const RgbdFeatures>(
-        make_rgbd_features(as_seen_, descriptors_, image_, camera_, noise_, velocity, options_));
+        make_rgbd_features(orb_, as_seen_, image_, camera_, noise_, velocity, options_));
   }
 
  private:
-  const std::vector<Keypoint>& as_seen_;
-  const std::vector<Descriptor>& descriptors_;
+  const OrbFeatures& orb_;
   const RgbdImage& image_;
   const Camera& camera_;
   const SensorNoise& noise_;
   const DepthOptions& options_;
+  const std::vector<Keypoint> as_seen_;
 };
 
 }  // namespace dkb

@@ -114,11 +114,9 @@ void OrbExtractor::describe_corners(int level, Worker& worker) {
     corner.octave = static_cast<uint8_t>(level);
     features_.descriptors[at++] = brief_.describe(blurred.row(pixel.y) + pixel.x, pixels.width(), corner.angle);
   }
-  if (*level_done_) (*level_done_)(firsts_[i], std::span(features_.corners).subspan(firsts_[i], corners.size()));
 }
 
-OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& poor, int cell,
-                                  const LevelDone& level_done) {
+OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& poor, int cell) {
   if (image.width() > 65535 || image.height() > 65535)
     throw InputError("feature extraction: the image is " + std::to_string(image.width()) + " x " +
                      std::to_string(image.height()) + " pixels; at most 65535 per side are possible");
@@ -158,7 +156,6 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
   }
   features_.corners.resize(count);
   features_.descriptors.resize(count);
-  level_done_ = &level_done;
   each_level(&OrbExtractor::describe_corners, [] {});
   return std::exchange(features_, {});
 }

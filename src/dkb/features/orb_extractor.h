@@ -3,8 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
-#include <span>
 #include <vector>
 
 #include "dkb/features/corner_spread.h"
@@ -37,18 +35,13 @@ struct OrbOptions {
 // Deterministic: the same image gives the same features, on every processor, with and without a thread beside.
 class OrbExtractor {
  public:
-  // What is done with a level's corners when they are known: the first of them has this place among all. Either thread
-  // calls it, both at a time.
-  using LevelDone = std::function<void(size_t first, std::span<const Corner> corners)>;
-
   // `threaded`: a thread of its own takes a share of the levels.
   explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd(), bool threaded = false);
 
   // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 65535.
   // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
   // image; these get half of the features at most where there are enough others. Empty: no such place.
-  OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1,
-                      const LevelDone& level_done = {});
+  OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1);
   // Features asked for from now on.
   void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
@@ -84,7 +77,6 @@ class OrbExtractor {
   std::vector<GreyImage> blurred_;                                // per level
   std::vector<size_t> firsts_;                                    // of each level in `features_`
   OrbFeatures features_;
-  const LevelDone* level_done_ = nullptr;
 
   LevelStep step_ = nullptr;
   std::atomic<int> next_level_ = 0;    // that nobody works at

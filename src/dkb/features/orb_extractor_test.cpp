@@ -214,20 +214,6 @@ TEST(OrbExtractor, ReusedObjectsGiveTheSameAsFreshOnes) {
   expect_equal(reused.extract(second), fresh.extract(second));
 }
 
-TEST(OrbExtractor, TellsOfEachLevelsCornersOnceTheyAreKnown) {
-  const GreyImage image = noise_image(320, 240, 5);
-  for (const bool threaded : {false, true}) {
-    OrbExtractor extractor({}, best_simd(), threaded);
-    std::vector<std::pair<float, float>> told(static_cast<size_t>(extractor.options().count));
-    const OrbFeatures features = extractor.extract(image, {}, 1, [&](size_t first, std::span<const Corner> corners) {
-      for (const Corner& c : corners) told.at(first++) = {c.x, c.y};
-    });
-    ASSERT_GT(features.corners.size(), 300U);
-    for (size_t i = 0; i < features.corners.size(); ++i)
-      ASSERT_EQ(told[i], std::pair(features.corners[i].x, features.corners[i].y)) << i;
-  }
-}
-
 TEST(OrbExtractor, ImagesWithoutCornersOrRoomGiveNone) {
   OrbExtractor extractor;
   EXPECT_TRUE(extractor.extract(GreyImage(640, 480, 90)).corners.empty());

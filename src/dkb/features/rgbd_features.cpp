@@ -129,8 +129,10 @@ Eigen::Vector2f UndistortionTable::operator()(float x, float y) const {
          fy * ((1 - fx) * node[columns_] + fx * node[columns_ + 1]);
 }
 
-void set_as_seen(std::span<const Corner> corners, const RgbdImage& image, const UndistortionTable& undistort,
-                 const CameraModel& camera, const SensorNoise& noise, Keypoint* keypoints) {
+std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
+                                        const UndistortionTable& undistort, const CameraModel& camera,
+                                        const SensorNoise& noise) {
+  std::vector<Keypoint> keypoints(orb.corners.size());
   const CornerDepths depths(image.depth, camera, noise);
   // The images have mostly left the cache by now, and corners lie all over them.
   const auto ask_early = [&image](const Corner& c) {
@@ -140,9 +142,9 @@ void set_as_seen(std::span<const Corner> corners, const RgbdImage& image, const 
     if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
   };
   constexpr size_t kAhead = 12;  // [corners] as measured, docs/decisions.md
-  for (size_t i = 0; i < corners.size(); ++i) {
-    if (i + kAhead < corners.size()) ask_early(corners[i + kAhead]);
-    const Corner& c = corners[i];
+  for (size_t i = 0; i < orb.corners.size(); ++i) {
+    if (i + kAhead < orb.corners.size()) ask_early(orb.corners[i + kAhead]);
+    const Corner& c = orb.corners[i];
     Keypoint& k = keypoints[i];
     k.image_pixel = {c.x, c.y};
     k.pixel = undistort(c.x, c.y);
@@ -162,14 +164,15 @@ void set_as_seen(std::span<const Corner> corners, const RgbdImage& image, const 
       k.colour = {g, g, g};
     }
   }
+  return keypoints;
 }
 
-RgbdFeatures make_rgbd_features(std::vector<Keypoint> as_seen, std::vector<Descriptor> descriptors,
-                                const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
-                                const Vector6d& velocity, const DepthOptions& options) {
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
+                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
+                                const DepthOptions& options) {
   RgbdFeatures result;
   const CornerDepths depths(image.depth, camera, noise);
-  result.descriptors = std::move(descriptors);
+  result.descriptors = orb.descriptors;
   result.keypoints = std::move(as_seen);
   const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
@@ -178,8 +181,9 @@ RgbdFeatures make_rgbd_features(std::vector<Keypoint> as_seen, std::vector<Descr
       options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
                                     vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
   const bool rolling = options.model_rolling_shutter && camera.readout > 0 && velocity.squaredNorm() > 0;
-  for (Keypoint& k : result.keypoints) {
-    const Eigen::Vector2f c = k.image_pixel;
+  for (size_t i = 0; i < orb.corners.size(); ++i) {
+    const Corner& c = orb.corners[i];
+    Keypoint& k = result.keypoints[i];
     float z = k.depth;
     if (moved && z > 0) {
       // Where was this surface point when the depth image was taken? Ask there, and carry the answer over.
@@ -187,8 +191,7 @@ RgbdFeatures make_rgbd_features(std::vector<Keypoint> as_seen, std::vector<Descr
       const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
       if (then.z() > 0.05) {
         const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
-        const float z_then =
-            depths.at(c.x() + static_cast<float>(shift.x()), c.y() + static_cast<float>(shift.y())).own;
+        const float z_then = depths.at(c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y())).own;
         z = z_then > 0 ? static_cast<float>(
                              (rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
                        : 0.0f;
@@ -196,7 +199,7 @@ RgbdFeatures make_rgbd_features(std::vector<Keypoint> as_seen, std::vector<Descr
     }
     if (rolling) {
       const double early =
-          (0.5 - c.y() / camera.height) * camera.readout;  // this row was exposed so long before the middle
+          (0.5 - c.y / camera.height) * camera.readout;  // this row was exposed so long before the middle
       const Eigen::Vector3d seen = camera.unproject(k.pixel.cast<double>(), z > 0 ? z : 1.0);
       const Eigen::Vector3d turned =
           seen + early * (velocity.tail<3>().cross(seen) + (z > 0 ? 1.0 : 0.0) * velocity.head<3>());

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <span>
 #include <vector>
 
 #include "dkb/features/features.h"
@@ -105,14 +104,15 @@ class CornerDepths {
   const Simd simd_;
 };
 
-// Sets as many keypoints as there are corners: these with depth and colour, as a camera that stands still has them.
-void set_as_seen(std::span<const Corner> corners, const RgbdImage& image, const UndistortionTable& undistort,
-                 const CameraModel& camera, const SensorNoise& noise, Keypoint* keypoints);
+// Corners with depth and colour, as a camera that stands still has them.
+std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
+                                        const UndistortionTable& undistort, const CameraModel& camera,
+                                        const SensorNoise& noise);
 // Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen: hand-held
 // Kinects move millimetres between the stamps of colour and depth.
-RgbdFeatures make_rgbd_features(std::vector<Keypoint> as_seen, std::vector<Descriptor> descriptors,
-                                const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
-                                const Vector6d& velocity, const DepthOptions& options);
+RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
+                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
+                                const DepthOptions& options);
 
 // The features of these indices, in this order, with a grid of their own.
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices);

@@ -36,9 +36,8 @@ OrbFeatures corners_at(const std::vector<Eigen::Vector2f>& pixels) {
 
 RgbdFeatures make(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                   const Vector6d& velocity = Vector6d::Zero(), const DepthOptions& options = {}) {
-  std::vector<Keypoint> as_seen(orb.corners.size());
-  set_as_seen(orb.corners, image, UndistortionTable(camera), camera, SensorNoise(), as_seen.data());
-  return make_rgbd_features(as_seen, orb.descriptors, image, camera, SensorNoise(), velocity, options);
+  return make_rgbd_features(orb, keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
+                            camera, SensorNoise(), velocity, options);
 }
 
 // Depth image of the plane normal * point = distance, given in the camera's axes.

@@ -141,12 +141,9 @@ ExtractedFrame Pipeline::extract(const Frame& frame) {
   // When movers took most of the last frame's features, the rest of the image gets its half now.
   const bool crowded = crowded_share_ > 0.5 && !last_mask_.empty();
   extractor_.set_count(features_wanted());
-  ExtractedFrame extracted{next_frame_, frame, {}, std::vector<Keypoint>(static_cast<size_t>(features_wanted()))};
-  const auto see = [&](size_t first, std::span<const Corner> corners) {
-    set_as_seen(corners, *frame.image(), undistort_, context_.camera, options_.noise, &extracted.as_seen[first]);
-  };
-  extracted.orb = extractor_.extract(grey, crowded ? last_mask_.cells : Image<uint8_t>(), last_mask_.cell, see);
-  extracted.as_seen.resize(extracted.orb.corners.size());
+  ExtractedFrame extracted{
+      next_frame_, frame,
+      crowded ? extractor_.extract(grey, last_mask_.cells, last_mask_.cell) : extractor_.extract(grey)};
   record_.add_time("features", watch.ms());
   return extracted;
 }
@@ -202,14 +199,13 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   const Frame& frame = scene.extracted.frame;
   const RgbdImage& image = *frame.image();
   camera_at_readout_.readout = readout_.readout();
-  ExtractedFeatures features(usable.as_seen, usable.descriptors, image, camera_at_readout_, options_.noise,
-                             options_.depth);
+  ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
   ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
   std::optional<ExtractedFeatures> start;
   if (start_)
-    start.emplace(start_->usable.as_seen, start_->usable.descriptors, start_->scene.extracted.image(),
-                  camera_at_readout_, options_.noise, options_.depth);
+    start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,
+                  options_.depth);
   TrackedFrame tracked = tracker_.track({.index = next_frame_,
                                          .timestamp = image.timestamp,
                                          .features = features,

@@ -11,15 +11,16 @@ UsableFeatures usable_features(const Scene& scene) {
   const OrbFeatures& orb = scene.extracted.orb;
   usable.corner.reserve(orb.corners.size());
   usable.motion.reserve(orb.corners.size());
-  usable.as_seen.reserve(orb.corners.size());
-  usable.descriptors.reserve(orb.corners.size());
+  usable.orb.corners.reserve(orb.corners.size());
+  usable.orb.descriptors.reserve(orb.corners.size());
   for (size_t i = 0; i < orb.corners.size(); ++i) {
     if (scene.rejected[i] == FeatureReason::moved) continue;
+    const Corner& corner = orb.corners[i];
     usable.corner.push_back(static_cast<int>(i));
     usable.motion.push_back(scene.rejected[i] == FeatureReason::on_mover ? FeatureMotion::on_mover
                                                                          : FeatureMotion::still);
-    usable.as_seen.push_back(scene.extracted.as_seen[i]);
-    usable.descriptors.push_back(orb.descriptors[i]);
+    usable.orb.corners.push_back(corner);
+    usable.orb.descriptors.push_back(orb.descriptors[i]);
   }
   return usable;
 }

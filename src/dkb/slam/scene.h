@@ -17,7 +17,6 @@ struct ExtractedFrame {
   FrameIndex index = 0;
   Frame frame;
   OrbFeatures orb;
-  std::vector<Keypoint> as_seen;  // its corners with depth, as a camera that stands still has them
 
   const RgbdImage& image() const { return *frame.image(); }
 };
@@ -36,11 +35,11 @@ struct Scene {
 // The corners that tracking may see. Those that a rival filter rejected are gone for good. Those on movers stay,
 // marked: well-established map points may be found there.
 struct UsableFeatures {
-  std::vector<Keypoint> as_seen;
-  std::vector<Descriptor> descriptors;  // per feature, like all that follows
-  std::vector<int> corner;              // its index among all corners of the scene
+  OrbFeatures orb;
+  std::vector<int> corner;  // per feature: its index among all corners of the scene
   std::vector<FeatureMotion> motion;
 };
+// `focal`: the camera's focal length [px].
 UsableFeatures usable_features(const Scene& scene);
 
 // What became of every corner in the end. `tracked.source` are indices of `usable`.

@@ -23,7 +23,6 @@ Scene scene_with(const std::vector<FeatureReason>& rejected) {
     corner.y = 100;
     scene.extracted.orb.corners.push_back(corner);
     scene.extracted.orb.descriptors.push_back({i, 0, 0, 0});
-    scene.extracted.as_seen.emplace_back().image_pixel = {corner.x, corner.y};
   }
   return scene;
 }
@@ -34,9 +33,9 @@ TEST(UsableFeatures, AreAllButThoseThatARivalFilterRejected) {
   const Scene scene = scene_with({kNone, kMoved, kOnMover, kMoved, kNone});
   const UsableFeatures usable = usable_features(scene);
   EXPECT_EQ(usable.corner, (std::vector<int>{0, 2, 4}));
-  ASSERT_EQ(usable.as_seen.size(), 3U);
-  EXPECT_EQ(usable.as_seen[1].image_pixel.x(), 50);
-  EXPECT_EQ(usable.descriptors[2][0], 4U);
+  ASSERT_EQ(usable.orb.corners.size(), 3U);
+  EXPECT_EQ(usable.orb.corners[1].x, 50);
+  EXPECT_EQ(usable.orb.descriptors[2][0], 4U);
   EXPECT_EQ(usable.motion,
             (std::vector<FeatureMotion>{FeatureMotion::still, FeatureMotion::on_mover, FeatureMotion::still}));
 }
