@@ -51,9 +51,10 @@ class BundleAdjuster {
     point_sums_.resize(static_cast<size_t>(kPointStride) * (layout_.points + 1));
     factors_.resize(point_sums_.size());
     pair_sums_.resize(static_cast<size_t>(kPairStride) * (layout_.pairs() + 1));
-    camera_blocks_.resize(kBlockSize * layout_.pattern.rows.size());
-    system_.resize(camera_blocks_.size());
-    gradient_.resize(6 * n);
+    system_.resize(kBlockSize * layout_.pattern.rows.size());
+    camera_sums_.resize(kBlockSize * n);
+    camera_gradient_.resize(6 * n);
+    diagonal_.resize(6 * n);
     camera_step_.resize(6 * n);
     point_step_.resize(state_.points.size());
   }
@@ -136,35 +137,38 @@ class BundleAdjuster {
     return total;
   }
 
-  using Block = Eigen::Map<Matrix6d>;
-  Block diagonal_block(int free) { return Block(camera_blocks_.data() + kBlockSize * layout_.pattern.first[free]); }
-  Eigen::Map<Vector6d> gradient_of(int free) { return Eigen::Map<Vector6d>(gradient_.data() + 6 * free); }
-
   void linearise() {
     std::fill(point_sums_.begin(), point_sums_.end(), 0.0);
-    std::fill(camera_blocks_.begin(), camera_blocks_.end(), 0.0);
     double sums[solver::kPoseSums];
     for (int c = 0; c < layout_.cameras; ++c) {
       const int free = layout_.free_of_camera[c];
       kernels_.ba_linearise(input(c, state_), free < 0, point_sums_.data(), pair_sums_.data(), sums);
       if (free < 0) continue;
-      Block block = diagonal_block(free);
+      Eigen::Map<Matrix6d> block(camera_sums_.data() + kBlockSize * static_cast<size_t>(free));
       const double* h = sums;
       for (int i = 0; i < 6; ++i) {
         for (int j = i; j < 6; ++j) block(i, j) = block(j, i) = *h++;
       }
-      std::copy_n(h, 6, gradient_of(free).data());
+      std::copy_n(h, 6, camera_gradient_.data() + 6 * free);
     }
-    layout_.motions->add(state_.poses, camera_blocks_, gradient_);
   }
 
   // Step of all cameras and points for a damping, and the cost that the quadratic model saves. False: not solvable.
   bool solve(double damping, double& predicted) {
-    system_ = camera_blocks_;
-    for (int i = 0; i < layout_.free_cameras(); ++i) {
-      double* block = system_.data() + kBlockSize * static_cast<size_t>(layout_.pattern.first[i]);
-      for (int k = 0; k < 6; ++k) block[7 * k] += damping * std::max(block[7 * k], kMinDiagonal);
-    }
+    const auto diagonal_block = [this](int free) {
+      return system_.data() + kBlockSize * static_cast<size_t>(layout_.pattern.first[free]);
+    };
+    std::fill(system_.begin(), system_.end(), 0.0);
+    for (int i = 0; i < layout_.free_cameras(); ++i)
+      std::copy_n(camera_sums_.data() + kBlockSize * static_cast<size_t>(i), kBlockSize, diagonal_block(i));
+    gradient_ = camera_gradient_;
+    layout_.motions->add(state_.poses, system_, gradient_);
+    for (int i = 0; i < layout_.free_cameras(); ++i)
+      for (int k = 0; k < 6; ++k) {
+        double& diagonal = diagonal_block(i)[7 * k];
+        diagonal_[6 * static_cast<size_t>(i) + static_cast<size_t>(k)] = std::max(diagonal, kMinDiagonal);
+        diagonal += damping * std::max(diagonal, kMinDiagonal);
+      }
     camera_step_ = gradient_;
     const solver::SchurInput in{layout_.points,
                                 layout_.pair_first.data(),
@@ -182,8 +186,7 @@ class BundleAdjuster {
       for (int k = 0; k < 6; ++k) {
         double& d = camera_step_[6 * i + k];
         d = -d;
-        const double diagonal = std::max(diagonal_block(i)(k, k), kMinDiagonal);
-        predicted += damping * diagonal * d * d - gradient_[6 * i + k] * d;
+        predicted += damping * diagonal_[6 * i + k] * d * d - gradient_[6 * i + k] * d;
       }
     }
     for (int p = 0; p < layout_.points; ++p) predicted += solve_point(p, damping);
@@ -299,9 +302,11 @@ class BundleAdjuster {
   State state_, candidate_;
   std::vector<double> values_;  // observations as arrays
   std::vector<double> point_sums_, pair_sums_, factors_;
-  std::vector<double> camera_blocks_;  // cameras' part of the system, in the layout's pattern
-  std::vector<double> system_;         // the same, damped, with the points eliminated
-  std::vector<double> gradient_;
+  // Of the present state, per free camera: what its observations give its block of the system and the gradient.
+  std::vector<double> camera_sums_, camera_gradient_;
+  // Of one step: the cameras' system in the layout's pattern, damped, with the points eliminated; the gradient; and the
+  // diagonal before damping.
+  std::vector<double> system_, gradient_, diagonal_;
   std::vector<double> camera_step_, point_step_;
 };
 
