@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "dkb/features/vectorised.h"
@@ -30,13 +31,14 @@ constexpr float kPrior = 0.015f;        // nothing moves until something says so
 constexpr float kHolePrior = 0.02f;     // the same where depth is missing
 constexpr float kFullEvidence = 0.05f;  // mean weight around a cell at which one frame says all it can
 
-constexpr float kMotionPerFrame = 0.03f;  // [m] that a surface comes nearer or goes away from frame to frame
 constexpr float kMaxScore = 3.0f, kMinScore = -1.0f;  // bounds of scores: a still cell is convinced sooner than a mover
 constexpr float kStill = -0.3f;                       // below it nothing speaks for motion
 constexpr int kCarryRadius = 2;  // [cells] a mover is sought around where it would be, were it still
 constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
 constexpr double kWalk = 1.5;    // [m/s] people walk at their ease (1.3 to 1.5: Bohannon, Age and Ageing 1997)
-constexpr size_t kBlock = 640;   // [cells] worked at together
+// [m/s] The same along the line of sight, in the mean over all ways that they may go.
+constexpr double kWalkInDepth = 2 / std::numbers::pi * kWalk;
+constexpr size_t kBlock = 640;  // [cells] worked at together
 
 template <class T>
 std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
@@ -188,6 +190,7 @@ void MotionSegmenter::carry_scores(CellRange block) {
   const Rigid3 before_from_now = previous_->cam_from_world * current_->cam_from_world.inverse();
   rays_.project(current_->depth, kTooNear, before_from_now, block, projection_, simd_);
   const double interval = std::max(0.0, current_->time - previous_->time);
+  const auto walked = static_cast<float>(kWalkInDepth * interval);
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
   const auto keep_hole = static_cast<float>(std::exp(-interval / kHoleMemory));
   const Image<float>& before = previous_->depth;
@@ -204,7 +207,7 @@ void MotionSegmenter::carry_scores(CellRange block) {
           const float then = depth_before[at], carried = score_before[at];
           const bool seen = cell >= 0, hole = !(depth[i] > 0);
           const bool too_near = seen & hole & (then < near);
-          const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + kMotionPerFrame);
+          const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + walked);
           const float score_if_near = too_near ? keep_hole * std::max(0.0f, carried) : 0.0f;
           scores[i] = same ? keep * carried : score_if_near;
           knowns[i] = too_near | same ? 1 : 0;
@@ -215,7 +218,7 @@ void MotionSegmenter::carry_scores(CellRange block) {
     if (verdict_[i] == 0) continue;
     const int at = projection_.cell[i];
     const float depth_there = projection_.depth[i];
-    float bound = tolerances[i] + kMotionPerFrame;
+    float bound = tolerances[i] + walked;
     // It has moved: the cell around that fits best in depth.
     const int x = at % before.width(), y = at / before.width();
     for (int v = std::max(0, y - kCarryRadius); v <= std::min(before.height() - 1, y + kCarryRadius); ++v)
@@ -293,11 +296,13 @@ void MotionSegmenter::find_vacated() {
     const auto tolerance = static_cast<float>(std::max(noise_.surface_tolerance(z), noise_.surface_tolerance(near)));
     vacated_.data()[i] = far > 0 && z + tolerance + kSlope * (far - near) < near ? 1 : 0;
   }
-  const double reach = kWalk * (current_->time - previous_->time) * camera_.fx / options_.cell;  // [cells] at 1 m
+  const double interval = std::max(0.0, current_->time - previous_->time);
+  const auto walked = static_cast<float>(kWalkInDepth * interval);
+  const double reach = kWalk * interval * camera_.fx / options_.cell;  // [cells] at 1 m
   for_supported(vacated_, [&](int x, int y) {
     const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
     const int at = projection_.cell[i], u0 = at % width, v0 = at / width;
-    const float z = projection_.depth[i], bound = static_cast<float>(noise_.surface_tolerance(z)) + kMotionPerFrame;
+    const float z = projection_.depth[i], bound = static_cast<float>(noise_.surface_tolerance(z)) + walked;
     const int radius = 1 + static_cast<int>(std::clamp(reach / z, 0.0, static_cast<double>(width)));
     for (int v = std::max(0, v0 - radius); v <= std::min(height - 1, v0 + radius); ++v)
       for (int u = std::max(0, u0 - radius); u <= std::min(width - 1, u0 + radius); ++u)
