@@ -42,6 +42,19 @@ TEST(DepthParts, ACellIsInnerIfAllItsNeighboursAreLinked) {
   EXPECT_EQ(DepthParts(3, 3).find(std::vector<float>(9, 1), 0.05F)[0].inner, 9u) << "outside counts as linked";
 }
 
+TEST(LinkCells, TheNearerOfTwoCellsTellsHowFarApartTheyMayBe) {
+  const std::vector<float> depth = {1, 1.2F, 1, 1.2F, 0, 1}, jump = {0.3F, 0.1F, 0.1F, 0.3F, 1, 1};
+  for (const Simd simd : {Simd::scalar, best_simd()}) {
+    std::vector<uint8_t> linked(6, 7);
+    link_cells(depth, jump, 1, linked.data(), simd);
+    EXPECT_EQ(linked, (std::vector<uint8_t>{1, 0, 0, 0, 0, 7}));
+    link_cells(depth, jump, 2, linked.data(), simd);
+    EXPECT_EQ(linked, (std::vector<uint8_t>{1, 1, 0, 1, 0, 7}));
+    link_cells(depth, jump, 6, linked.data(), simd);  // there is no such neighbour
+    EXPECT_EQ(linked, (std::vector<uint8_t>{1, 1, 0, 1, 0, 7}));
+  }
+}
+
 // The same by a search from neighbour to neighbour.
 std::vector<Cells> flooded(const std::vector<float>& depth, int columns, int rows, float jump) {
   std::vector<bool> seen(depth.size(), false);

@@ -74,7 +74,7 @@ Window window_around(const CellBounds& range, const DepthImage& depth, const Cam
     for (int x = std::max(range.x0 - 1, 0); x < std::min(range.x1 + 1, image_columns); ++x)
       w.depth[w.at(x, y)] = cell_depth(depth, x, y);
   run_vectorised(best_simd(),
-                 [&noise, count, f = camera.fx, from = w.depth.data(), to = w.jump.data()]() DKB_KERNEL_BODY {
+                 [noise, count, f = camera.fx, from = w.depth.data(), to = w.jump.data()]() DKB_KERNEL_BODY {
                    DKB_INDEPENDENT_STEPS
                    for (size_t i = 0; i < count; ++i)
                      to[i] = static_cast<float>(noise.max_depth_jump(static_cast<double>(from[i]), kMaskCell, f));
