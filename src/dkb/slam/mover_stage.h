@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dkb/dynamics/mover_tracker.h"
@@ -21,7 +22,7 @@ class MoverStage {
 
   // Begins to look at a frame where something moves.
   void begin(const Scene& scene, const std::optional<Rigid3>& world_from_cam_expected) {
-    looking_.drop();
+    end_look();
     begun_ = world_from_cam_expected && !scene.mask.empty();
     if (!begun_) return;
     set_task(scene, *world_from_cam_expected);
@@ -30,7 +31,7 @@ class MoverStage {
   // The movers of that frame; frames that are lost get none.
   std::vector<Mover> finish(const Scene& scene, const Rigid3& world_from_cam) {
     if (begun_) {
-      looking_.finish();
+      end_look();
     } else {
       set_task(scene, world_from_cam);
       look();
@@ -39,7 +40,7 @@ class MoverStage {
   }
   // The estimated world has moved under the camera, between two frames: what was at p is at new_from_old * p.
   void rebase(const Rigid3& new_from_old) {
-    looking_.drop();
+    end_look();
     movers_.rebase(new_from_old);
   }
 
@@ -50,6 +51,10 @@ class MoverStage {
     std::vector<Detection> boxes;
     Rigid3 world_from_cam;
   };
+  // Also a frame that was lost is looked at to the end: what is known of movers must not depend on how far it came.
+  void end_look() {
+    if (std::exchange(begun_, false)) looking_.finish();
+  }
   void set_task(const Scene& scene, const Rigid3& world_from_cam) {
     task_ = {scene.extracted.frame, scene.mask, scene.boxes, world_from_cam};
   }
