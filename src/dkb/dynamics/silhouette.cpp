@@ -61,9 +61,8 @@ struct Window {
   }
 };
 
-Window window_around(const CellBounds& range, const DepthImage& depth, const Camera& camera, const SensorNoise& noise) {
-  const int image_columns = (depth.width() + kMaskCell - 1) / kMaskCell,
-            image_rows = (depth.height() + kMaskCell - 1) / kMaskCell;
+Window window_around(const CellBounds& range, int image_columns, int image_rows, const DepthImage& depth,
+                     const Camera& camera, const SensorNoise& noise) {
   Window w{image_columns, image_rows, range, range.x1 - range.x0 + 2, range.y1 - range.y0 + 2, {}, {}, {}, {}};
   const size_t count = static_cast<size_t>(w.columns) * static_cast<size_t>(w.rows);
   w.depth.resize(count);
@@ -263,7 +262,7 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
       return cells_of(scaled(detection.box, share), kMaskCell, columns, rows);
     };
     const CellBounds range = part_of_box(1 + 2 * kWidening), core = part_of_box(kCore);
-    const Window window = window_around(range, depth, camera, noise);
+    const Window window = window_around(range, columns, rows, depth, camera, noise);
     const float layer = object_depth(window, core);
     if (!(layer > 0)) {
       for (int y = range.y0; y < range.y1; ++y)
@@ -272,7 +271,7 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
     }
     const auto half_layer =
         std::min({static_cast<float>(kRelativeLayer) * layer, static_cast<float>(kHalfDepth), reach});
-    std::vector<uint8_t> mine = find_object(window, core, layer, half_layer, reach);
+    const std::vector<uint8_t> mine = find_object(window, core, layer, half_layer, reach);
     add_holes(window, mine, mask.cells);
     std::vector<uint8_t> body(mine.size());
     find_body(window, part_of_box(1), part_of_box(kMiddle), layer, std::min(static_cast<float>(kHalfDepth), reach),

@@ -25,18 +25,17 @@ class MoverStage {
     end_look();
     begun_ = world_from_cam_expected && !scene.mask.empty();
     if (!begun_) return;
-    set_task(scene, *world_from_cam_expected);
+    task_ = {scene.extracted.frame, scene.mask, scene.boxes, *world_from_cam_expected};
     looking_.begin();
   }
   // The movers of that frame; frames that are lost get none.
   std::vector<Mover> finish(const Scene& scene, const Rigid3& world_from_cam) {
-    if (begun_) {
+    const RgbdImage& image = scene.extracted.image();
+    if (begun_)
       end_look();
-    } else {
-      set_task(scene, world_from_cam);
-      look();
-    }
-    return movers_.update(std::move(sighting_), task_.frame.image()->depth, world_from_cam);
+    else
+      sighting_ = movers_.look(image.timestamp, image.depth, scene.mask, scene.boxes, world_from_cam);
+    return movers_.update(std::move(sighting_), image.depth, world_from_cam);
   }
   // The estimated world has moved under the camera, between two frames: what was at p is at new_from_old * p.
   void rebase(const Rigid3& new_from_old) {
@@ -53,10 +52,9 @@ class MoverStage {
   };
   // Also a frame that was lost is looked at to the end: what is known of movers must not depend on how far it came.
   void end_look() {
-    if (std::exchange(begun_, false)) looking_.finish();
-  }
-  void set_task(const Scene& scene, const Rigid3& world_from_cam) {
-    task_ = {scene.extracted.frame, scene.mask, scene.boxes, world_from_cam};
+    if (!std::exchange(begun_, false)) return;
+    looking_.finish();
+    task_.frame = {};  // its images are not kept longer than they are needed
   }
   void look() {
     const RgbdImage& image = *task_.frame.image();
