@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How often, how fast and how rightly is a camera found again in a map? As a Markdown table.
 //
-//   relocalise_bench [--kidnaps N] [--frames N] [--map-from P] [--map-to P] [--elsewhere FOLDER] [--verbose] FOLDER ...
+//   relocalise_bench [--kidnaps N] [--shown N] [--frames N] [--map-from P] [--map-to P] [--motion]
+//                    [--elsewhere FOLDER] [--verbose] FOLDER ...
 //
 // Each FOLDER is in TUM layout with a ground truth. A map is made of its pairs between P and P percent. Then the camera
-// is kidnapped N times: it is shown black, then three frames in a row from anywhere in the sequence (from
+// is kidnapped N times: it is shown black, then three frames (`--shown`) in a row from anywhere in the sequence (from
 // `--elsewhere`, which shows another place with the same camera: there every pose is wrong). Poses are compared with
-// those of the run that made the map; where there is none, with the ground truth, aligned to that run.
+// those of the run that made the map; where there is none, with the ground truth, aligned to that run. `--motion`: with
+// the motion segmentation, for sequences with people.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -22,9 +24,9 @@
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/rgbd_reader.h"
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/image/test_frame.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/image/rgbd_image.h"
+#include "dkb/image/test_frame.h"
 #include "dkb/util/random.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
@@ -35,11 +37,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace dkb;
 
-constexpr size_t kFramesShown = 3;
-
 struct Arguments {
   int kidnaps = 200;
-  size_t frames = 0;
+  size_t shown = 3, frames = 0;
+  bool motion = false;
   double map_from = 0, map_to = 100;  // [%]
   fs::path elsewhere;
   bool verbose = false;
@@ -85,7 +86,7 @@ class Reference {
 struct Score {
   int kidnaps = 0, found = 0, wrong = 0;
   std::vector<double> centimetres, degrees;
-  std::vector<int> frames_needed = std::vector<int>(kFramesShown, 0);
+  std::vector<double> frames_needed;
   std::vector<double> search_ms;
 };
 
@@ -111,7 +112,8 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   const auto share = [&](double percent) {
     return pairs.begin() + static_cast<long>(percent / 100 * static_cast<double>(pairs.size()));
   };
-  Slam mapper(camera, Options(), Detectors::none());
+  const Detectors detectors = arguments.motion ? Detectors() : Detectors::none();
+  Slam mapper(camera, Options(), detectors);
   RgbdReader reader({share(arguments.map_from), share(arguments.map_to)}, camera, {});
   while (const auto frame = reader.next())
     if (frame->image) mapper.process(frame_of(frame->image));
@@ -121,7 +123,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
     if (f.map == 0) first_map.push_back(f);
   const Reference reference(folder, first_map);
 
-  Slam slam(camera, Options(), Detectors::none());
+  Slam slam(camera, Options(), detectors);
   const fs::path file = fs::temp_directory_path() / ("dkb-relocalise-bench-" + std::to_string(getpid()) + ".dkb");
   mapper.save_map(file);
   slam.load_map(file);
@@ -133,9 +135,9 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   Score inside, outside;
   double clock = 0;
   for (int n = 0; n < arguments.kidnaps; ++n) {
-    const size_t start = random.below(static_cast<uint32_t>(shown.size() - kFramesShown + 1));
+    const size_t start = random.below(static_cast<uint32_t>(shown.size() - arguments.shown + 1));
     const auto first = shown.begin() + static_cast<long>(start);
-    RgbdReader frames({first, first + kFramesShown}, camera, {.threaded = false, .probed = 1});
+    RgbdReader frames({first, first + static_cast<long>(arguments.shown)}, camera, {.threaded = false, .probed = 1});
     slam.process(darkness(camera, clock += 1));
     const bool mapped = arguments.elsewhere.empty() && reference.mapped(first->timestamp);
     Score& score = mapped ? inside : outside;
@@ -146,7 +148,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
       const FrameResult result = slam.process(at_time(*frame->image, clock += 1 / camera.fps));
       if (!found) score.search_ms.push_back(result.tracking_ms);
       if (!result.tracked()) continue;
-      if (!found) ++score.frames_needed[frame->index];
+      if (!found) score.frames_needed.push_back(static_cast<double>(frame->index) + 1);
       found = true;
       const std::optional<Rigid3> truth = arguments.elsewhere.empty() ? reference.at(frame->timestamp) : std::nullopt;
       if (!truth) {
@@ -170,12 +172,14 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   const auto row = [&](const char* where, const Score& s) {
     if (s.kidnaps == 0) return;
     fmt::print(
-        "| {} | {} | {} | {} | {} ({:.1f} %) | {} / {} / {} | {} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | {:.1f} / {:.1f} "
+        "| {} | {} | {} | {} | {} ({:.1f} %) | {:.0f} / {:.0f} / {:.0f} | {} | {:.2f} / {:.2f} | {:.2f} / {:.2f} | "
+        "{:.1f} / {:.1f} "
         "|\n",
         folder.filename().string(), where, mapper.statistics().keyframes, s.kidnaps, s.found,
-        100.0 * s.found / s.kidnaps, s.frames_needed[0], s.frames_needed[1], s.frames_needed[2], s.wrong,
-        percentile(s.centimetres, 0.5), percentile(s.centimetres, 1), percentile(s.degrees, 0.5),
-        percentile(s.degrees, 1), percentile(s.search_ms, 0.5), percentile(s.search_ms, 0.95));
+        100.0 * s.found / s.kidnaps, percentile(s.frames_needed, 0.5), percentile(s.frames_needed, 0.95),
+        percentile(s.frames_needed, 1), s.wrong, percentile(s.centimetres, 0.5), percentile(s.centimetres, 1),
+        percentile(s.degrees, 0.5), percentile(s.degrees, 1), percentile(s.search_ms, 0.5),
+        percentile(s.search_ms, 0.95));
     std::fflush(stdout);
   };
   row("mapped", inside);
@@ -192,6 +196,10 @@ Arguments parse(int argc, char** argv) {
     };
     if (word == "--kidnaps")
       arguments.kidnaps = std::stoi(value());
+    else if (word == "--shown")
+      arguments.shown = std::stoul(value());
+    else if (word == "--motion")
+      arguments.motion = true;
     else if (word == "--frames")
       arguments.frames = std::stoul(value());
     else if (word == "--map-from")
@@ -214,7 +222,8 @@ int main(int argc, char** argv) {
   try {
     const Arguments arguments = parse(argc, argv);
     fmt::print(
-        "| sequence | frames from | keyframes | kidnaps | found | in 1 / 2 / 3 frames | wrong | off by, median / "
+        "| sequence | frames from | keyframes | kidnaps | found | with frame, median / p95 / last | wrong | off by, "
+        "median / "
         "largest [cm] | [deg] | search median / p95 [ms] |\n|---|---|---|---|---|---|---|---|---|---|\n");
     for (const fs::path& folder : arguments.folders) measure(folder, arguments);
   } catch (const std::exception& e) {

@@ -5,6 +5,9 @@ add_library(dkb_compile_options INTERFACE)
 target_compile_features(dkb_compile_options INTERFACE cxx_std_20)
 # -ffp-contract=off: the same source gives the same bits whatever the compiler would like to fuse.
 target_compile_options(dkb_compile_options INTERFACE -ffp-contract=off)
+# Nobody asks for errno or for traps of the floating-point unit: square roots and roundings are instructions then, and
+# loops with branches are vectorised. No bit of a result changes.
+target_compile_options(dkb_compile_options INTERFACE "$<BUILD_INTERFACE:-fno-math-errno;-fno-trapping-math>")
 if(DKB_SANITIZE)
   # A null pointer that is used is a crash, which AddressSanitizer tells of: to look for it before each use as well takes
   # a fifth of the build's time.

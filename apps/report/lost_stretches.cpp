@@ -87,6 +87,12 @@ class Judge {
     else if (const auto [turn, pixels] = speed_before(stretch.begin); pixels > kFastShare * limits_.image_width)
       say(stretch, "too fast",
           fmt::format("the camera turned by {:.0f} deg/s before it: {:.0f} px from frame to frame", turn, pixels));
+    else if (const auto alike =
+                 std::count_if(first.begin(), first.end(), [](const FrameRow* r) { return r->ambiguous; });
+             2 * alike > static_cast<long>(first.size()))
+      say(stretch, "a look-alike",
+          fmt::format("{} of its first {} frames show a place of the map or one that looks like it", alike,
+                      first.size()));
     else
       say(stretch, "not recognised",
           fmt::format("{:.0f} features a frame, {} with depth, but only {:.0f} fit the map (at least {})", now.features,

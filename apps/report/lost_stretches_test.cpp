@@ -85,6 +85,11 @@ TEST(LostStretches, WhatIsLeftIsAViewThatTheMapDoesNotKnow) {
   EXPECT_EQ(s.evidence, "1000 features a frame, 80 % with depth, but only 7 fit the map (at least 20)");
 }
 
+TEST(LostStretches, AViewThatMayBeALookAlikeIsNamed) {
+  const LostStretch s = stretch_of([](Rows& rows, size_t i) { rows[i].ambiguous = true; });
+  EXPECT_EQ(s.cause, "a look-alike");
+}
+
 TEST(LostStretches, FramesByAPriorAreAStretchOfTheirOwn) {
   Rows rows;
   for (int i = 0; i < 6; ++i) rows.push_back(good(i));

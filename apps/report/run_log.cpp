@@ -57,6 +57,7 @@ void RunLog::frame(const Frame& frame, const FrameResult& result) {
   row.stamp_ns = result.stamp_ns;
   row.state = result.state;
   row.keyframe = result.keyframe;
+  row.ambiguous = result.ambiguous;
   row.movers = static_cast<uint16_t>(result.movers.size());
   row.inliers = result.inliers;
   row.masked = masked_share(result.mask);

@@ -16,6 +16,7 @@ struct FrameRow {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::initialising;
   bool keyframe = false;
+  bool ambiguous = false;             // lost, before one of two places that look alike
   uint8_t rule = 0;                   // of a keyframe, index into RunLog::rules()
   uint16_t movers = 0;                // as obstacles
   int features = 0;                   // extracted

@@ -134,12 +134,14 @@ struct FrameResult {
   int frame = 0;                                      ///< counts the frames that were accepted, from 0
   int64_t stamp_ns = 0;                               ///< the input's
   TrackingState state = TrackingState::initialising;  ///< what the rest may be used for
+  /// Lost, though the map has a place that looks like this one: it may be another. More views decide.
+  bool ambiguous = false;
   /// The pose. Camera axes: x right, y down, z forward. World: the first tracked camera, or the robot's base there
   /// (Options::base_from_cam). There is a pose when tracked().
   std::optional<Rigid3> world_from_cam;
   std::optional<Rigid3> odom_from_cam;  ///< smooth: does not jump when the map is corrected; steer by this
-  /// Of world_from_cam: right perturbation, [translation m, rotation rad]. The frame's in the map, and the map's own there
-  /// against the world's origin; a map that was loaded is taken for the truth.
+  /// Of world_from_cam: right perturbation, [translation m, rotation rad]. The frame's in the map, and the map's own
+  /// there against the world's origin; a map that was loaded is taken for the truth.
   std::optional<Matrix6d> covariance;
   Rigid3 world_from_odom;               ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
   int inliers = 0;                      ///< map points that the pose rests on

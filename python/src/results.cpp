@@ -128,6 +128,9 @@ frame a to frame b. Camera axes: x right, y down, z forward. World: the first tr
       .def_property_readonly("odom_from_cam", pose(&FrameResult::odom_from_cam),
                              "float64 [4, 4] or None: smooth, does not jump when the map is corrected; steer by this.")
       .def_property_readonly(
+          "ambiguous", [](const PyResult& p) { return p.r.ambiguous; },
+          "bool: lost, though the map has a place that looks like this one: it may be another. More views decide.")
+      .def_property_readonly(
           "world_from_odom", [](const PyResult& p) { return pose_array(p.r.world_from_odom); },
           "float64 [4, 4]: takes the jumps; world_from_cam = world_from_odom @ odom_from_cam.")
       .def_property_readonly(

@@ -33,10 +33,10 @@ class ImageAppearanceTest : public ::testing::Test {
         chosen = &c, descriptor = features.descriptors[i];
     }
   }
-  std::optional<bool> same_in(const RgbdImage& seen, double depth = 2) const {
+  Look look_in(const RgbdImage& seen, double depth = 2) const {
     const UndistortionTable undistort(camera);
-    ImageAppearance appearance(seen, undistort, {});
-    return appearance.same({chosen->x, chosen->y}, depth, chosen->octave, descriptor);
+    ImageAppearance appearance(seen, undistort, {}, {});
+    return appearance.look({chosen->x, chosen->y}, depth, chosen->octave, descriptor);
   }
 
   Camera camera;
@@ -48,16 +48,16 @@ class ImageAppearanceTest : public ::testing::Test {
 
 TEST_F(ImageAppearanceTest, APlaceThatLooksAsItDidIsTheSame) {
   ASSERT_NE(chosen, nullptr);
-  EXPECT_EQ(same_in(image), true);
+  EXPECT_EQ(look_in(image), Look::same);
 }
 
 TEST_F(ImageAppearanceTest, AnotherPictureAtItsPlaceIsAnother) {
   ASSERT_NE(chosen, nullptr);
   int different = 0, told = 0;
   for (uint64_t seed = 2; seed < 12; ++seed) {
-    const auto same = same_in(wall(seed));
-    told += same.has_value();
-    different += same == false;
+    const Look look = look_in(wall(seed));
+    told += look != Look::unknown;
+    different += look == Look::other;
   }
   EXPECT_GE(told, 5);
   EXPECT_GT(different, 0.8 * told) << "pictures of blocks on one grid may look alike by chance";
@@ -65,19 +65,19 @@ TEST_F(ImageAppearanceTest, AnotherPictureAtItsPlaceIsAnother) {
 
 TEST_F(ImageAppearanceTest, WhatIsHiddenIsNotToldAndWhatIsSeenThroughIsGone) {
   ASSERT_NE(chosen, nullptr);
-  EXPECT_EQ(same_in(image, 2.2), std::nullopt) << "something stands 9% before it";
-  EXPECT_EQ(same_in(image, 1.8), false) << "what is seen lies 11% behind it";
-  EXPECT_EQ(same_in(image, 2.1), true) << "5% are within the gate";
+  EXPECT_EQ(look_in(image, 2.2), Look::unknown) << "something stands 20 cm before it";
+  EXPECT_EQ(look_in(image, 1.8), Look::gone) << "what is seen lies 20 cm behind it";
+  EXPECT_EQ(look_in(image, 2.05), Look::same) << "within the tolerance of a surface, 5.6 cm";
   RgbdImage blind = image;
   blind.depth = DepthImage(320, 240);
-  EXPECT_EQ(same_in(blind), std::nullopt) << "no depth";
+  EXPECT_EQ(look_in(blind), Look::unknown) << "no depth";
 }
 
 TEST_F(ImageAppearanceTest, PlacesOutsideTheImageAreNotTold) {
   const UndistortionTable undistort(camera);
-  ImageAppearance appearance(image, undistort, {});
+  ImageAppearance appearance(image, undistort, {}, {});
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(-5, 100), {400, 100}, {100, -1}, {100, 300}, {1e12, -1e12}})
-    EXPECT_EQ(appearance.same(pixel, 2, 0, {}), std::nullopt);
+    EXPECT_EQ(appearance.look(pixel, 2, 0, {}), Look::unknown);
 }
 
 }  // namespace

@@ -83,8 +83,7 @@ std::optional<DetectionStage::Answer> DetectionStage::take(FrameIndex index) {
   return answer;
 }
 
-std::vector<DueDetections> DetectionStage::exchange(FrameIndex index, const Frame& frame) {
-  offer(index, frame);
+std::vector<DueDetections> DetectionStage::take_due(FrameIndex index) {
   std::vector<DueDetections> due;
   const Stopwatch watch;
   const bool waits = stage_.must_wait(index);

@@ -32,8 +32,12 @@ class DetectionStage {
   DetectionStage(Detector& detector, const Camera& camera, const DetectionSchedule& schedule, bool threaded,
                  bool realtime);
 
-  // Offers the image of a frame, by increasing index, and takes what counts from this frame on, oldest first.
-  std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  // Offers the image of a frame, by increasing index; one that was offered already is left alone.
+  void offer(FrameIndex index, const Frame& frame);
+  // Whether the next answer counts at its own frame, which must be offered first.
+  bool answers_at_once() const { return next_ == 0 || schedule_.latency == 0; }
+  // What counts from this frame on, oldest first.
+  std::vector<DueDetections> take_due(FrameIndex index);
   // For real-time runs: while on, the detector rests as long as its last answer took, in frames.
   void rest(bool on) { rests_ = on; }
   std::vector<std::string> take_warnings();
@@ -55,7 +59,6 @@ class DetectionStage {
     double ms = 0;
   };
   Answer detect(const Task& task);
-  void offer(FrameIndex index, const Frame& frame);
   std::optional<Answer> take(FrameIndex index);
 
   Detector& detector_;

@@ -61,6 +61,11 @@ std::unique_ptr<DetectionStage> stage_of(Detector& detector, DetectionSchedule s
   return std::make_unique<DetectionStage>(detector, Camera(), schedule, mode.threaded, mode.realtime);
 }
 
+std::vector<DueDetections> exchange(DetectionStage& stage, FrameIndex index, const Frame& frame) {
+  stage.offer(index, frame);
+  return stage.take_due(index);
+}
+
 // Everything that tracking would see of `frames` frames, as text, and how often the detector was asked.
 std::string run(DetectionSchedule schedule, int64_t bad, FrameIndex frames, bool threaded = true) {
   ScriptedDetector detector;
@@ -70,7 +75,7 @@ std::string run(DetectionSchedule schedule, int64_t bad, FrameIndex frames, bool
     const auto stage = stage_of(detector, schedule, {.threaded = threaded});
     for (FrameIndex frame = 0; frame < frames; ++frame) {
       log += std::to_string(frame);
-      for (const DueDetections& due : stage->exchange(frame, frame_at(frame))) {
+      for (const DueDetections& due : exchange(*stage, frame, frame_at(frame))) {
         log += " <" + std::to_string(due.frame);
         for (const Detection& d : due.detections.boxes) log += "#" + std::to_string(static_cast<int>(d.box.y));
         EXPECT_EQ(due.stamp_ns, int64_t{1'000'000'000} * due.frame);
@@ -110,7 +115,7 @@ TEST(DetectionStage, ADetectorThatThrewIsNotAskedAgain) {
     detector.bad = 2;
     {
       const auto stage = stage_of(detector, {.every = 1, .latency = 4}, {.threaded = threaded});
-      for (FrameIndex frame = 0; frame < 12; ++frame) stage->exchange(frame, frame_at(frame));
+      for (FrameIndex frame = 0; frame < 12; ++frame) exchange(*stage, frame, frame_at(frame));
     }
     EXPECT_EQ(detector.calls, 3);
   }
@@ -121,7 +126,7 @@ TEST(DetectionStage, FramesThatWereSkippedDoNotStopTheRhythm) {
   const auto stage = stage_of(detector, {.every = 3, .latency = 1}, {.threaded = false});
   const auto asked_at = [&](FrameIndex frame) {
     const int before = detector.calls;
-    stage->exchange(frame, frame_at(frame));
+    exchange(*stage, frame, frame_at(frame));
     return detector.calls > before;
   };
   EXPECT_TRUE(asked_at(5));
@@ -138,7 +143,7 @@ TEST(DetectionStage, ADetectorThatIsToRestDoesSoAsLongAsItsAnswerTook) {
   for (FrameIndex frame = 0; frame < 40; ++frame) {
     stage->rest(frame >= 10);
     const int before = detector.calls;
-    stage->exchange(frame, frame_at(frame));
+    exchange(*stage, frame, frame_at(frame));
     if (detector.calls > before) asked.push_back(frame);
   }
   const std::vector<FrameIndex> expected{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 17, 21, 25, 29, 33, 37};
@@ -149,15 +154,15 @@ TEST(DetectionStage, RealtimeNeverWaitsForOneThatHangsAndDropsWhatPilesUp) {
   ScriptedDetector detector;
   detector.slow = 1;
   const auto stage = stage_of(detector, {.every = 1, .latency = 1}, {.realtime = true});
-  EXPECT_EQ(stage->exchange(0, frame_at(0)).size(), 1u) << "the first is waited for";
-  EXPECT_TRUE(stage->exchange(1, frame_at(1)).empty());
+  EXPECT_EQ(exchange(*stage, 0, frame_at(0)).size(), 1u) << "the first is waited for";
+  EXPECT_TRUE(exchange(*stage, 1, frame_at(1)).empty());
   detector.entered.get_future().wait();
-  for (FrameIndex frame = 2; frame < 6; ++frame) EXPECT_TRUE(stage->exchange(frame, frame_at(frame)).empty());
+  for (FrameIndex frame = 2; frame < 6; ++frame) EXPECT_TRUE(exchange(*stage, frame, frame_at(frame)).empty());
   EXPECT_EQ(stage->dropped(), 3u) << "2, 3 and 4 gave way to 5";
   detector.gate.set_value();
   std::vector<DueDetections> due;
   for (FrameIndex frame = 6; due.size() < 2; ++frame)
-    for (DueDetections& d : stage->exchange(frame, frame_at(frame))) due.push_back(std::move(d));
+    for (DueDetections& d : exchange(*stage, frame, frame_at(frame))) due.push_back(std::move(d));
   EXPECT_EQ(due[0].frame, 1);
   EXPECT_GE(due[1].frame, 5);
 }
@@ -166,17 +171,38 @@ TEST(DetectionStage, EndsWithTheWorkInHandAndDropsTheRest) {
   ScriptedDetector detector;
   detector.slow = 1;
   auto stage = stage_of(detector, {.every = 1, .latency = 5});
-  for (FrameIndex frame = 0; frame < 4; ++frame) stage->exchange(frame, frame_at(frame));
+  for (FrameIndex frame = 0; frame < 4; ++frame) exchange(*stage, frame, frame_at(frame));
   detector.entered.get_future().wait();
   detector.gate.set_value();
   stage.reset();
   EXPECT_GE(detector.calls, 2);
 }
 
+TEST(DetectionStage, OnlyWhatCountsAtOnceMustBeOfferedBeforeItIsTaken) {
+  ScriptedDetector detector;
+  const auto late = stage_of(detector, {.every = 1, .latency = 1});
+  EXPECT_TRUE(late->answers_at_once()) << "the first answer counts at its own frame";
+  late->offer(0, frame_at(0));
+  EXPECT_EQ(late->take_due(0).size(), 1u);
+  EXPECT_FALSE(late->answers_at_once());
+  late->offer(0, frame_at(0));
+  for (FrameIndex frame = 1; frame < 4; ++frame) {
+    const auto due = late->take_due(frame);
+    ASSERT_EQ(due.size(), frame > 1 ? 1u : 0u);
+    if (!due.empty()) {
+      EXPECT_EQ(due[0].frame, frame - 1);
+    }
+    late->offer(frame, frame_at(frame));
+  }
+  const auto prompt = stage_of(detector, {.every = 1, .latency = 0});
+  prompt->offer(0, frame_at(0));
+  EXPECT_TRUE(prompt->answers_at_once());
+}
+
 TEST(DetectionStage, TellsRateAndCost) {
   ScriptedDetector detector;
   const auto stage = stage_of(detector, {.every = 2, .latency = 2});
-  for (FrameIndex frame = 0; frame < 9; ++frame) stage->exchange(frame, frame_at(frame));
+  for (FrameIndex frame = 0; frame < 9; ++frame) exchange(*stage, frame, frame_at(frame));
   EXPECT_DOUBLE_EQ(stage->rate_hz(), 0.5) << "stamps a second apart";
   EXPECT_EQ(stage->take_times().summaries().at("detection").count, 4u) << "of frames 0, 2, 4, 6";
   EXPECT_TRUE(stage->take_times().summaries().empty()) << "they were taken";
@@ -192,7 +218,7 @@ TEST(DetectionStage, WhatDoesNotFitTheImageIsLeftOutWithAWarning) {
   answer.mask = GreyImage(320, 240, 255);
   FixedDetector detector(answer);
   const auto stage = stage_of(detector, {.every = 1, .latency = 0});
-  const auto due = stage->exchange(0, frame_at(0));
+  const auto due = exchange(*stage, 0, frame_at(0));
   ASSERT_EQ(due.size(), 1u);
   EXPECT_EQ(due[0].detections.boxes,
             (std::vector<Detection>{{"whole", {10, 20, 30, 40}, 0.5f}, {"over", {600, 460, 40, 20}, 1}}));

@@ -201,7 +201,8 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   camera_at_readout_.readout = readout_.readout();
   ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
-  ImageAppearance appearance(image, undistort_, {.levels = options_.features.levels, .scale = options_.features.scale});
+  ImageAppearance appearance(image, undistort_, options_.noise,
+                             {.levels = options_.features.levels, .scale = options_.features.scale});
   std::optional<ExtractedFeatures> start;
   if (start_)
     start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,
@@ -390,6 +391,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     if (explain_keyframes_) result.keyframe_explanation = explained(decision);
     if (options_.dynamics.filter == FilterKind::standard) result.movers = movers_.finish(scene, world_from_cam);
   } else if (tracked.state == TrackingState::lost) {
+    result.ambiguous = tracked.ambiguous;
     odometry_.lost();
   }
   result.world_from_odom = odometry_.world_from_odom();

@@ -46,11 +46,16 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
   slow_stage_.emplace(*slow_, camera, schedule_, threaded, realtime);
 }
 
-std::vector<DueDetections> SceneStage::exchange(FrameIndex index, const Frame& frame) {
+std::vector<DueDetections> SceneStage::take_due(FrameIndex index, const Frame& frame) {
   if (!slow_stage_) return {};
-  auto due = slow_stage_->exchange(index, frame);
+  if (slow_stage_->answers_at_once()) slow_stage_->offer(index, frame);
+  auto due = slow_stage_->take_due(index);
   for (std::string& warning : slow_stage_->take_warnings()) warnings_.push_back(std::move(warning));
   return due;
+}
+
+void SceneStage::ask_slow_detector(FrameIndex index, const Frame& frame) {
+  if (slow_stage_) slow_stage_->offer(index, frame);
 }
 
 void SceneStage::learn(const FrameOutcome& before) {

@@ -75,7 +75,9 @@ class SceneStage {
              bool threaded, bool realtime);
 
   // What the slow detector has due at this frame. It may wait.
-  std::vector<DueDetections> exchange(FrameIndex index, const Frame& frame);
+  std::vector<DueDetections> take_due(FrameIndex index, const Frame& frame);
+  // Gives the slow detector this frame, if it was not given it by take_due.
+  void ask_slow_detector(FrameIndex index, const Frame& frame);
   // While on, the slow detector of a real-time run rests half of the time.
   void rest_detector(bool on) {
     if (slow_stage_) slow_stage_->rest(on);

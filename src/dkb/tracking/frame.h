@@ -47,6 +47,7 @@ struct TrackedFrame {
   // Of the frame before, which its map starts with: made again at the velocity that only this frame tells.
   std::shared_ptr<const RgbdFeatures> start_features;
   TrackingState state = TrackingState::initialising;
+  bool ambiguous = false;                   // lost: it shows a place of the map, or one that looks like it
   bool starts_map = false;                  // it wants to be a map's first keyframe
   std::optional<PosePrediction> predicted;  // by the step from the frame before
   // What follows holds when tracking or relocalised; of a predicted frame the reference and the pose.

@@ -23,7 +23,7 @@ constexpr double kMinShare = 0.1;        // of the map's well-known points in vi
 constexpr double kMinSimilarity = 0.7;   // of those points that the image shows at all, that must look as they did
 constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
 constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
-constexpr double kClearLead = 0.03;      // ... unless they look less alike by this share; rivals make all worthless
+constexpr double kClearLead = 3.0;       // ... unless its log odds are so much less: 20 to one
 
 bool same_place(const Rigid3& a, const Rigid3& b) {
   return (centre_in_world(a) - centre_in_world(b)).norm() < 0.1 &&
@@ -37,20 +37,38 @@ Relocaliser::Relocaliser(const CameraModel& camera, const SensorNoise& noise, do
     : camera_(camera), noise_(noise), scale_factor_(scale_factor), levels_(levels), seed_(seed) {}
 
 std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFeatures& features,
-                                              const IgnoresPoint& ignores, PointAppearance* appearance) const {
+                                              const IgnoresPoint& ignores, PointAppearance* appearance,
+                                              PlaceEvidence& evidence) const {
   std::vector<PoseProposal> proposals = propose(map, features, ignores, appearance);
+  // After a view of nothing known the camera may be elsewhere.
+  if (proposals.empty()) evidence.clear();
+  std::vector<PointLook> looks;
+  for (const PoseProposal& p : proposals) looks.insert(looks.end(), p.looks.begin(), p.looks.end());
+  evidence.add(std::move(looks));
+  for (PoseProposal& p : proposals) p.log_odds = evidence.log_odds(map, p.around);
   int most = 0;
   for (const PoseProposal& p : proposals) most = std::max(most, p.inliers);
   std::erase_if(proposals, [&](const PoseProposal& p) { return p.inliers < kAmbiguity * most; });
   // Of look-alike places the true one differs least from what is seen.
-  const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.similarity() > b.similarity(); };
+  const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.log_odds > b.log_odds; };
   std::stable_sort(proposals.begin(), proposals.end(), better);
   if (proposals.empty() || !proposals.front().verified) return std::nullopt;
   PoseProposal& best = proposals.front();
   for (const PoseProposal& other : proposals)
-    if (!same_place(other.cam_from_world, best.cam_from_world) && other.similarity() > best.similarity() - kClearLead)
-      return std::nullopt;
+    if (!same_place(other.cam_from_world, best.cam_from_world) && other.log_odds > best.log_odds - kClearLead)
+      best.ambiguous = true;
   return std::move(best);
+}
+
+double Relocaliser::odds_of(const Map& map, const Rigid3& cam_from_world, const std::vector<PointId>& points,
+                            const MatchableFeatures& features, const IgnoresPoint& ignores, PointAppearance* appearance,
+                            PlaceEvidence& evidence) const {
+  PoseProposal pose;
+  pose.cam_from_world = cam_from_world;
+  pose.points = points;
+  verify(map, map_around(map, points, ignores), features, appearance, pose);
+  evidence.add(std::move(pose.looks));
+  return evidence.log_odds(map, pose.around);
 }
 
 std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFeatures& features,
@@ -172,6 +190,8 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());
+  proposal.around.reserve(nearby.size());
+  for (const Candidate& c : nearby) proposal.around.push_back(c.id);
   std::vector<uint8_t> visible(nearby.size(), 0);
   match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
                       &visible);
@@ -183,6 +203,7 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
     if (std::binary_search(matched.begin(), matched.end(), c.id)) {
       ++proposal.found;
       ++proposal.similar;
+      proposal.looks.push_back({c.id, true});
       continue;
     }
     if (appearance == nullptr) continue;
@@ -190,9 +211,11 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
     const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
     const int octave =
         std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(scale_factor_))), 0, levels_ - 1);
-    const auto same = appearance->same(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
-    if (!same) continue;
-    ++(*same ? proposal.similar : proposal.changed);
+    const Look look = appearance->look(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
+    if (look == Look::unknown) continue;
+    ++(look == Look::same ? proposal.similar : proposal.changed);
+    // What is gone may have been taken away: that happens in every place.
+    if (look != Look::gone) proposal.looks.push_back({c.id, look == Look::same});
   }
   proposal.verified = proposal.inliers >= kMinRelocalisationInliers &&
                       proposal.found >= kMinShare * proposal.well_known && proposal.similarity() >= kMinSimilarity &&

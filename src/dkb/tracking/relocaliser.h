@@ -11,6 +11,7 @@
 #include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
 #include "dkb/tracking/local_map.h"
+#include "dkb/tracking/place_evidence.h"
 
 namespace dkb {
 
@@ -26,6 +27,10 @@ struct PoseProposal {
   int similar = 0, changed = 0;   // of these, that look the same in the image; that look different, or are seen through
   double position_sd = 0;         // [m]
   bool verified = false;          // enough of the map is found from there, and looks the same
+  std::vector<PointLook> looks;   // of well-known map points that should be in view, and are not hidden or gone
+  std::vector<PointId> around;    // the map there
+  double log_odds = 0;            // of all that was seen there, against a place that only looks like it
+  bool ambiguous = false;         // another place in the map explains the view nearly as well
 
   double similarity() const { return similar + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
 };
@@ -41,9 +46,14 @@ class Relocaliser {
   using IgnoresPoint = std::function<bool(PointId)>;
 
   // `appearance` may be null: then only what features tell is verified.
-  // The verified pose; nothing when there is none, or when poses at different places explain the frame nearly as well.
+  // The verified pose of the best odds; nothing when there is none. What the frame shows goes into `evidence`, what
+  // earlier ones showed counts.
   std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
-                                   PointAppearance* appearance) const;
+                                   PointAppearance* appearance, PlaceEvidence& evidence) const;
+  // The log odds of a pose that shows these map points, with what the frame shows from there added to `evidence`.
+  double odds_of(const Map& map, const Rigid3& cam_from_world, const std::vector<PointId>& points,
+                 const MatchableFeatures& features, const IgnoresPoint& ignores, PointAppearance* appearance,
+                 PlaceEvidence& evidence) const;
   // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
   std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
                                     PointAppearance* appearance) const;

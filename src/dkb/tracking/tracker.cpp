@@ -22,11 +22,6 @@ constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, 
 constexpr double kGoOnAfter = 0.1;           // [s] without a pose by the images: more than a blurred one or two
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
-// A place farther from where the camera was lost than this is one that it cannot have come to ...
-constexpr double kMaxDistance = 1.0;       // [m]
-constexpr double kMaxSpeed = 2.0;          // [m/s] more for every second since
-constexpr double kMinSimilarityFar = 0.9;  // ... unless so many of the points in view there look as they did
-
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
@@ -354,23 +349,16 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   frame.covariance = pose.covariance;
 }
 
-// Rooms that look alike are told apart by where the camera can have come to.
-bool Tracker::within_travel_distance(const PoseProposal& found, double timestamp) const {
-  if (!last_) return true;
-  if (map_.root(last_->reference) != map_.root(found.keyframe)) return false;
-  const double distance = (centre_in_world(found.cam_from_world) - centre_in_world(last_->cam_from_world)).norm();
-  return distance <= kMaxDistance + kMaxSpeed * (timestamp - last_seen_);
-}
-
 // `expected`: where to look first; may be null.
 bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected) {
   std::optional<PoseProposal> found;
   if (expected != nullptr) found = find_near(*expected, frame.matchable(), appearance);
   if (!found) {
     found = relocaliser_.find(
-        map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance);
+        map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance, place_evidence_);
     if (!found) return false;
-    if (!within_travel_distance(*found, frame.timestamp) && found->similarity() < kMinSimilarityFar) return false;
+    frame.ambiguous = found->ambiguous || found->log_odds < 0;
+    if (frame.ambiguous) return false;
   }
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;
@@ -385,7 +373,12 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& i
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
-  if (last_->index + 1 == frame.index && track_from_last(frame, input)) return true;
+  if (last_->index + 1 == frame.index && track_from_last(frame, input)) {
+    const auto ignores = [this](PointId id) { return is_retracted(id); };
+    frame.ambiguous = relocaliser_.odds_of(map_.view(), frame.cam_from_world, frame.points, frame.matchable(), ignores,
+                                           input.appearance, place_evidence_) < 0;
+    if (!frame.ambiguous) return true;
+  }
   last_ = std::move(before_loss);
   state_ = before;
   return false;
@@ -469,6 +462,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   suggested_.reset();
   lost_since_.reset();
   unconfirmed_.reset();
+  place_evidence_.clear();
   if (!last_ || frame.timestamp <= last_->timestamp) {
     forget_velocity();
   } else {

@@ -120,7 +120,6 @@ class Tracker {
   bool moved_plausibly_from_last(const TrackedFrame& frame) const;
   bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);
   Rigid3 express_anew(TrackedFrame& frame) const;
-  bool within_travel_distance(const PoseProposal& found, double timestamp) const;
   bool start_map(TrackedFrame& frame, const PosePrediction* expected);
   // `accept`: what else a pose must fulfil; may be empty.
   bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
@@ -153,6 +152,7 @@ class Tracker {
   TrackingState state_ = TrackingState::initialising;
   std::optional<TrackedFrame> last_;         // last frame with a pose
   OdometryPoints odometry_;                  // from the last frame
+  PlaceEvidence place_evidence_;             // of the frames since the camera was lost
   std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
   std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
   VelocityFilter filter_;                    // of the same, with its covariance
