@@ -60,17 +60,6 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
   return std::move(best);
 }
 
-double Relocaliser::odds_of(const Map& map, const Rigid3& cam_from_world, const std::vector<PointId>& points,
-                            const MatchableFeatures& features, const IgnoresPoint& ignores, PointAppearance* appearance,
-                            PlaceEvidence& evidence) const {
-  PoseProposal pose;
-  pose.cam_from_world = cam_from_world;
-  pose.points = points;
-  verify(map, map_around(map, points, ignores), features, appearance, pose);
-  evidence.add(std::move(pose.looks));
-  return evidence.log_odds(map, pose.around);
-}
-
 std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFeatures& features,
                                                const IgnoresPoint& ignores, PointAppearance* appearance) const {
   std::vector<Descriptor> still;

@@ -50,10 +50,6 @@ class Relocaliser {
   // earlier ones showed counts.
   std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
                                    PointAppearance* appearance, PlaceEvidence& evidence) const;
-  // The log odds of a pose that shows these map points, with what the frame shows from there added to `evidence`.
-  double odds_of(const Map& map, const Rigid3& cam_from_world, const std::vector<PointId>& points,
-                 const MatchableFeatures& features, const IgnoresPoint& ignores, PointAppearance* appearance,
-                 PlaceEvidence& evidence) const;
   // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
   std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
                                     PointAppearance* appearance) const;

@@ -108,6 +108,7 @@ void Tracker::reset_motion() {
   forget_velocity();
   last_.reset();
   odometry_.clear();
+  place_evidence_.clear();
   state_ = map_.view().keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
 }
 
@@ -373,12 +374,7 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& i
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
-  if (last_->index + 1 == frame.index && track_from_last(frame, input)) {
-    const auto ignores = [this](PointId id) { return is_retracted(id); };
-    frame.ambiguous = relocaliser_.odds_of(map_.view(), frame.cam_from_world, frame.points, frame.matchable(), ignores,
-                                           input.appearance, place_evidence_) < 0;
-    if (!frame.ambiguous) return true;
-  }
+  if (last_->index + 1 == frame.index && track_from_last(frame, input)) return true;
   last_ = std::move(before_loss);
   state_ = before;
   return false;
