@@ -19,8 +19,6 @@ constexpr int kMinMatches = 15;                 // by descriptor alone that make
 constexpr int kMinRansacInliers = 10;           // of these, that must agree on a pose
 constexpr float kRadius = 10, kRadiusFine = 4;  // [px] first and second search nearby that pose
 
-constexpr double kMinShare = 0.1;        // of the map's well-known points in view that must be found
-constexpr double kMinSimilarity = 0.7;   // of those points that the image shows at all, that must look as they did
 constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
 constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
 constexpr double kClearLead = 3.0;       // ... unless its log odds are so much less: 20 to one
@@ -77,15 +75,17 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
       return shared >= kMinMatches;
     });
     if (explained) continue;
-    if (auto proposal = propose_from(map, like.id, features, ignores, appearance))
+    if (auto proposal = propose_from(map, like.id, features, ignores)) {
+      look_around(map, features, ignores, appearance, *proposal);
       proposals.push_back(std::move(*proposal));
+    }
   }
   return proposals;
 }
 
 std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe,
-                                                      const MatchableFeatures& features, const IgnoresPoint& ignores,
-                                                      PointAppearance* appearance) const {
+                                                      const MatchableFeatures& features,
+                                                      const IgnoresPoint& ignores) const {
   PoseProposal proposal;
   proposal.keyframe = keyframe;
   const auto coarse = coarse_pose(map, keyframe, features, ignores, proposal.points);
@@ -94,21 +94,19 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
   const std::vector<Candidate> nearby = map_around(map, proposal.points, ignores);
   if (!search(nearby, kRadius, features, proposal)) return std::nullopt;
   if (!search(nearby, kRadiusFine, features, proposal)) return std::nullopt;
-  verify(map, nearby, features, appearance, proposal);
   return proposal;
 }
 
 std::optional<PoseProposal> Relocaliser::propose_at(const Map& map, KeyframeId keyframe,
                                                     const Rigid3& expected_cam_from_world, double radius,
-                                                    const MatchableFeatures& features, const IgnoresPoint& ignores,
-                                                    PointAppearance* appearance) const {
+                                                    const MatchableFeatures& features,
+                                                    const IgnoresPoint& ignores) const {
   PoseProposal proposal;
   proposal.keyframe = keyframe;
   proposal.cam_from_world = expected_cam_from_world;
   const std::vector<Candidate> nearby = map_around(map, map.keyframe(keyframe)->points, ignores);
   for (const float r : {static_cast<float>(radius), kRadius, kRadiusFine})
     if (r <= radius && !search(nearby, r, features, proposal)) return std::nullopt;
-  verify(map, nearby, features, appearance, proposal);
   return proposal;
 }
 
@@ -164,6 +162,7 @@ bool Relocaliser::search(const std::vector<Candidate>& nearby, float radius, con
   proposal.cam_from_world = pose.cam_from_world;
   proposal.inliers = pose.inliers;
   proposal.position_sd = std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
+  proposal.verified = proposal.inliers >= kMinRelocalisationInliers && proposal.position_sd <= kMaxPositionSd;
   proposal.points.assign(features.features.size(), kNoPoint);
   for (size_t i = 0; i < matches.size(); ++i)
     if (pose.inlier[i])
@@ -171,16 +170,17 @@ bool Relocaliser::search(const std::vector<Candidate>& nearby, float radius, con
   return true;
 }
 
-// What the map would have in view from there must be found, or at least look as it did. In a room that is only similar
-// most things do, but some are others, and those are told by the points that no feature was matched with.
-void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, const MatchableFeatures& features,
-                         PointAppearance* appearance, PoseProposal& proposal) const {
+// How the map points look that should be in view. In a room that is only similar most are as they were, but some are
+// others, and those are told by the points that no feature was matched with.
+void Relocaliser::look_around(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                              PointAppearance* appearance, PoseProposal& proposal) const {
+  const std::vector<Candidate> nearby = map_around(map, proposal.points, ignores);
+  proposal.around.reserve(nearby.size());
+  for (const Candidate& c : nearby) proposal.around.push_back(c.id);
   std::vector<PointId> matched;
   for (PointId p : proposal.points)
     if (p != kNoPoint) matched.push_back(p);
   std::sort(matched.begin(), matched.end());
-  proposal.around.reserve(nearby.size());
-  for (const Candidate& c : nearby) proposal.around.push_back(c.id);
   std::vector<uint8_t> visible(nearby.size(), 0);
   match_by_projection(nearby, features, camera_, proposal.cam_from_world, scale_factor_, levels_, {}, nullptr,
                       &visible);
@@ -188,10 +188,7 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
   for (size_t i = 0; i < nearby.size(); ++i) {
     const Candidate& c = nearby[i];
     if (!visible[i] || map.point(c.id)->observations.size() < kWellKnownObservers) continue;
-    ++proposal.well_known;
     if (std::binary_search(matched.begin(), matched.end(), c.id)) {
-      ++proposal.found;
-      ++proposal.similar;
       proposal.looks.push_back({c.id, true});
       continue;
     }
@@ -200,15 +197,10 @@ void Relocaliser::verify(const Map& map, const std::vector<Candidate>& nearby, c
     const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
     const int octave =
         std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(scale_factor_))), 0, levels_ - 1);
-    const Look look = appearance->look(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
-    if (look == Look::unknown) continue;
-    ++(look == Look::same ? proposal.similar : proposal.changed);
     // What is gone may have been taken away: that happens in every place.
-    if (look != Look::gone) proposal.looks.push_back({c.id, look == Look::same});
+    const Look look = appearance->look(camera_.project(in_cam), in_cam.z(), octave, c.descriptor);
+    if (look == Look::same || look == Look::other) proposal.looks.push_back({c.id, look == Look::same});
   }
-  proposal.verified = proposal.inliers >= kMinRelocalisationInliers &&
-                      proposal.found >= kMinShare * proposal.well_known && proposal.similarity() >= kMinSimilarity &&
-                      proposal.position_sd <= kMaxPositionSd;
 }
 
 }  // namespace dkb

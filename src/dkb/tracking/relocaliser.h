@@ -23,16 +23,13 @@ struct PoseProposal {
   Rigid3 cam_from_world;
   std::vector<PointId> points;  // per feature: the map point that it shows, else kNoPoint
   int inliers = 0;
-  int well_known = 0, found = 0;  // well-known map points that should be in view; of these, found
-  int similar = 0, changed = 0;   // of these, that look the same in the image; that look different, or are seen through
-  double position_sd = 0;         // [m]
-  bool verified = false;          // enough of the map is found from there, and looks the same
-  std::vector<PointLook> looks;   // of well-known map points that should be in view, and are not hidden or gone
-  std::vector<PointId> around;    // the map there
-  double log_odds = 0;            // of all that was seen there, against a place that only looks like it
-  bool ambiguous = false;         // another place in the map explains the view nearly as well
-
-  double similarity() const { return similar + changed > 0 ? static_cast<double>(similar) / (similar + changed) : 1; }
+  double position_sd = 0;  // [m]
+  bool verified = false;   // enough of the map is found from there, and tells where the camera is
+  // Of those that find() and propose() give:
+  std::vector<PointLook> looks;  // of well-known map points that should be in view, and are not hidden or gone
+  std::vector<PointId> around;   // the map there
+  double log_odds = 0;           // of all that was seen there, against a place that only looks like it
+  bool ambiguous = false;        // another place in the map explains the view nearly as well
 };
 
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the
@@ -45,7 +42,7 @@ class Relocaliser {
   // True for points that must not be matched.
   using IgnoresPoint = std::function<bool(PointId)>;
 
-  // `appearance` may be null: then only what features tell is verified.
+  // `appearance` may be null: then only what features tell is known of how a place looks.
   // The verified pose of the best odds; nothing when there is none. What the frame shows goes into `evidence`, what
   // earlier ones showed counts.
   std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
@@ -55,13 +52,13 @@ class Relocaliser {
                                     PointAppearance* appearance) const;
   // The pose that this one keyframe leads to, verified or not.
   std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
-                                           const IgnoresPoint& ignores, PointAppearance* appearance) const;
+                                           const IgnoresPoint& ignores) const;
 
   // The pose near an expected one, among what this keyframe and those around it see, verified or not: points are sought
   // within `radius` [px] of where they are expected.
   std::optional<PoseProposal> propose_at(const Map& map, KeyframeId keyframe, const Rigid3& expected_cam_from_world,
-                                         double radius, const MatchableFeatures& features, const IgnoresPoint& ignores,
-                                         PointAppearance* appearance) const;
+                                         double radius, const MatchableFeatures& features,
+                                         const IgnoresPoint& ignores) const;
 
  private:
   std::vector<Candidate> map_around(const Map& map, const std::vector<PointId>& points,
@@ -70,8 +67,8 @@ class Relocaliser {
                                     const IgnoresPoint& ignores, std::vector<PointId>& points) const;
   bool search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,
               PoseProposal& proposal) const;
-  void verify(const Map& map, const std::vector<Candidate>& nearby, const MatchableFeatures& features,
-              PointAppearance* appearance, PoseProposal& proposal) const;
+  void look_around(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                   PointAppearance* appearance, PoseProposal& proposal) const;
 
   CameraModel camera_;
   SensorNoise noise_;

@@ -353,7 +353,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
 // `expected`: where to look first; may be null.
 bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected) {
   std::optional<PoseProposal> found;
-  if (expected != nullptr) found = find_near(*expected, frame.matchable(), appearance);
+  if (expected != nullptr) found = find_near(*expected, frame.matchable());
   if (!found) {
     found = relocaliser_.find(
         map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance, place_evidence_);

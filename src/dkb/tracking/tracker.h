@@ -114,8 +114,7 @@ class Tracker {
   void forget_velocity();
   double spread_px(const Matrix6d& covariance) const;
   double search_radius(double radius) const;
-  std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features,
-                                        PointAppearance* appearance) const;
+  std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
   bool moved_plausibly_from_last(const TrackedFrame& frame) const;
   bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);

@@ -106,8 +106,8 @@ double Tracker::spread_px(const Matrix6d& covariance) const {
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.
-std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected, const MatchableFeatures& features,
-                                               PointAppearance* appearance) const {
+std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
+                                               const MatchableFeatures& features) const {
   const Eigen::Vector3d centre = centre_in_world(expected.cam_from_world);
   const double reach = kMaxViewDistance + 3 * std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   std::vector<std::pair<double, KeyframeId>> nearby;
@@ -129,11 +129,11 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected, c
   const double reach_px = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
   for (double radius = kRadiusLocalMap; radius < 2 * reach_px && !nearby.empty(); radius *= 2) {
     auto found = relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world,
-                                         std::min(radius, reach_px), features, ignores, appearance);
+                                         std::min(radius, reach_px), features, ignores);
     if (right(found)) return found;
   }
   for (const auto& [off, id] : nearby) {
-    auto found = relocaliser_.propose_from(map_.view(), id, features, ignores, appearance);
+    auto found = relocaliser_.propose_from(map_.view(), id, features, ignores);
     if (right(found)) return found;
   }
   return std::nullopt;

@@ -98,7 +98,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
-                                          [this](PointId id) { return is_retracted(id); }, {});
+                                          [this](PointId id) { return is_retracted(id); });
     if (near && plausible_motion(near->cam_from_world, frame.timestamp)) {
       pose = near->cam_from_world;
       points = std::move(near->points);
