@@ -8,9 +8,9 @@
 namespace dkb {
 namespace {
 
-constexpr double kDetail = 0.3;   // [m] points so near to each other belong to one thing, and are judged together
-constexpr int kMaxVotes = 10;     // of one point: what a camera saw before it came here is outvoted in as many frames
-constexpr int kPointsOfMany = 4;  // that a detail must show
+constexpr double kDetail = 0.3;  // [m] points so near to each other belong to one thing, and are judged together
+constexpr int kMaxVotes = 10;    // of one point: what a camera saw before it came here is outvoted in as many frames
+constexpr int kMinPoints = 4;    // of a detail: the fewest of which three in four can look different
 
 // Shares of the details that look different. Of places that a camera came back to 0.3 to 1 % do (freiburg1_xyz,
 // walking_halfsphere, the composed sequences, `loop`); of the second room of `twins` seen as the first one a tenth.
@@ -47,7 +47,7 @@ double PlaceEvidence::log_odds(const Map& map, const std::vector<PointId>& point
   const double other_odds = std::log(kOtherInPlace / kOtherInLookAlike);
   double odds = kPriorOdds;
   for (const auto& [at, detail] : details) {
-    if (detail.same + detail.other < kPointsOfMany) continue;
+    if (detail.same + detail.other < kMinPoints) continue;
     // Corners fail one by one, by blur and by what was described wrongly; something else there changes nearly all.
     if (detail.other >= 3 * detail.same)
       odds += other_odds;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "dkb/map/map.h"
@@ -21,7 +20,8 @@ class PlaceEvidence {
  public:
   // What one frame shows; a point that is named twice counts once.
   void add(std::vector<PointLook> looks);
-  // Log odds that what is in view is the place of these points, against a look-alike, both as likely beforehand.
+  // Log odds that what is in view is the place of these points, against a look-alike: five to one where nothing is
+  // seen.
   double log_odds(const Map& map, const std::vector<PointId>& points) const;
   void clear() { votes_.clear(); }
 

@@ -21,7 +21,7 @@ constexpr float kRadius = 10, kRadiusFine = 4;  // [px] first and second search 
 
 constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
 constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
-constexpr double kClearLead = 3.0;       // ... unless its log odds are so much less: 20 to one
+const double kClearLead = std::log(20);  // ... unless its log odds are so much less
 
 bool same_place(const Rigid3& a, const Rigid3& b) {
   return (centre_in_world(a) - centre_in_world(b)).norm() < 0.1 &&
@@ -38,8 +38,10 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
                                               const IgnoresPoint& ignores, PointAppearance* appearance,
                                               PlaceEvidence& evidence) const {
   std::vector<PoseProposal> proposals = propose(map, features, ignores, appearance);
-  // After a view of nothing known the camera may be elsewhere.
-  if (proposals.empty()) evidence.clear();
+  if (proposals.empty()) {  // after a view of nothing known the camera may be elsewhere
+    evidence.clear();
+    return std::nullopt;
+  }
   std::vector<PointLook> looks;
   for (const PoseProposal& p : proposals) looks.insert(looks.end(), p.looks.begin(), p.looks.end());
   evidence.add(std::move(looks));
@@ -50,7 +52,7 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
   // Of look-alike places the true one differs least from what is seen.
   const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.log_odds > b.log_odds; };
   std::stable_sort(proposals.begin(), proposals.end(), better);
-  if (proposals.empty() || !proposals.front().verified) return std::nullopt;
+  if (!proposals.front().verified) return std::nullopt;
   PoseProposal& best = proposals.front();
   for (const PoseProposal& other : proposals)
     if (!same_place(other.cam_from_world, best.cam_from_world) && other.log_odds > best.log_odds - kClearLead)
