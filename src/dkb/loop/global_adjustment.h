@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "dkb/loop/place_verification.h"
+#include "dkb/matching/place_fit.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
 

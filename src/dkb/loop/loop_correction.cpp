@@ -87,7 +87,7 @@ std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
   const KeyframeId far = finding.far_area.front();
   const Rigid3 world_from_far = map.keyframe(far)->cam_from_world.inverse();
   for (const LoopFinding::Support& s : finding.support)
-    edges.push_back({far, s.keyframe, s.fit.cam_from_world * world_from_far, static_cast<int>(s.fit.matches.size())});
+    edges.push_back({far, s.keyframe, s.fit.cam_from_world * world_from_far, s.fit.inliers});
   return edges;
 }
 
@@ -98,10 +98,10 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
   for (const LoopFinding::Support& s : finding.support) {
     correction.near_side.push_back(s.keyframe);
     const Keyframe& k = *map.keyframe(s.keyframe);
-    for (const auto& [feature, point] : s.fit.matches) {
-      const PointId own = k.points[static_cast<size_t>(feature)];
-      if (own != kNoPoint && own != point) correction.same.emplace_back(own, point);
-    }
+    for (size_t f = 0; f < s.fit.points.size(); ++f)
+      if (const PointId point = s.fit.points[f], own = k.points[f];
+          own != kNoPoint && point != kNoPoint && own != point)
+        correction.same.emplace_back(own, point);
   }
   const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
   if (!finding.merge) {

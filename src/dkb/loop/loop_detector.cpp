@@ -14,6 +14,8 @@ constexpr double kDegrees = 57.295779513082321;
 constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
 constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
 constexpr int kAreaKeyframes = 8;               // a candidate and its best covisible ones, whose points are matched
+constexpr int kMinMatches = 15;                 // by descriptor alone that make a candidate worth a try
+constexpr float kSearchRadii[] = {12, 4};       // [px] around the pose of these, and around the refined one
 constexpr double kMinShare = 0.2;               // of the area's well-known points that ought to be in view
 
 // Keyframes around the newest one that show the area just there as well.
@@ -31,10 +33,34 @@ constexpr double kDriftRotationPerMetre = 1.5;   // [deg/m]
 constexpr int kMergeMinInliers = 80;
 constexpr double kMergeMinShare = 0.3;
 
-// How far the camera is from where it would be, and turned, if the world moved as `moved_from_map`.
-bool supports(const Rigid3& cam_from_world, const PlaceFit& fit, const Rigid3& fit_world_from_world) {
-  const Rigid3 expected = cam_from_world * fit_world_from_world.inverse();
-  const Rigid3 difference = fit.cam_from_world * expected.inverse();
+// A part of the map that may be seen again: a keyframe, its best covisible ones, and their points.
+struct MapArea {
+  std::vector<KeyframeId> keyframes;  // the first is the one that the area is named after
+  std::vector<Candidate> points;      // by increasing id
+};
+
+MapArea area_around(const Map& map, KeyframeId centre) {
+  MapArea area;
+  area.keyframes.push_back(centre);
+  for (const Covisible& c : map.keyframe(centre)->covisible)
+    if (static_cast<int>(area.keyframes.size()) < kAreaKeyframes) area.keyframes.push_back(c.keyframe);
+  for (PointId id : map.points_of(area.keyframes)) area.points.push_back(candidate_of(*map.point(id)));
+  return area;
+}
+
+// Of the area's well-known points that ought to be in view.
+double share_found(const Map& map, const MapArea& area, const PlaceFit& fit) {
+  int expected = 0, found = 0;
+  for (size_t i = 0; i < area.points.size(); ++i) {
+    if (fit.sightings[i] == Sighting::out_of_view || !well_known(*map.point(area.points[i].id))) continue;
+    ++expected;
+    found += fit.sightings[i] == Sighting::found;
+  }
+  return expected > 0 ? static_cast<double>(found) / expected : 0;
+}
+
+bool supports(const Rigid3& expected_cam_from_world, const PlaceFit& fit) {
+  const Rigid3 difference = fit.cam_from_world * expected_cam_from_world.inverse();
   return difference.translation.norm() <= kMaxSupportTranslation &&
          kDegrees * vector_from_rotation(difference.rotation).norm() <= kMaxSupportRotation;
 }
@@ -132,24 +158,26 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
-    const MapArea area = area_around(map, far, kAreaKeyframes);
-    const auto located = locate_in_area(map, id, area, optics, seed + static_cast<uint64_t>(id));
+    const MapArea area = area_around(map, far);
+    const auto located = fit_by_descriptors(area.points, *newest->features, optics, kMinMatches,
+                                            {.min_inliers = kMinMatches, .seed = seed + static_cast<uint64_t>(id)});
     if (!located) continue;
     if (!merge) {
       if (path_lengths.empty()) path_lengths = path_lengths_through_map(map, id);
       const double path_length = path_lengths[static_cast<size_t>(far)];
-      const double shift = (centre_in_world(*located) - centre_in_world(newest->cam_from_world)).norm();
+      const double shift = (centre_in_world(located->cam_from_world) - centre_in_world(newest->cam_from_world)).norm();
       const double rotation =
-          kDegrees * vector_from_rotation(located->rotation.conjugate() * newest->cam_from_world.rotation).norm();
+          kDegrees *
+          vector_from_rotation(located->cam_from_world.rotation.conjugate() * newest->cam_from_world.rotation).norm();
       if (shift > options.drift_translation_base + kDriftTranslationShare * path_length ||
           rotation > kDriftRotationBase + kDriftRotationPerMetre * path_length)
         continue;
     }
-    const auto fit = fit_to_area(map, id, *located, area, optics);
-    if (!fit || static_cast<int>(fit->matches.size()) < (merge ? kMergeMinInliers : options.min_inliers) ||
-        fit->share() < (merge ? kMergeMinShare : kMinShare))
+    const auto fit = fit_by_projection(area.points, *newest->features, optics, located->cam_from_world, kSearchRadii);
+    if (!fit || fit->inliers < (merge ? kMergeMinInliers : options.min_inliers) ||
+        share_found(map, area, *fit) < (merge ? kMergeMinShare : kMinShare))
       continue;
-    if (best && best->support.front().fit.matches.size() >= fit->matches.size()) continue;
+    if (best && best->support.front().fit.inliers >= fit->inliers) continue;
 
     const Rigid3 far_world_from_world = fit->cam_from_world.inverse() * newest->cam_from_world;
     LoopFinding finding;
@@ -157,10 +185,10 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     finding.far_area = area.keyframes;
     finding.support.push_back({id, *fit});
     for (KeyframeId supporter : support_candidates(map, id)) {
-      const Rigid3& own = map.keyframe(supporter)->cam_from_world;
-      auto seen = fit_to_area(map, supporter, own * far_world_from_world.inverse(), area, optics);
-      if (seen && static_cast<int>(seen->matches.size()) >= kSupportInliers &&
-          supports(own, *seen, far_world_from_world))
+      const Keyframe& k = *map.keyframe(supporter);
+      const Rigid3 expected = k.cam_from_world * far_world_from_world.inverse();
+      auto seen = fit_by_projection(area.points, *k.features, optics, expected, kSearchRadii);
+      if (seen && seen->inliers >= kSupportInliers && supports(expected, *seen))
         finding.support.push_back({supporter, std::move(*seen)});
     }
     if (static_cast<int>(finding.support.size()) > options.min_support) best = std::move(finding);

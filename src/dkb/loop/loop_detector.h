@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "dkb/loop/loop_options.h"
-#include "dkb/loop/place_verification.h"
+#include "dkb/map/map.h"
+#include "dkb/matching/place_fit.h"
 
 namespace dkb {
 
@@ -13,7 +14,7 @@ namespace dkb {
 struct LoopFinding {
   struct Support {
     KeyframeId keyframe = kNoKeyframe;
-    PlaceFit fit;
+    PlaceFit fit;  // in the old place's part of the world
   };
   std::vector<Support> support;      // the newest keyframe first
   std::vector<KeyframeId> far_area;  // the old keyframe first
@@ -28,10 +29,10 @@ std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from);
 std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps);
 
 // Does keyframe `id` show a place that the map knows, but does not know to be the same? Candidates are the keyframes
-// that look most like it (PlaceIndex), its neighbours apart. Each is verified by geometry: a rigid motion between the
-// points of both (3-D to 3-D, RANSAC), guided matching, and a pose on that. A loop needs supporting
-// keyframes, and a drift that the path between the two places could explain. Only the path tells similar rooms apart:
-// their views pass the other tests as well as those of one room do.
+// that look most like it (PlaceIndex), its neighbours apart. Each is verified as a camera that was lost is found: a
+// pose by descriptors alone, matches around it, and a pose on these. A loop needs supporting keyframes, and a drift
+// that the path between the two places could explain. Only the path tells similar rooms apart: their views pass the
+// other tests as well as those of one room do.
 //
 // A pure function of the snapshot. Deterministic for a seed.
 std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics& optics, const LoopOptions& options,

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "dkb/loop/place_verification.h"
+#include "dkb/matching/place_fit.h"
 #include "dkb/map/map.h"
 #include "dkb/slam/options.h"
 

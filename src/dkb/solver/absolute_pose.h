@@ -24,7 +24,7 @@ struct RansacOptions {
 
 struct RansacPose {
   bool ok = false;
-  Rigid3 pose;                  // cam_from_world or to_from_from; identity where not ok
+  Rigid3 pose;                  // cam_from_world; identity where not ok
   std::vector<uint8_t> inlier;  // per correspondence
   int inliers = 0;
   int iterations = 0;
@@ -39,12 +39,5 @@ std::vector<Rigid3> solve_p3p(const Eigen::Vector3d (&points_in_world)[3], const
 // within 7.815, in the choice of inliers. Deterministic for a seed.
 RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const PoseObservation> observations,
                                   const RansacOptions& options = {});
-
-// to_from_from with point_in_to = to_from_from * point_in_from from 3D-3D matches with outliers (loop verification with
-// depth): RANSAC over three pairs, refined on the inliers. `sigma` [m] per pair, of the distance along each axis;
-// options.chi2 applies to |error|^2 / sigma^2 (7.815 for 3 d.o.f. is apt). Deterministic for a seed.
-RansacPose estimate_rigid_motion(std::span<const Eigen::Vector3d> points_in_from,
-                                 std::span<const Eigen::Vector3d> points_in_to, std::span<const double> sigma,
-                                 const RansacOptions& options = {});
 
 }  // namespace dkb

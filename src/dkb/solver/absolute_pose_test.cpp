@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -112,36 +111,6 @@ TEST(AbsolutePose, TheSeedDecidesAllRandomness) {
   EXPECT_EQ(a.pose.translation, b.pose.translation);
   EXPECT_EQ(a.pose.rotation.coeffs(), b.pose.rotation.coeffs());
   EXPECT_EQ(a.iterations, b.iterations);
-}
-
-TEST(RigidMotion, IsFoundAmongHalfOutliers) {
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
-    Random random(seed);
-    const Rigid3 truth = random_pose(random);
-    std::vector<Eigen::Vector3d> from, to;
-    std::vector<double> sigma;
-    const auto vector = [&] { return Eigen::Vector3d(random.normal(), random.normal(), random.normal()); };
-    for (int k = 0; k < 80; ++k) {
-      from.push_back(vector() + Eigen::Vector3d(0, 0, 3));
-      sigma.push_back(0.005 * (1 + k % 4));
-      to.push_back(k % 2 ? vector() : Eigen::Vector3d(truth * from.back() + sigma.back() * vector()));
-    }
-    const RansacPose result = estimate_rigid_motion(from, to, sigma, {.chi2 = 7.815});
-    ASSERT_TRUE(result.ok);
-    EXPECT_LT(distance(result.pose, truth), 0.02);
-    EXPECT_GE(result.inliers, 32);
-    for (int k = 1; k < 80; k += 2) EXPECT_FALSE(result.inlier[k]);
-  }
-}
-
-TEST(RigidMotion, DegenerateInputIsRefused) {
-  EXPECT_FALSE(estimate_rigid_motion({}, {}, {}).ok);
-  // All points in a line leave the rotation about it free.
-  std::vector<Eigen::Vector3d> line;
-  for (int k = 0; k < 20; ++k) line.emplace_back(0.1 * k, 0, 2);
-  const std::vector<double> sigma(20, 0.01);
-  EXPECT_FALSE(estimate_rigid_motion(line, line, sigma).ok);
-  EXPECT_THROW(estimate_rigid_motion(line, line, std::vector<double>(3, 0.01)), InputError);
 }
 
 }  // namespace

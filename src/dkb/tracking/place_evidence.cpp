@@ -30,16 +30,15 @@ void PlaceEvidence::add(std::vector<PointLook> looks) {
   }
 }
 
-double PlaceEvidence::log_odds(const Map& map, const std::vector<PointId>& points) const {
+double PlaceEvidence::log_odds(const std::vector<Candidate>& points) const {
   struct Detail {
     int same = 0, other = 0;  // points
   };
   std::map<std::array<int, 3>, Detail> details;
-  for (PointId id : points) {
-    const auto votes = votes_.find(id);
-    const MapPoint* point = map.point(id);
-    if (point == nullptr || votes == votes_.end() || votes->second == 0) continue;
-    const Eigen::Vector3i at = (point->position / kDetail).array().floor().cast<int>();
+  for (const Candidate& point : points) {
+    const auto votes = votes_.find(point.id);
+    if (votes == votes_.end() || votes->second == 0) continue;
+    const Eigen::Vector3i at = (point.position / kDetail).array().floor().cast<int>();
     Detail& detail = details[{at.x(), at.y(), at.z()}];
     ++(votes->second > 0 ? detail.same : detail.other);
   }

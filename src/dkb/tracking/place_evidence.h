@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "dkb/map/map.h"
+#include "dkb/matching/candidates.h"
 
 namespace dkb {
 
@@ -22,7 +22,7 @@ class PlaceEvidence {
   void add(std::vector<PointLook> looks);
   // Log odds that what is in view is the place of these points, against a look-alike: five to one where nothing is
   // seen.
-  double log_odds(const Map& map, const std::vector<PointId>& points) const;
+  double log_odds(const std::vector<Candidate>& points) const;
   void clear() { votes_.clear(); }
 
  private:

@@ -5,12 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "dkb/features/frame_features.h"
 #include "dkb/features/image_appearance.h"
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
-#include "dkb/tracking/local_map.h"
+#include "dkb/matching/place_fit.h"
 #include "dkb/tracking/place_evidence.h"
 
 namespace dkb {
@@ -20,16 +17,14 @@ constexpr int kMinRelocalisationInliers = 40;  // map points that the pose of a 
 // A pose that a similar keyframe led to, with what speaks for and against it.
 struct PoseProposal {
   KeyframeId keyframe = kNoKeyframe;  // that led to it
-  Rigid3 cam_from_world;
-  std::vector<PointId> points;  // per feature: the map point that it shows, else kNoPoint
-  int inliers = 0;
-  double position_sd = 0;  // [m]
-  bool verified = false;   // enough of the map is found from there, and tells where the camera is
+  PlaceFit fit;
+  std::vector<Candidate> around;  // the map there, of which `fit` tells what was seen
   // Of those that find() and propose() give:
   std::vector<PointLook> looks;  // of well-known map points that should be in view, and are not hidden or gone
-  std::vector<PointId> around;   // the map there
   double log_odds = 0;           // of all that was seen there, against a place that only looks like it
   bool ambiguous = false;        // another place in the map explains the view nearly as well
+
+  bool verified() const;  // enough of the map is found from there, and tells where the camera is
 };
 
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the
@@ -37,7 +32,7 @@ struct PoseProposal {
 // Deterministic for a seed. Features that may lie on movers take no part.
 class Relocaliser {
  public:
-  Relocaliser(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels, uint64_t seed);
+  Relocaliser(const Optics& optics, uint64_t seed);
 
   // True for points that must not be matched.
   using IgnoresPoint = std::function<bool(PointId)>;
@@ -61,19 +56,14 @@ class Relocaliser {
                                          const IgnoresPoint& ignores) const;
 
  private:
-  std::vector<Candidate> map_around(const Map& map, const std::vector<PointId>& points,
-                                    const IgnoresPoint& ignores) const;
-  std::optional<Rigid3> coarse_pose(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
-                                    const IgnoresPoint& ignores, std::vector<PointId>& points) const;
-  bool search(const std::vector<Candidate>& nearby, float radius, const MatchableFeatures& features,
-              PoseProposal& proposal) const;
-  void look_around(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
-                   PointAppearance* appearance, PoseProposal& proposal) const;
+  std::optional<PoseProposal> fit_around(const Map& map, KeyframeId keyframe, const std::vector<PointId>& points,
+                                         const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                         const Rigid3& expected_cam_from_world, std::span<const float> radii) const;
+  std::optional<PlaceFit> coarse_fit(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
+                                     const IgnoresPoint& ignores) const;
+  void look_around(const Map& map, PointAppearance* appearance, PoseProposal& proposal) const;
 
-  CameraModel camera_;
-  SensorNoise noise_;
-  double scale_factor_;
-  int levels_;
+  Optics optics_;
   uint64_t seed_;
 };
 

@@ -28,7 +28,7 @@ class FixedAppearance final : public PointAppearance {
 
 class RelocaliserTest : public ::testing::Test {
  protected:
-  Relocaliser relocaliser() const { return {camera, {}, TestScene::kScaleFactor, TestScene::kLevels, 1}; }
+  Relocaliser relocaliser() const { return {{camera, {}, TestScene::kScaleFactor, TestScene::kLevels}, 1}; }
   std::optional<PoseProposal> find(const MatchableFeatures& features, PointAppearance* appearance = nullptr) const {
     PlaceEvidence evidence;
     return relocaliser().find(map, features, ignores_none, appearance, evidence);
@@ -78,9 +78,9 @@ TEST_F(RelocaliserTest, FindsTheCameraWithoutAnyIdeaOfItsPlace) {
     FixedAppearance unmatched(Look::other);
     const auto found = find(*scene.look(truth, noisy).features, &unmatched);
     ASSERT_TRUE(found) << n;
-    EXPECT_TRUE(found->verified);
-    EXPECT_LT(distance_between(found->cam_from_world, truth), 0.015);
-    EXPECT_LT(rotation_between(found->cam_from_world, truth), 0.3);
+    EXPECT_TRUE(found->verified());
+    EXPECT_LT(distance_between(found->fit.cam_from_world, truth), 0.015);
+    EXPECT_LT(rotation_between(found->fit.cam_from_world, truth), 0.3);
     const auto matched = std::count_if(found->looks.begin(), found->looks.end(), [](PointLook l) { return l.same; });
     EXPECT_GT(static_cast<double>(matched), 0.5 * static_cast<double>(found->looks.size()));
   }
@@ -104,7 +104,7 @@ TEST_F(RelocaliserTest, TwoPlacesThatExplainAFrameEquallyWellAreAmbiguous) {
   const RgbdFeatures features = *scene.look({}).features;
   const auto proposals = relocaliser().propose(map, features, ignores_none, nullptr);
   ASSERT_EQ(proposals.size(), 2U);
-  EXPECT_TRUE(proposals[0].verified && proposals[1].verified);
+  EXPECT_TRUE(proposals[0].verified() && proposals[1].verified());
   const auto found = find(features);
   ASSERT_TRUE(found);
   EXPECT_TRUE(found->ambiguous) << "a guess is no pose";
@@ -119,7 +119,7 @@ TEST_F(RelocaliserTest, FeaturesOnMoversDoNotVote) {
   for (size_t f = 0; f < features.size(); f += 2) motion[f] = FeatureMotion::still;
   const auto found = find({features, motion});
   ASSERT_TRUE(found);
-  for (size_t f = 1; f < features.size(); f += 2) EXPECT_EQ(found->points[f], kNoPoint);
+  for (size_t f = 1; f < features.size(); f += 2) EXPECT_EQ(found->fit.points[f], kNoPoint);
 }
 
 TEST_F(RelocaliserTest, IgnoredPointsAreNotMatched) {
@@ -130,7 +130,7 @@ TEST_F(RelocaliserTest, IgnoredPointsAreNotMatched) {
   const auto found = relocaliser().find(
       map, *features, [](PointId id) { return birth_feature(id) % 2 == 0; }, nullptr, evidence);
   ASSERT_TRUE(found);
-  for (PointId p : found->points)
+  for (PointId p : found->fit.points)
     if (p != kNoPoint) {
       EXPECT_EQ(birth_feature(p) % 2, 1);
     }
@@ -146,7 +146,7 @@ TEST_F(RelocaliserTest, TheImageTellsHowPointsLookThatNoFeatureMatched) {
   const auto looks_by = [&](Look answer) {
     FixedAppearance appearance(answer);
     const auto found = find(features, &appearance);
-    EXPECT_TRUE(found && found->verified);
+    EXPECT_TRUE(found && found->verified());
     const auto same = std::count_if(found->looks.begin(), found->looks.end(), [](PointLook l) { return l.same; });
     return std::pair(same, static_cast<long>(found->looks.size()) - same);
   };
@@ -175,7 +175,7 @@ TEST_F(RelocaliserTest, ALookAlikeIsAmbiguousUntilTheViewsDecide) {
     if (seen->keypoints[f].pixel.x() < 120) seen->descriptors[f] = {f, ~f, f * f, ~(f * f)};
   FixedAppearance different(Look::other);
   const auto found = find(*seen, &different);
-  ASSERT_TRUE(found && found->verified);
+  ASSERT_TRUE(found && found->verified());
   EXPECT_LT(found->log_odds, 0);
 
   Tracker tracker(camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1);

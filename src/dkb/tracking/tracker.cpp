@@ -32,7 +32,7 @@ Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double sca
       levels_(levels),
       options_(options),
       seed_(seed),
-      relocaliser_(camera, noise, scale_factor, levels, seed),
+      relocaliser_({camera, noise, scale_factor, levels}, seed),
       odometry_(camera, noise, scale_factor, options.close_depth) {
   noise_.check();
 }
@@ -363,7 +363,8 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
   }
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;
-  return track_local_map(found->cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->points, frame);
+  return track_local_map(found->fit.cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->fit.points,
+                         frame);
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the

@@ -123,7 +123,7 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
   const auto ignores = [this](PointId point) { return is_retracted(point); };
   const auto right = [&](const std::optional<PoseProposal>& found) {
-    return found && found->verified && expected.agrees(found->cam_from_world);
+    return found && found->verified() && expected.agrees(found->fit.cam_from_world);
   };
   // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
   const double reach_px = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));

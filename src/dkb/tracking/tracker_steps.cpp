@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "dkb/tracking/descriptor_pose.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -61,15 +60,19 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
 // By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
 // the last place of each point finds just enough wrong ones for a wrong pose.
 std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const {
-  std::vector<DescribedPoint> known;
+  std::vector<Candidate> known;
   for (size_t f = 0; f < last_->points.size(); ++f) {
     const PointId id = last_->points[f];
     if (id == kNoPoint || is_retracted(id)) continue;
-    if (const auto at = position(id)) known.push_back({id, *at, last_->features->descriptors[f]});
+    const auto at = position(id);
+    if (!at) continue;
+    Candidate& k = known.emplace_back();
+    k.id = id;
+    k.position = *at;
+    k.descriptor = last_->features->descriptors[f];
   }
-  RansacOptions ransac;
-  ransac.seed = seed_;
-  auto found = pose_by_descriptors(known, frame.matchable(), camera_, noise_, scale_factor_, kMinMatches, ransac);
+  const Optics optics{camera_, noise_, scale_factor_, levels_};
+  auto found = fit_by_descriptors(known, frame.matchable(), optics, kMinMatches, {.seed = seed_});
   if (!found || found->inliers < kMinMatches || !plausible_motion(found->cam_from_world, frame.timestamp))
     return std::nullopt;
   points = std::move(found->points);
@@ -99,9 +102,9 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); });
-    if (near && plausible_motion(near->cam_from_world, frame.timestamp)) {
-      pose = near->cam_from_world;
-      points = std::move(near->points);
+    if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) {
+      pose = near->fit.cam_from_world;
+      points = std::move(near->fit.points);
     }
   }
   if (pose && track_local_map(*pose, kRadiusLocalMap, options_.min_inliers, points, frame)) return true;
