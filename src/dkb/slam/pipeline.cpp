@@ -14,12 +14,12 @@ FrameResult Pipeline::process(const Frame& frame) {
   if (load_) shed_load();
   FrameResult result;
   const Stopwatch whole;
-  std::vector<DueDetections> detections = scenes_.take_due(next_frame_, frame);
+  const FrameIndex index = next_frame_;
+  std::vector<DueDetections> detections = scenes_.take_due(index, frame);
   result.waiting_ms = whole.ms();
   const Expectation expected = expect(frame);
-  scenes_.begin(next_frame_, frame, std::move(detections), expected, std::exchange(outcome_, std::nullopt));
+  scenes_.begin(index, frame, std::move(detections), expected, std::exchange(outcome_, std::nullopt));
   const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
-  scenes_.ask_slow_detector(next_frame_, frame);                   // now that no other thread works for this frame
   result.waiting_ms += take_due_map(!options_.pipeline.realtime);  // as late as it may come: nothing before needs it
   follow_motion(scene);
   retract_late(scene.late_masks);
@@ -31,6 +31,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   if (decision.insert) insert_keyframe(scene, usable, tracked);  // DKB 3.3 happens there
   result.features = report_features(scene, usable, tracked);
   publish(scene, tracked, decision, result);
+  scenes_.ask_slow_detector(index, frame);  // now that no other thread works for this frame
   result.tracking_ms = whole.ms() - result.waiting_ms;
   record_.add_time("tracking", result.tracking_ms);
   result.stages = record_.take_news();
