@@ -59,8 +59,7 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
   // Points of one observation tie nothing together; they follow their keyframe.
   std::vector<PointId> points = map.points_of(keyframes);
   std::erase_if(points, [&](PointId p) { return map.point(p)->observations.size() < 2; });
-  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics.camera, optics.noise,
-                                   optics.scale_factor);
+  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;
   ba.rounds = {5, 10};  // [steps] before and after outliers are told apart

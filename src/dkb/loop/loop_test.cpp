@@ -14,7 +14,7 @@ using test::OdometryWorld;
 using test::RoundTrip;
 
 LocalMapper mapper_of(const OdometryWorld& world, const Map& map) {
-  return LocalMapper(world.scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, Map(map));
+  return LocalMapper(world.scene.optics(), {}, Map(map));
 }
 
 double worst_error(const OdometryWorld& world, const Map& map) {

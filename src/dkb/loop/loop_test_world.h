@@ -49,7 +49,7 @@ class OdometryWorld {
     truths.push_back(truth);
     return k;
   }
-  Optics optics() const { return {scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels}; }
+  Optics optics() const { return scene.optics(); }
   // [m] between where keyframe k is in `m` and where it is in truth; the worlds share their first keyframe.
   double error(const Map& m, KeyframeId k) const {
     return (centre_in_world(m.cam_from_world(k)) - centre_in_world(truths[static_cast<size_t>(k)])).norm();

@@ -6,11 +6,10 @@
 namespace dkb {
 
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
-                        std::vector<PointId> points, const CameraModel& camera, const SensorNoise& noise,
-                        double scale_factor) {
+                        std::vector<PointId> points, const Optics& optics) {
   BaWindow window;
   BaProblem& problem = window.problem;
-  problem.camera = camera;
+  problem.camera = optics.camera;
   std::vector<int> camera_of(static_cast<size_t>(map.keyframe_count()), -1);
   window.keyframes = std::move(keyframes);
   problem.fixed = std::move(fixed);
@@ -29,7 +28,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
 
   add_planes(map, window.keyframes, problem);
 
-  const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
+  const std::vector<double> sigmas = optics.noise.corner_sigmas(optics.scale_factor);
   window.points = std::move(points);
   // Room for what comes and no more: in a large map half of it again would be some megabytes.
   size_t observed = 0;
@@ -52,7 +51,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
       observation.v = k.pixel.y();
       observation.inv_sigma = 1 / corner_sigma(k, sigmas);
       observation.depth = k.depth;
-      if (k.depth > 0) observation.inv_depth_sigma = 1.0 / noise.depth_sigma(k.depth);
+      if (k.depth > 0) observation.inv_depth_sigma = 1.0 / optics.noise.depth_sigma(k.depth);
       problem.observations.push_back(observation);
       window.sources.push_back({o.keyframe, static_cast<int>(p)});
     }

@@ -5,9 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/optics.h"
 #include "dkb/solver/bundle_adjustment.h"
 
 namespace dkb {
@@ -30,7 +29,6 @@ struct BaWindow {
 
 // `keyframes` with their observations of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
-                        std::vector<PointId> points, const CameraModel& camera, const SensorNoise& noise,
-                        double scale_factor);
+                        std::vector<PointId> points, const Optics& optics);
 
 }  // namespace dkb

@@ -36,8 +36,8 @@ Matrix6d carried_to(const Rigid3& cam_from_world, const Matrix6d& in_world) {
 
 }  // namespace
 
-LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
-                                      double scale_factor, const LocalBaOptions& options) {
+LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
+                                      const LocalBaOptions& options) {
   LocalBaReport report;
   std::vector<KeyframeId> keyframes = {newest};
   for (const Covisible& c : map.keyframe(newest)->covisible)
@@ -75,8 +75,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraM
     fixed.push_back(1);
   }
   if (std::none_of(fixed.begin(), fixed.end(), [](uint8_t f) { return f != 0; })) fixed[0] = 1;
-  BaWindow window =
-      make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), camera, noise, scale_factor);
+  BaWindow window = make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), optics);
   BaProblem& problem = window.problem;
   if (options.weighted) set_geometric_weights(problem, options.weights);
 

@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/optics.h"
 #include "dkb/solver/bundle_adjustment.h"
 #include "dkb/solver/geometric_weights.h"
 
@@ -26,7 +25,6 @@ struct LocalBaReport {
 
 // Adjusts the neighbourhood of a keyframe (DKB eqs. 42-48) and writes the result into the map; observations that end as
 // outliers are forgotten. The oldest keyframe of the map never moves.
-LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const CameraModel& camera, const SensorNoise& noise,
-                                      double scale_factor, const LocalBaOptions& options);
+LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics, const LocalBaOptions& options);
 
 }  // namespace dkb

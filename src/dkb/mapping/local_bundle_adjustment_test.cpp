@@ -38,7 +38,7 @@ class LocalBa : public ::testing::Test {
   LocalBaReport adjust(KeyframeId newest, const LocalBaOptions& options = {}) {
     SensorNoise noise;
     noise.scale_exponent = 1;  // the test scene's corners blur with their level's scale
-    return local_bundle_adjustment(map, newest, scene.camera, noise, TestScene::kScaleFactor, options);
+    return local_bundle_adjustment(map, newest, scene.optics(noise), options);
   }
   double worst_camera() const {
     double worst = 0;

@@ -47,15 +47,8 @@ size_t central_descriptor(std::span<const Descriptor> descriptors) {
 
 }  // namespace
 
-LocalMapper::LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-                         const MappingOptions& options, Map map)
-    : camera_(camera),
-      noise_(noise),
-      scale_factor_(scale_factor),
-      levels_(levels),
-      options_(options),
-      planes_(camera, noise),
-      map_(std::move(map)) {
+LocalMapper::LocalMapper(const Optics& optics, const MappingOptions& options, Map map)
+    : optics_(optics), options_(options), planes_(optics.camera, optics.noise), map_(std::move(map)) {
   for (PointId id : map_.live_points())
     if (map_.keyframe_count() - 1 - map_.point(id)->born_at < kProbationKeyframes) young_.push_back(id);
 }
@@ -66,7 +59,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   if (packet.id == kNoKeyframe) return map_.snapshot();
   insert(packet);
   cull_points(packet.id);
-  const auto triangulated = triangulate_new_points(map_, packet.id, camera_, noise_, scale_factor_);
+  const auto triangulated = triangulate_new_points(map_, packet.id, optics_);
   young_.insert(young_.end(), triangulated.begin(), triangulated.end());
   report_.points_created += static_cast<int>(triangulated.size());
   refresh(triangulated);
@@ -75,8 +68,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   if (packet.planes) planes_.recognise(map_, packet.id);
   if (map_.live_keyframe_count() > 1) {
     const Stopwatch ba;
-    const LocalBaReport adjusted =
-        local_bundle_adjustment(map_, packet.id, camera_, noise_, scale_factor_, options_.ba);
+    const LocalBaReport adjusted = local_bundle_adjustment(map_, packet.id, optics_, options_.ba);
     times_.add("local_ba", ba.ms());
     refresh(adjusted.moved_points);
     cull_keyframes(packet.id);
@@ -198,12 +190,10 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
   }
   const Keyframe& k = *map_.keyframe(keyframe);
   ProjectionMatchOptions match;
-  match.noise = noise_;
   match.radius = static_cast<float>(tolerance * kFusionRadius);
   match.max_distance = 50;
   match.ratio = 1.0f;
-  const auto matches = match_by_projection(candidates, *k.features, camera_, k.cam_from_world, scale_factor_, levels_,
-                                           match, nullptr, nullptr);
+  const auto matches = match_by_projection(candidates, *k.features, optics_, k.cam_from_world, match, nullptr, nullptr);
   int fused = 0;
   const auto features = k.features;
   for (const ProjectionMatch& m : matches) {
@@ -213,11 +203,11 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     const Keypoint& kp = features->keypoints[static_cast<size_t>(m.feature)];
     const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
     const Eigen::Vector3d in_cam = cam_from_world * p->position;
-    const double sigma = corner_sigma(kp, noise_, scale_factor_);
-    if ((camera_.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
+    const double sigma = corner_sigma(kp, optics_);
+    if ((optics_.camera.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
         5.991 * tolerance * tolerance * sigma * sigma)
       continue;
-    if (!may_show(kp, in_cam.z(), noise_, tolerance)) continue;
+    if (!may_show(kp, in_cam.z(), optics_.noise, tolerance)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];
     if (there == kNoPoint) {
       map_.observe(id, keyframe, m.feature);
@@ -266,7 +256,7 @@ void LocalMapper::cull_keyframes(KeyframeId newest) {
 
 void LocalMapper::refresh(const std::vector<PointId>& points) {
   for (PointId id : points)
-    if (map_.point(id) != nullptr) refresh_point(map_, id, scale_factor_);
+    if (map_.point(id) != nullptr) refresh_point(map_, id, optics_.scale_factor);
 }
 
 void refresh_point(Map& map, PointId id, double scale_factor) {

@@ -3,14 +3,13 @@
 
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
 #include "dkb/mapping/planes.h"
 #include "dkb/mapping/point_creation.h"
+#include "dkb/matching/optics.h"
 #include "dkb/util/timing.h"
 
 namespace dkb {
@@ -29,8 +28,7 @@ struct MappingReport {
 // the map. Deterministic: the same packets in the same order give the same map.
 class LocalMapper {
  public:
-  LocalMapper(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-              const MappingOptions& options, Map map = {});
+  LocalMapper(const Optics& optics, const MappingOptions& options, Map map = {});
 
   // Works a keyframe in and returns the map as it is then.
   MapView process(const KeyframePacket& packet);
@@ -51,10 +49,7 @@ class LocalMapper {
   void cull_keyframes(KeyframeId newest);
   void refresh(const std::vector<PointId>& points);
 
-  CameraModel camera_;
-  SensorNoise noise_;
-  double scale_factor_;
-  int levels_;
+  Optics optics_;
   MappingOptions options_;
   PlaneRecogniser planes_;
   Map map_;

@@ -13,9 +13,7 @@ namespace {
 
 class Mapping : public ::testing::Test, protected PacketSource {
  protected:
-  LocalMapper make(const MappingOptions& options = {}) const {
-    return LocalMapper(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options);
-  }
+  LocalMapper make(const MappingOptions& options = {}) const { return LocalMapper(scene.optics(), options); }
   static Rigid3 at(int k) { return TestScene::camera_at({0.1 * k, 0.03 * (k % 2), 0.02 * (k % 3)}, {0, 0.02 * k, 0}); }
 };
 

@@ -65,13 +65,13 @@ DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& desc
 
 }  // namespace
 
-std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera,
-                                            const SensorNoise& noise, double scale_factor,
+std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const Optics& optics,
                                             const PointCreationOptions& options) {
   std::vector<PointId> made;
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
   const double max_cosine = std::cos(options.min_parallax_deg * M_PI / 180);
-  const std::vector<double> sigmas = noise.corner_sigmas(scale_factor);
+  const CameraModel& camera = optics.camera;
+  const std::vector<double> sigmas = optics.noise.corner_sigmas(optics.scale_factor);
   for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
     const Keyframe& a = *map.keyframe(newest);
     const Keyframe& b = *map.keyframe(neighbours[n].keyframe);
@@ -109,7 +109,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const C
         if (in_cam.z() < 0.1) return false;
         const double sigma = corner_sigma(k, sigmas);
         if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * sigma * sigma) return false;
-        return may_show(k, in_cam.z(), noise);
+        return may_show(k, in_cam.z(), optics.noise);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;
       found.push_back({static_cast<int>(fa), best.feature, best.distance, *point});

@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/optics.h"
 
 namespace dkb {
 
@@ -16,8 +15,7 @@ struct PointCreationOptions {
 
 // Makes points from features of `newest` that show none yet, by matching them along epipolar lines in covisible
 // keyframes and triangulating. The ids of the new points, increasing.
-std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const CameraModel& camera,
-                                            const SensorNoise& noise, double scale_factor,
+std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const Optics& optics,
                                             const PointCreationOptions& options = {});
 
 }  // namespace dkb

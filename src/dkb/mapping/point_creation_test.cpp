@@ -40,7 +40,7 @@ class PointCreation : public ::testing::Test {
     map = SceneMap(known_scene, views, poses, [&](int i) { return known_scene.points[static_cast<size_t>(i)]; }).map;
   }
   std::vector<PointId> create(const PointCreationOptions& options = {}) {
-    return triangulate_new_points(map, 1, scene.camera, {}, TestScene::kScaleFactor, options);
+    return triangulate_new_points(map, 1, scene.optics(), options);
   }
 
   // `change` gets the fresh features of the first keyframe, and how far what they show is from it [m].

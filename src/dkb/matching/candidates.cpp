@@ -37,11 +37,12 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
 }
 
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
-                                                 const MatchableFeatures& matchable, const CameraModel& camera,
-                                                 const Rigid3& cam_from_world, double scale_factor, int levels,
-                                                 const ProjectionMatchOptions& options,
+                                                 const MatchableFeatures& matchable, const Optics& optics,
+                                                 const Rigid3& cam_from_world, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
   const RgbdFeatures& features = matchable.features;
+  const CameraModel& camera = optics.camera;
+  const double scale_factor = optics.scale_factor;
   const Eigen::Matrix3f rotation = cam_from_world.matrix3().cast<float>();
   const Eigen::Vector3f translation = cam_from_world.translation.cast<float>();
   const Eigen::Vector3f centre = centre_in_world(cam_from_world).cast<float>();
@@ -53,7 +54,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
   std::array<float, 32> boundary{};  // level l is the nearest while the scale is below boundary[l]
   for (int l = 0; l < 32; ++l) boundary[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l + 0.5));
   const float nearest_scale = 1.0f / static_cast<float>(std::pow(scale_factor, 1.5));
-  const float farthest_scale = static_cast<float>(std::pow(scale_factor, levels + 0.5));
+  const float farthest_scale = static_cast<float>(std::pow(scale_factor, optics.levels + 0.5));
 
   std::vector<ProjectionMatch> best_of_feature(features.size());
   for (size_t i = 0; i < candidates.size(); ++i) {
@@ -72,14 +73,14 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (visible != nullptr) (*visible)[i] = 1;
     // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;
-    for (int l = 0; l < levels - 1; ++l) level += scale > boundary[static_cast<size_t>(l)] ? 1 : 0;
+    for (int l = 0; l < optics.levels - 1; ++l) level += scale > boundary[static_cast<size_t>(l)] ? 1 : 0;
     const float radius = options.radius * scales[static_cast<size_t>(level)];
     int best = 256, second = 256, best_feature = -1, best_level = -1, second_level = -1;
     features.grid.for_each_near({u, v, radius, level - 1, level + 1}, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];
-      if (p.z() < k.lent_depth && !may_show(k, p.z(), options.noise)) return;
+      if (p.z() < k.lent_depth && !may_show(k, p.z(), optics.noise)) return;
       if (matchable.on_mover(static_cast<size_t>(f)) &&
-          (!c.established || (k.depth > 0 && !options.noise.same_surface(k.depth, p.z()))))
+          (!c.established || (k.depth > 0 && !optics.noise.same_surface(k.depth, p.z()))))
         return;
       if (taken != nullptr && (*taken)[static_cast<size_t>(f)]) return;
       const int d = hamming_distance(c.descriptor, features.descriptors[static_cast<size_t>(f)]);

@@ -5,10 +5,9 @@
 #include <vector>
 
 #include "dkb/features/frame_features.h"
-#include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/optics.h"
 
 namespace dkb {
 
@@ -32,7 +31,6 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
                        double scale_factor);
 
 struct ProjectionMatchOptions {
-  SensorNoise noise;             // by which a feature's depth tells what it may show
   float radius = 4.0f;           // [px] search radius at the finest level, > 0; grows with the predicted scale
   int max_distance = 64;         // [bits] largest Hamming distance of a match, 0 ... 256
   float ratio = 0.8f;            // best distance must be below this share of the second best on the same level, 0 ... 1
@@ -49,9 +47,8 @@ struct ProjectionMatch {
 // wins, ties go to the earlier candidate. Features in `taken` (non-zero) are left alone. `visible` (when given) is set
 // to 1 for each candidate whose projection lies in view. Deterministic; result by increasing feature.
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
-                                                 const MatchableFeatures& matchable, const CameraModel& camera,
-                                                 const Rigid3& cam_from_world, double scale_factor, int levels,
-                                                 const ProjectionMatchOptions& options,
+                                                 const MatchableFeatures& matchable, const Optics& optics,
+                                                 const Rigid3& cam_from_world, const ProjectionMatchOptions& options,
                                                  const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible);
 
 }  // namespace dkb

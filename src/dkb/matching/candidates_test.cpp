@@ -49,7 +49,7 @@ class CandidateMatching : public ::testing::Test {
                                      const std::vector<uint8_t>* taken = nullptr,
                                      std::vector<uint8_t>* visible = nullptr) {
     features.grid = KeypointGrid(features.keypoints, camera.width, camera.height);
-    return match_by_projection(candidates, {features, motion}, camera, cam_from_world, 1.2, 8, options, taken, visible);
+    return match_by_projection(candidates, {features, motion}, {camera, {}}, cam_from_world, options, taken, visible);
   }
 
   CameraModel camera = simple_camera();

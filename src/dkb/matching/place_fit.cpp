@@ -24,8 +24,7 @@ std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, 
   observations.reserve(matches.size());
   for (const DescriptorMatch& m : matches)
     observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.b)],
-                                            known[static_cast<size_t>(m.a)].position, optics.noise,
-                                            optics.scale_factor));
+                                            known[static_cast<size_t>(m.a)].position, optics));
   const RansacPose pose = estimate_absolute_pose(optics.camera, observations, ransac);
   if (!pose.ok) return std::nullopt;
   PlaceFit fit;
@@ -45,17 +44,14 @@ std::optional<PlaceFit> fit_by_projection(const std::vector<Candidate>& known, c
   fit.cam_from_world = expected_cam_from_world;
   for (const float radius : radii) {
     ProjectionMatchOptions match;
-    match.noise = optics.noise;
     match.radius = radius;
     std::vector<uint8_t> visible(known.size(), 0);
-    const auto matches = match_by_projection(known, matchable, optics.camera, fit.cam_from_world, optics.scale_factor,
-                                             optics.levels, match, nullptr, &visible);
+    const auto matches = match_by_projection(known, matchable, optics, fit.cam_from_world, match, nullptr, &visible);
     std::vector<PoseObservation> observations;
     observations.reserve(matches.size());
     for (const ProjectionMatch& m : matches)
       observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
-                                              known[static_cast<size_t>(m.candidate)].position, optics.noise,
-                                              optics.scale_factor));
+                                              known[static_cast<size_t>(m.candidate)].position, optics));
     const PoseEstimate pose = optimise_pose(optics.camera, fit.cam_from_world, observations);
     if (!pose.ok || pose.inliers < kMinInliers) return std::nullopt;
     fit.cam_from_world = pose.cam_from_world;

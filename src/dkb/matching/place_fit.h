@@ -10,14 +10,6 @@
 
 namespace dkb {
 
-// What an image's features are measured with.
-struct Optics {
-  CameraModel camera;
-  SensorNoise noise;
-  double scale_factor = 1.2;
-  int levels = 8;
-};
-
 // A point that so many keyframes see is to be expected wherever it should be in view.
 inline bool well_known(const MapPoint& point) {
   return point.observations.size() >= 3;

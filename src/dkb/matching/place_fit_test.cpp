@@ -45,7 +45,7 @@ class PlaceFitTest : public ::testing::Test {
   }
 
   TestScene scene{300};
-  Optics optics{scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels};
+  Optics optics = scene.optics();
   std::vector<Candidate> known;
   Rigid3 truth = TestScene::camera_at({0.3, -0.1, 0.2}, {0.05, -0.2, 0.1});
 };

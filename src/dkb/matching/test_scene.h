@@ -9,6 +9,7 @@
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/matching/optics.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -53,6 +54,7 @@ class TestScene {
     return Rigid3(rotation_from_vector(rotation), centre).inverse();
   }
 
+  Optics optics(const SensorNoise& noise = {}) const { return {camera, noise, kScaleFactor, kLevels}; }
   // The level on which a point is found from a distance [m].
   int octave(int point, double distance) const {
     const double level = std::log(fine_at_[static_cast<size_t>(point)] / distance) / std::log(kScaleFactor);

@@ -20,7 +20,7 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
       if (map.root(id) < begin) return true;
     return false;
   };
-  LocalMapper mapper(optics.camera, optics.noise, optics.scale_factor, optics.levels, options.mapping, std::move(both));
+  LocalMapper mapper(optics, options.mapping, std::move(both));
   LoopOptions loop = options.loop_closing.loop;
   loop.min_support = std::min(loop.min_support, second.live_keyframe_count() - 1);  // short maps have few witnesses
   LoopCloser closer(optics, loop, options.seed);

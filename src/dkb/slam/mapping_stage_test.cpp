@@ -10,7 +10,7 @@ namespace {
 
 class MappingStageTest : public ::testing::Test, protected PacketSource {
  protected:
-  LocalMapper mapper() const { return LocalMapper(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}); }
+  LocalMapper mapper() const { return LocalMapper(scene.optics(), {}); }
   KeyframePacket next() {
     const int k = static_cast<int>(shows.size());
     return packet(TestScene::camera_at({0.1 * k, 0.03 * (k % 2), 0}),

@@ -28,6 +28,11 @@ ReadoutOptions readout_options(const SlamOptions& options) {
   return readout;
 }
 
+Optics optics_of(const PipelineContext& context) {
+  const SlamOptions& o = context.options;
+  return {context.camera, o.noise, o.features.scale, o.features.levels};
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
@@ -37,22 +42,18 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       undistort_(context.camera),
       extractor_(options_.features, best_simd(), options_.pipeline.threaded),
       planes_(context.camera, options_.noise),
-      tracker_(context.camera, options_.noise, options_.features.scale, options_.features.levels, options_.tracking,
-               options_.seed),
+      tracker_(optics_of(context), options_.tracking, options_.seed),
       decider_(make_decider(context)),
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
-      readout_(context.camera, options_.noise, options_.features.scale, readout_options(options_)),
+      readout_(optics_of(context), readout_options(options_)),
       movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
       camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
-      mapping_(LocalMapper(context.camera, options_.noise, options_.features.scale, options_.features.levels,
-                           options_.mapping, map),
-               options_.pipeline.threaded),
-      loop_(Optics{context.camera, options_.noise, options_.features.scale, options_.features.levels},
-            options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
+      mapping_(LocalMapper(optics_of(context), options_.mapping, map), options_.pipeline.threaded),
+      loop_(optics_of(context), options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
   tracker_.set_start(options_.base_from_cam.inverse());
   loop_.start_at(next_keyframe_);
   last_keyframe_.id = next_keyframe_ - 1;

@@ -15,13 +15,10 @@ constexpr double kExpectedReadout = kMaxReadout / 2;
 constexpr double kExpectedVariance = kMaxReadout * kMaxReadout / 12;
 }  // namespace
 
-ReadoutCalibration::ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
-                                       const ReadoutOptions& options)
-    : camera_(camera),
-      noise_(noise),
-      scale_factor_(scale_factor),
-      known_(camera.readout > 0 || !options.estimate),
-      readout_(known_ ? camera.readout : kExpectedReadout),
+ReadoutCalibration::ReadoutCalibration(const Optics& optics, const ReadoutOptions& options)
+    : optics_(optics),
+      known_(optics.camera.readout > 0 || !options.estimate),
+      readout_(known_ ? optics.camera.readout : kExpectedReadout),
       information_(1 / kExpectedVariance) {}
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
@@ -38,11 +35,11 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     const Eigen::Vector3d p = frame.cam_from_world * *position;
     if (p.z() < 0.1) continue;
     const Keypoint& k = frame.features->keypoints[f];
-    const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(camera_, p);
+    const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(optics_.camera, p);
     const Eigen::Vector2d flow = jacobian * velocity;
-    const Eigen::Vector2d late = flow * (k.image_pixel.y() / camera_.height - 0.5);
-    const Eigen::Vector2d error = k.pixel.cast<double>() - camera_.project(p);
-    const double sigma = corner_sigma(k, noise_, scale_factor_), weight = 1 / (sigma * sigma);
+    const Eigen::Vector2d late = flow * (k.image_pixel.y() / optics_.camera.height - 0.5);
+    const Eigen::Vector2d error = k.pixel.cast<double>() - optics_.camera.project(p);
+    const double sigma = corner_sigma(k, optics_), weight = 1 / (sigma * sigma);
     pose_pose += weight * jacobian.transpose() * jacobian;
     pose_readout += weight * jacobian.transpose() * late;
     pose_gradient += weight * jacobian.transpose() * error;

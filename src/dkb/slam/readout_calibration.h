@@ -5,8 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
+#include "dkb/matching/optics.h"
 #include "dkb/tracking/frame.h"
 
 namespace dkb {
@@ -22,8 +21,7 @@ struct ReadoutOptions {
 // Deterministic.
 class ReadoutCalibration {
  public:
-  ReadoutCalibration(const CameraModel& camera, const SensorNoise& noise, double scale_factor,
-                     const ReadoutOptions& options);
+  ReadoutCalibration(const Optics& optics, const ReadoutOptions& options);
 
   // [s] to be used for the next frame; the camera file's own where it has one.
   double readout() const { return readout_; }
@@ -34,9 +32,7 @@ class ReadoutCalibration {
            const std::vector<std::optional<Eigen::Vector3d>>& positions);
 
  private:
-  CameraModel camera_;
-  SensorNoise noise_;
-  double scale_factor_;
+  Optics optics_;
   bool known_;
   double readout_;
   double information_;  // [1/s^2] of the readout

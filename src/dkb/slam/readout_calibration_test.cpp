@@ -12,9 +12,9 @@ namespace {
 // Frames of a scene under motion that changes, with rows exposed late by `readout`, of which `known` was taken out.
 double calibrated(double readout, ReadoutOptions options = {}, double file = 0, int frames = 60) {
   const TestScene scene(500);
-  CameraModel camera = scene.camera;
-  camera.readout = file;
-  ReadoutCalibration calibration(camera, {}, TestScene::kScaleFactor, options);
+  Optics optics = scene.optics();
+  optics.camera.readout = file;
+  ReadoutCalibration calibration(optics, options);
   for (int n = 0; n < frames; ++n) {
     Vector6d velocity;
     velocity << 0.3 * std::sin(0.3 * n), 0.1, 0.2 * std::cos(0.2 * n), 0.2 * std::sin(0.5 * n), 0.7 * std::cos(0.4 * n),
@@ -27,9 +27,9 @@ double calibrated(double readout, ReadoutOptions options = {}, double file = 0, 
     for (size_t f = 0; f < features.size(); ++f) {
       Keypoint& k = features.keypoints[f];
       const Eigen::Vector3d p = frame.cam_from_world * scene.points[static_cast<size_t>(view.shows[f])];
-      const double late = (readout - calibration.readout()) * (k.image_pixel.y() / camera.height - 0.5);
+      const double late = (readout - calibration.readout()) * (k.image_pixel.y() / optics.camera.height - 0.5);
       const Eigen::Vector3d then = p + late * (velocity.head<3>() + velocity.tail<3>().cross(p));
-      k.pixel += (camera.project(then) - camera.project(p)).cast<float>();
+      k.pixel += (optics.camera.project(then) - optics.camera.project(p)).cast<float>();
       frame.points.push_back(static_cast<PointId>(view.shows[f]));
       positions.emplace_back(scene.points[static_cast<size_t>(view.shows[f])]);
     }

@@ -23,8 +23,8 @@ std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) con
   result.reserve(points_.size());
   for (const Point& p : points_) {
     const Eigen::Vector3d position = world_from_cam * p.point_in_cam;
-    result.push_back(
-        candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(), scale_factor_));
+    result.push_back(candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(),
+                                  optics_.scale_factor));
   }
   return result;
 }
@@ -38,8 +38,8 @@ OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
 // [px^2] mean over both directions in the image, of a corner and of where a pose puts its point.
 double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
                                       const Matrix6d& covariance) const {
-  const double sigma = corner_sigma(keypoint, noise_, scale_factor_);
-  const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(camera_, point_in_cam);
+  const double sigma = corner_sigma(keypoint, optics_);
+  const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(optics_.camera, point_in_cam);
   return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
 }
 
@@ -47,7 +47,7 @@ double OdometryPoints::parallax_sigma(const OdometryMatch& guessed, const Rigid3
                                       const Rigid3& cam_from_world) const {
   const double depth = (last_cam_from_world * guessed.point_in_world).z();
   const double step = (centre_in_world(cam_from_world) - centre_in_world(last_cam_from_world)).norm();
-  return camera_.fx * step / (std::sqrt(3.0) * depth);
+  return optics_.camera.fx * step / (std::sqrt(3.0) * depth);
 }
 
 bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypoint, const Rigid3& cam_from_world,
@@ -56,8 +56,8 @@ bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypo
   if (!(ray.direction.z() > 0)) return false;
   // It is seen from where it is near to either camera up to infinity.
   const double nearest = std::max(kNearest, (kNearest - ray.origin.z()) / ray.direction.z());
-  const Eigen::Vector2d from = camera_.project(ray.origin + nearest * ray.direction);
-  const Eigen::Vector2d along = camera_.project(ray.direction) - from;
+  const Eigen::Vector2d from = optics_.camera.project(ray.origin + nearest * ray.direction);
+  const Eigen::Vector2d along = optics_.camera.project(ray.direction) - from;
   const Eigen::Vector2d seen = keypoint.pixel.cast<double>();
   const double length = along.squaredNorm();
   const double t = length > 0 ? std::clamp((seen - from).dot(along) / length, 0.0, 1.0) : 0.0;
@@ -91,7 +91,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
     const float depth = k.depth > 0 ? k.depth : k.lent_depth > 0 ? k.lent_depth : depth_around(frame, k);
     if (!(depth > 0) || depth > max_depth_) continue;
     p.point_in_cam = before && !before->guessed ? frame.cam_from_world * before->point_in_world
-                                                : camera_.unproject(k.pixel.cast<double>(), depth);
+                                                : optics_.camera.unproject(k.pixel.cast<double>(), depth);
     if (p.guessed) {
       p.moves = before && before->moves;
       p.first_in_cam = before ? transformed(frame.cam_from_world, before->first)

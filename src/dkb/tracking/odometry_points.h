@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "dkb/geometry/camera.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/matching/candidates.h"
+#include "dkb/matching/optics.h"
 #include "dkb/tracking/frame.h"
 
 namespace dkb {
@@ -19,8 +18,7 @@ namespace dkb {
 // Deterministic.
 class OdometryPoints {
  public:
-  OdometryPoints(const CameraModel& camera, const SensorNoise& noise, double scale_factor, double max_depth)
-      : camera_(camera), noise_(noise), scale_factor_(scale_factor), max_depth_(max_depth) {}
+  OdometryPoints(const Optics& optics, double max_depth) : optics_(optics), max_depth_(max_depth) {}
 
   // The points as matching wants them, in the world that `frame`, the one last remembered, lives in now. Candidate ids
   // are kNoPoint.
@@ -55,9 +53,8 @@ class OdometryPoints {
                         const Matrix6d& covariance) const;
   static float depth_around(const TrackedFrame& frame, const Keypoint& keypoint);
 
-  CameraModel camera_;
-  SensorNoise noise_;
-  double scale_factor_, max_depth_;
+  Optics optics_;
+  double max_depth_;
   std::vector<Point> points_;  // by feature
 };
 

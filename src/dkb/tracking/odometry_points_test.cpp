@@ -30,7 +30,7 @@ TrackedFrame frame_of(const std::vector<Eigen::Vector3f>& pixels_and_depths) {
 
 TEST(OdometryPoints, StartAtTheirDepth) {
   const CameraModel camera;
-  OdometryPoints points(camera, SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({camera, {}}, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 2}});
   frame.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {0, 0, 1});
   points.remember(frame);
@@ -42,7 +42,7 @@ TEST(OdometryPoints, StartAtTheirDepth) {
 }
 
 TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
-  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({}, 4.0);
   const TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 1}, {100, 90, 3}, {300, 80, 2}, {500, 400, 0}});
   points.remember(frame);
   const auto candidates = points.candidates(frame);
@@ -52,7 +52,7 @@ TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
 }
 
 TEST(OdometryPoints, ASurfaceBesideLendsItsDepthBeforeTheSurroundingsDo) {
-  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({}, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 3}});
   RgbdFeatures lent = *frame.features;
   lent.keypoints[0].lent_depth = 2;
@@ -67,7 +67,7 @@ TEST(OdometryPoints, ASurfaceBesideLendsItsDepthBeforeTheSurroundingsDo) {
 TEST(OdometryPoints, AGuessedDepthIsWorthTheLessTheFartherTheCameraWent) {
   CameraModel camera;
   camera.fx = 500;
-  OdometryPoints points(camera, SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({camera, {}}, 4.0);
   const Rigid3 last(Eigen::Quaterniond::Identity(), {0, 0, 1});  // the world's origin lies 1 m before it
   const Rigid3 now(rotation_from_vector({0, 0.1, 0}) * last.rotation,
                    rotation_from_vector({0, 0.1, 0}) * Eigen::Vector3d(0.03, 0.04, 1));
@@ -77,7 +77,7 @@ TEST(OdometryPoints, AGuessedDepthIsWorthTheLessTheFartherTheCameraWent) {
 }
 
 TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
-  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({}, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 1}, {200, 80, 1}, {300, 80, 1}, {400, 80, 5}, {500, 80, 1}});
   frame.points[0] = make_point_id(0, 0);
   frame.outlier[1] = 1;
@@ -92,7 +92,7 @@ TEST(OdometryPoints, LeaveOutMapPointsOutliersSuspectsAndTheFar) {
 }
 
 TEST(OdometryPoints, KeepTheirPlaceInTheWorldWhileFollowedButForGuessedOnes) {
-  OdometryPoints points(CameraModel(), SensorNoise(), 1.2, 4.0);
+  OdometryPoints points({}, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 2}, {300, 80, 2}, {310, 80, 0}});
   frame.odometry[0] = OdometryMatch{{0.1, 0.2, 1.9}, false};
   frame.odometry[2] = OdometryMatch{{0.1, 0.2, 1.5}, true};
@@ -107,7 +107,7 @@ TEST(OdometryPoints, KeepTheirPlaceInTheWorldWhileFollowedButForGuessedOnes) {
 // A point without depth at 100 px right of and 80 px below the corner of the image, seen first at the world's origin.
 struct SeenWithoutDepth : testing::Test {
   const CameraModel camera;
-  OdometryPoints points{camera, SensorNoise(), 1.2, 4.0};
+  OdometryPoints points{{camera, {}}, 4.0};
   TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 2}});
 
   SeenWithoutDepth() { frame.covariance.setZero(); }

@@ -178,7 +178,7 @@ TEST_F(RelocaliserTest, ALookAlikeIsAmbiguousUntilTheViewsDecide) {
   ASSERT_TRUE(found && found->verified());
   EXPECT_LT(found->log_odds, 0);
 
-  Tracker tracker(camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1);
+  Tracker tracker({camera, {}, TestScene::kScaleFactor, TestScene::kLevels}, {}, 1);
   tracker.take_view(map.snapshot());
   tracker.reset_motion();
   FrameIndex index = 0;

@@ -24,17 +24,13 @@ constexpr float kMatchRatio = 0.8f;          // best over second best distance o
 
 }  // namespace
 
-Tracker::Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-                 const TrackingOptions& options, uint64_t seed)
-    : camera_(camera),
-      noise_(noise),
-      scale_factor_(scale_factor),
-      levels_(levels),
+Tracker::Tracker(const Optics& optics, const TrackingOptions& options, uint64_t seed)
+    : optics_(optics),
       options_(options),
       seed_(seed),
-      relocaliser_({camera, noise, scale_factor, levels}, seed),
-      odometry_(camera, noise, scale_factor, options.close_depth) {
-  noise_.check();
+      relocaliser_(optics, seed),
+      odometry_(optics, options.close_depth) {
+  optics_.noise.check();
 }
 
 Rigid3 Tracker::take_view(MapView view) {
@@ -125,16 +121,16 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
-    PoseObservation o = pose_observation(features.keypoints[static_cast<size_t>(pair.feature)], pair.point_in_world,
-                                         noise_, scale_factor_);
+    PoseObservation o =
+        pose_observation(features.keypoints[static_cast<size_t>(pair.feature)], pair.point_in_world, optics_);
     o.pixel_sigma = std::hypot(o.pixel_sigma * pair.sigma_factor, pair.parallax_sigma);
     o.depth_sigma *= pair.sigma_factor;
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
-  if (!expected || !expected->weighs) return optimise_pose(camera_, initial, observations, options);
+  if (!expected || !expected->weighs) return optimise_pose(optics_.camera, initial, observations, options);
   const PosePrior prior{expected->cam_from_world, expected->covariance.inverse()};
-  return optimise_pose(camera_, initial, observations, options, &prior);
+  return optimise_pose(optics_.camera, initial, observations, options, &prior);
 }
 
 // Visual-odometry points weigh little in a pose, and the limits of an inlier widen with their sigmas: a shoe that goes
@@ -146,8 +142,8 @@ double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, cons
   for (size_t i = first; i < pairs.size(); ++i) {
     if (!pose.inlier[i]) continue;
     const Keypoint& k = features.keypoints[static_cast<size_t>(pairs[i].feature)];
-    const double sigma = std::hypot(corner_sigma(k, noise_, scale_factor_), pairs[i].parallax_sigma);
-    const Eigen::Vector2d at = camera_.project(pose.cam_from_world * pairs[i].point_in_world);
+    const double sigma = std::hypot(corner_sigma(k, optics_), pairs[i].parallax_sigma);
+    const Eigen::Vector2d at = optics_.camera.project(pose.cam_from_world * pairs[i].point_in_world);
     squares[i] = (at - k.pixel.cast<double>()).squaredNorm() / (sigma * sigma);
     of_inliers.push_back(squares[i]);
   }
@@ -225,13 +221,11 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
-  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = kMatchRatio;
   std::vector<uint8_t> visible(candidates.size(), 0);
-  const auto matches = match_by_projection(candidates, frame.matchable(), camera_, initial, scale_factor_, levels_,
-                                           match, &taken, &visible);
+  const auto matches = match_by_projection(candidates, frame.matchable(), optics_, initial, match, &taken, &visible);
   for (const auto& m : matches)
     points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
 
@@ -244,8 +238,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   if (last_) {
     for (const Pair& p : pairs) taken[static_cast<size_t>(p.feature)] = 1;
     const std::vector<Candidate> others = odometry_.candidates(*last_);
-    for (const auto& m : match_by_projection(others, frame.matchable(), camera_, initial, scale_factor_, levels_, match,
-                                             &taken, nullptr)) {
+    for (const auto& m : match_by_projection(others, frame.matchable(), optics_, initial, match, &taken, nullptr)) {
       auto& shown = followed[static_cast<size_t>(m.feature)];
       shown = odometry_.match(static_cast<size_t>(m.candidate), *last_);
       if (!shown->moves) pairs.push_back(odometry_pair(m.feature, *shown, initial));

@@ -7,12 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "dkb/geometry/camera.h"
 #include "dkb/geometry/motion_model.h"
-#include "dkb/geometry/sensor_noise.h"
 #include "dkb/map/keyframe_packet.h"
 #include "dkb/map/map.h"
 #include "dkb/matching/candidates.h"
+#include "dkb/matching/optics.h"
 #include "dkb/solver/pose_optimiser.h"
 #include "dkb/tracking/frame.h"
 #include "dkb/tracking/local_map.h"
@@ -41,8 +40,7 @@ struct PointInView {
 // Deterministic: the same frames and views in the same order give the same poses.
 class Tracker {
  public:
-  Tracker(const CameraModel& camera, const SensorNoise& noise, double scale_factor, int levels,
-          const TrackingOptions& options, uint64_t seed);
+  Tracker(const Optics& optics, const TrackingOptions& options, uint64_t seed);
 
   // A newer view: the last pose is re-expressed through its reference keyframe. Returns how the world moved under the
   // camera: new_world_from_old_world.
@@ -133,10 +131,7 @@ class Tracker {
   static void drop_unmatched_suspects(TrackedFrame& frame);
   void finish(TrackedFrame& frame);
 
-  CameraModel camera_;
-  SensorNoise noise_;
-  double scale_factor_;
-  int levels_;
+  Optics optics_;
   TrackingOptions options_;
   uint64_t seed_;
   Relocaliser relocaliser_;

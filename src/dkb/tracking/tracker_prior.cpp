@@ -102,7 +102,7 @@ double Tracker::search_radius(double radius) const {
 // [px] three standard deviations of where a pose of that covariance puts a point 1 m away, nearer than most.
 double Tracker::spread_px(const Matrix6d& covariance) const {
   const auto sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return 3 * camera_.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
+  return 3 * optics_.camera.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.

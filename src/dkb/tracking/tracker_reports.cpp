@@ -48,8 +48,8 @@ std::vector<PointInView> Tracker::points_in_view() const {
   const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
     const Eigen::Vector3d p = last_->cam_from_world * world;
     if (p.z() < 0.1) return;
-    const Eigen::Vector2d pixel = camera_.project(p);
-    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera_.width && pixel.y() < camera_.height)
+    const Eigen::Vector2d pixel = optics_.camera.project(p);
+    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < optics_.camera.width && pixel.y() < optics_.camera.height)
       in_view.push_back({id, pixel, p.z()});
   };
   for (const Candidate& c : candidates_)
@@ -81,8 +81,8 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
     p.id = make_point_id(id, f);
     p.keyframe = id;
     p.feature = f;
-    p.point_in_keyframe = camera_.unproject(k.pixel.cast<double>(), z);
-    p.scale = static_cast<float>(std::pow(scale_factor_, k.octave));
+    p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), z);
+    p.scale = static_cast<float>(std::pow(optics_.scale_factor, k.octave));
     p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
     packet.new_points.push_back(p);
   }
@@ -109,7 +109,7 @@ void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, Tracked
     if (p.keyframe != last_->reference) {
       ++it;
     } else if (k.depth > 0) {
-      p.point_in_keyframe = camera_.unproject(k.pixel.cast<double>(), k.depth);
+      p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), k.depth);
       ++it;
     } else {
       last_->points[static_cast<size_t>(p.feature)] = kNoPoint;

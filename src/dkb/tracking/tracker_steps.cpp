@@ -31,19 +31,17 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     if (id == kNoPoint || is_retracted(id)) continue;
     const auto at = position(id);
     if (!at) continue;
-    Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), scale_factor_);
+    Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), optics_.scale_factor);
     c.id = id;
     if (!seen_from_here) c.angle = -1;
     c.established = established(id, last_->timestamp);
     candidates.push_back(c);
   }
   ProjectionMatchOptions match;
-  match.noise = noise_;
   match.radius = static_cast<float>(radius);
   match.max_distance = kMatchDistance;
   match.ratio = 0.9f;
-  const auto matches =
-      match_by_projection(candidates, features, camera_, predicted, scale_factor_, levels_, match, nullptr, nullptr);
+  const auto matches = match_by_projection(candidates, features, optics_, predicted, match, nullptr, nullptr);
   if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
   std::vector<Pair> pairs;
   pairs.reserve(matches.size());
@@ -71,8 +69,7 @@ std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::
     k.position = *at;
     k.descriptor = last_->features->descriptors[f];
   }
-  const Optics optics{camera_, noise_, scale_factor_, levels_};
-  auto found = fit_by_descriptors(known, frame.matchable(), optics, kMinMatches, {.seed = seed_});
+  auto found = fit_by_descriptors(known, frame.matchable(), optics_, kMinMatches, {.seed = seed_});
   if (!found || found->inliers < kMinMatches || !plausible_motion(found->cam_from_world, frame.timestamp))
     return std::nullopt;
   points = std::move(found->points);

@@ -192,7 +192,7 @@ TEST_F(TrackerTest, AfterAResetOfMotionTheFrameIsFoundAnew) {
 TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
   std::vector<Rigid3> runs[2];
   for (auto& poses : runs) {
-    tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1);
+    tracker = Tracker(scene.optics(), {}, 1);
     map = Map();
     keyframe_shows.clear();
     index = -1;
@@ -211,7 +211,7 @@ TEST_F(TrackerTest, TheSameFramesGiveTheSameBits) {
 TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   TrackingOptions options;
   options.new_map_after = 3.5 * kFrameTime;  // [s] the fifth lost frame is four later than the first
-  tracker = Tracker(scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, options, 1);
+  tracker = Tracker(scene.optics(), options, 1);
   publish(start(on_path(0)));
   const TrackedFrame last = track(on_path(1));
   const TestScene home = scene;

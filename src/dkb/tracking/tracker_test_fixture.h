@@ -95,7 +95,7 @@ class TrackerTest : public ::testing::Test {
   }
 
   TestScene scene{700};
-  Tracker tracker{scene.camera, {}, TestScene::kScaleFactor, TestScene::kLevels, {}, 1};
+  Tracker tracker{scene.optics(), {}, 1};
   Map map;
   View view;  // of the last frame
   std::vector<std::vector<int>> keyframe_shows;
