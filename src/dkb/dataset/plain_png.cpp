@@ -12,6 +12,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <type_traits>
 #endif
 
 namespace dkb::formats {
@@ -94,8 +95,10 @@ Lanes one_row_down(Lanes v) {
 
 template <int bpp>
 uint64_t load_pixel(const uint8_t* at) {
-  uint64_t pixel = 0;
-  for (int i = 0; i < bpp; ++i) pixel |= static_cast<uint64_t>(at[i]) << (8 * i);
+  // Byte by byte GCC would load each on its own.
+  if constexpr (bpp == 3) return load_pixel<2>(at) | static_cast<uint64_t>(at[2]) << 16;
+  std::conditional_t<bpp == 2, uint16_t, uint8_t> pixel = 0;
+  std::memcpy(&pixel, at, sizeof pixel);
   return pixel;
 }
 
