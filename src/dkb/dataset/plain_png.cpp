@@ -114,8 +114,8 @@ class RowGroup {
     for (int row = 0; row < kRows; ++row) {
       const uint8_t filter = first[static_cast<ptrdiff_t>(row * pitch) - 1];
       for (int lane = row * bpp; lane < (row + 1) * bpp; ++lane) {
-        is_left_[lane] = filter == 1 ? -1 : 0, is_above_[lane] = filter == 2 ? -1 : 0;
-        is_mean_[lane] = filter == 3 ? -1 : 0, is_paeth_[lane] = filter == 4 ? -1 : 0;
+        by_left_[lane] = filter == 1 || filter == 4 ? -1 : 0, by_above_[lane] = filter == 2 || filter == 4 ? -1 : 0;
+        by_mean_[lane] = filter == 3 ? -1 : 0, by_all_[lane] = filter == 4 ? -1 : 0;
       }
     }
   }
@@ -126,18 +126,9 @@ class RowGroup {
     uint64_t raw = 0;
     for (int row = 0; row < kRows; ++row)
       if (exists(x - row)) raw |= load_pixel<bpp>(at(x - row, row)) << (8 * bpp * row);
-    const Lanes above_left = above_;
-    above_ = one_row_down<bpp>(left_);
-    if (exists(x)) above_ |= widened(load_pixel<bpp>(at(x, 0) - pitch_));
-    const Lanes both = left_ + above_;
-    const Lanes from_left = distance(above_, above_left), from_above = distance(left_, above_left);
-    const Lanes from_both = distance(both, above_left + above_left);
-    const Lanes nearest = from_above < from_both ? from_above : from_both;
-    const Lanes nearer = from_above <= from_both ? above_ : above_left;
-    const Lanes simple = (left_ & is_left_) | (above_ & is_above_) | ((both >> 1) & is_mean_);
-    const Lanes expected = ((from_left <= nearest ? left_ : nearer) & is_paeth_) | simple;
-    left_ = (widened(raw) + expected) & 255;
-    const uint64_t pixels = narrowed(left_);
+    Lanes above = one_row_down<bpp>(left_);
+    if (exists(x)) above |= widened(load_pixel<bpp>(at(x, 0) - pitch_));
+    const uint64_t pixels = narrowed(unfiltered(widened(raw), above));
     for (int row = 0; row < kRows; ++row)
       if (exists(x - row)) {
         const uint64_t pixel = pixels >> (8 * bpp * row);
@@ -145,29 +136,112 @@ class RowGroup {
       }
   }
 
+#if defined(__SSE2__)
+  // The same of eight pixels in a row, all of which exist. Of two bytes: the rows are turned into columns and back.
+  void take_eight(int x) {
+    static_assert(bpp == 2);
+    for (int row = 0; row < 4; ++row) tile_[row] = load(at(x - row, row));
+    const __m128i upper[] = {_mm_unpacklo_epi16(tile_[0], tile_[1]), _mm_unpackhi_epi16(tile_[0], tile_[1])};
+    const __m128i lower[] = {_mm_unpacklo_epi16(tile_[2], tile_[3]), _mm_unpackhi_epi16(tile_[2], tile_[3])};
+    for (int half = 0; half < 2; ++half) {
+      tile_[2 * half] = _mm_unpacklo_epi32(upper[half], lower[half]);
+      tile_[2 * half + 1] = _mm_unpackhi_epi32(upper[half], lower[half]);
+    }
+    const __m128i above = load(at(x, 0) - pitch_), none = _mm_setzero_si128();
+    above_[0] = _mm_unpacklo_epi8(above, none), above_[1] = _mm_unpackhi_epi8(above, none);
+  }
+  // Two pixels of each row.
+  template <int pair>
+  void step_twice() {
+    const __m128i none = _mm_setzero_si128();
+    const __m128i even = step_in_tile(_mm_unpacklo_epi8(tile_[pair], none), 2 * pair);
+    tile_[pair] = _mm_packus_epi16(even, step_in_tile(_mm_unpackhi_epi8(tile_[pair], none), 2 * pair + 1));
+  }
+  void give_eight(int x) {
+    __m128i halves[4];
+    for (int half = 0; half < 2; ++half) {
+      const __m128i even = _mm_unpacklo_epi16(tile_[2 * half], tile_[2 * half + 1]);
+      const __m128i odd = _mm_unpackhi_epi16(tile_[2 * half], tile_[2 * half + 1]);
+      halves[half] = _mm_unpacklo_epi16(even, odd), halves[2 + half] = _mm_unpackhi_epi16(even, odd);
+    }
+    for (int pair = 0; pair < 2; ++pair) {
+      store(at(x - 2 * pair, 2 * pair), _mm_unpacklo_epi64(halves[2 * pair], halves[2 * pair + 1]));
+      store(at(x - 2 * pair - 1, 2 * pair + 1), _mm_unpackhi_epi64(halves[2 * pair], halves[2 * pair + 1]));
+    }
+  }
+#endif
+
  private:
-  uint8_t* at(int x, int row) const { return first_ + row * pitch_ + x * bpp; }
+  uint8_t* at(int x, int row) const {
+    return first_ + row * pitch_ + x * bpp;
+  }
+#if defined(__SSE2__)
+  __m128i step_in_tile(__m128i raw, int x) {
+    const __m128i above = above_[x / 4];
+    const __m128i shifted = x % 4 == 0   ? above
+                            : x % 4 == 1 ? _mm_srli_si128(above, 4)
+                            : x % 4 == 2 ? _mm_srli_si128(above, 8)
+                                         : _mm_srli_si128(above, 12);
+    const __m128i of_first = _mm_and_si128(shifted, _mm_cvtsi32_si128(-1));
+    const Lanes all_above = one_row_down<2>(left_) | reinterpret_cast<Lanes>(of_first);
+    return reinterpret_cast<__m128i>(unfiltered(reinterpret_cast<Lanes>(raw), all_above));
+  }
+  static __m128i load(const uint8_t* from) {
+    return _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
+  }
+  static void store(uint8_t* to, __m128i v) {
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), v);
+  }
+#endif
+
+  // By Paeth's rule, of which the others are cases: on the left where nothing is above, above where nothing is left.
+  Lanes unfiltered(Lanes raw, Lanes above) {
+    const Lanes mean = ((left_ + above) >> 1) & by_mean_;
+    const Lanes left = left_ & by_left_, up = above & by_above_, corner = above_left_ & by_all_;
+    const Lanes from_left = distance(up, corner), from_up = distance(left, corner);
+    const Lanes from_corner = distance(left + up, corner + corner);
+    const Lanes nearest = from_up < from_corner ? from_up : from_corner;
+    const Lanes nearer = from_up <= from_corner ? up : corner;
+    above_left_ = above;
+    left_ = (raw + ((from_left <= nearest ? left : nearer) | mean)) & 255;
+    return left_;
+  }
 
   uint8_t* const first_;
   const size_t pitch_;
-  Lanes is_left_{}, is_above_{}, is_mean_{}, is_paeth_{};
-  Lanes left_{}, above_{};
+  Lanes by_left_{}, by_above_{}, by_mean_{}, by_all_{};
+  Lanes left_{}, above_left_{};
+#if defined(__SSE2__)
+  __m128i tile_[4], above_[2];
+#endif
 };
 
 // Two groups at once, the second one behind the first: the processor works at one while it waits for the other.
 template <int bpp>
 void unfilter_rows(uint8_t* first, size_t pitch, int width) {
   constexpr int kRows = RowGroup<bpp>::kRows;
+  constexpr int kBehind = 3 * kRows;  // [px] so that of eight pixels all above are done before the eight begin
   RowGroup<bpp> upper(first, pitch), lower(first + kRows * pitch, pitch);
   const auto step = [&](int x, const auto& exists) {
     upper.step(x, exists);
-    lower.step(x - kRows, exists);
+    lower.step(x - kBehind, exists);
   };
   const auto checked = [width](int x) { return x >= 0 && x < width; };
   int x = 0;
-  for (; x < 2 * kRows - 1; ++x) step(x, checked);
+  for (; x < kBehind + kRows - 1; ++x) step(x, checked);
+#if defined(__SSE2__)
+  if constexpr (bpp == 2)
+    for (; x + 8 <= width; x += 8) {
+      upper.take_eight(x), lower.take_eight(x - kBehind);
+      upper.template step_twice<0>(), lower.template step_twice<0>();
+      upper.template step_twice<1>(), lower.template step_twice<1>();
+      upper.template step_twice<2>(), lower.template step_twice<2>();
+      upper.template step_twice<3>(), lower.template step_twice<3>();
+      upper.give_eight(x), lower.give_eight(x - kBehind);
+    }
+#endif
   for (; x < width; ++x) step(x, [](int) { return true; });
-  for (; x < width + 2 * kRows - 1; ++x) step(x, checked);
+  for (; x < width + kBehind + kRows - 1; ++x) step(x, checked);
 }
 
 template <int bpp>

@@ -101,8 +101,8 @@ class PlainPngTest : public testing::Test {
 
 TEST_F(PlainPngTest, EveryFilterIsUndoneAtEverySize) {
   for (const int bpp : {1, 2, 3})
-    for (int width = 1; width < 15; ++width)
-      for (int height = 1; height < 18; ++height) {
+    for (int width = 1; width < 50; ++width)
+      for (int height = 1; height < 18; height += width < 15 ? 1 : 7) {
         const PlainImage image(width, height, bpp, random_);
         const std::string file = image.header() + chunk("IDAT", deflated(image.filtered(random_))) + kEnd;
         ASSERT_EQ(image.read_from(file), image.in_machine_order()) << bpp << " " << width << "x" << height;
