@@ -36,16 +36,6 @@ struct RgbdFeatures {
   size_t size() const { return keypoints.size(); }
 };
 
-// Standard deviation [px, full resolution] of where a feature lies: what corners of its level vary by, and what the
-// image's noise leaves of its own.
-inline double corner_sigma(const Keypoint& keypoint, const SensorNoise& noise, double scale_factor) {
-  return std::hypot(noise.corner_sigma(keypoint.octave, scale_factor), static_cast<double>(keypoint.place_sigma));
-}
-// The same with SensorNoise::corner_sigmas(), for many.
-inline double corner_sigma(const Keypoint& keypoint, const std::vector<double>& by_octave) {
-  return std::hypot(by_octave[keypoint.octave], static_cast<double>(keypoint.place_sigma));
-}
-
 // Whether a corner may show what lies `z` [m] before the camera: the surface whose depth it has or, where it has none
 // of its own, nothing nearer than the surfaces around it. `tolerance` times what the noise lets depths differ by is
 // allowed.

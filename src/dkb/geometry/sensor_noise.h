@@ -31,13 +31,6 @@ struct SensorNoise {
   double corner_sigma(int octave, double scale_factor) const {
     return pixel_sigma * std::pow(scale_factor, scale_exponent * octave);
   }
-  // The same for every level that a pyramid may have.
-  std::vector<double> corner_sigmas(double scale_factor) const {
-    std::vector<double> sigmas(kMaxLevels);
-    for (int octave = 0; octave < kMaxLevels; ++octave)
-      sigmas[static_cast<size_t>(octave)] = corner_sigma(octave, scale_factor);
-    return sigmas;
-  }
   // Standard deviation [m] of a depth z [m] on a flat wall (the source), and at a corner.
   double flat_depth_sigma(double z) const { return depth_sigma_base + depth_sigma_quadratic * (z - 0.4) * (z - 0.4); }
   double depth_sigma(double z) const { return depth_sigma_factor * flat_depth_sigma(z); }

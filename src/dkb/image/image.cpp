@@ -41,6 +41,13 @@ __attribute__((target("avx2"))) size_t grey_avx2(const Rgb* in, size_t n, uint8_
 }
 #endif
 
+struct WithinRange {
+  explicit WithinRange(const Camera& camera)
+      : low(static_cast<float>(camera.depth_min)), high(static_cast<float>(camera.depth_max)) {}
+  float operator()(float depth) const { return depth >= low && depth <= high ? depth : 0.0f; }  // false for NaN
+  const float low, high;
+};
+
 }  // namespace
 
 GreyImage grey_from_colour(const ColourImage& colour) {
@@ -58,18 +65,18 @@ GreyImage grey_from_colour(const ColourImage& colour) {
 }
 
 void depth_from_units(const uint16_t* units, size_t count, const Camera& camera, float* metres) {
+  const WithinRange within(camera);
   const auto factor = static_cast<float>(camera.depth_factor);
   if (static_cast<double>(factor) == camera.depth_factor)  // one rounding, that of the division
-    for (size_t i = 0; i < count; ++i) metres[i] = static_cast<float>(units[i]) / factor;
+    for (size_t i = 0; i < count; ++i) metres[i] = within(static_cast<float>(units[i]) / factor);
   else
     for (size_t i = 0; i < count; ++i)
-      metres[i] = static_cast<float>(static_cast<double>(units[i]) / camera.depth_factor);
-  depth_from_metres(metres, count, camera, metres);
+      metres[i] = within(static_cast<float>(static_cast<double>(units[i]) / camera.depth_factor));
 }
 
 void depth_from_metres(const float* in, size_t count, const Camera& camera, float* metres) {
-  const auto low = static_cast<float>(camera.depth_min), high = static_cast<float>(camera.depth_max);
-  for (size_t i = 0; i < count; ++i) metres[i] = in[i] >= low && in[i] <= high ? in[i] : 0.0f;  // false for NaN
+  const WithinRange within(camera);
+  for (size_t i = 0; i < count; ++i) metres[i] = within(in[i]);
 }
 
 }  // namespace dkb

@@ -28,7 +28,6 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
 
   add_planes(map, window.keyframes, problem);
 
-  const std::vector<double> sigmas = optics.noise.corner_sigmas(optics.scale_factor);
   window.points = std::move(points);
   // Room for what comes and no more: in a large map half of it again would be some megabytes.
   size_t observed = 0;
@@ -49,7 +48,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
       observation.point = static_cast<int>(p);
       observation.u = k.pixel.x();
       observation.v = k.pixel.y();
-      observation.inv_sigma = 1 / corner_sigma(k, sigmas);
+      observation.inv_sigma = 1 / optics.corner_sigma(k);
       observation.depth = k.depth;
       if (k.depth > 0) observation.inv_depth_sigma = 1.0 / optics.noise.depth_sigma(k.depth);
       problem.observations.push_back(observation);

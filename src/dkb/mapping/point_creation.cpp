@@ -33,13 +33,12 @@ struct FreeFeature {
   double limit = 0;     // [px^2]
 };
 
-std::vector<FreeFeature> free_features(const Keyframe& keyframe, double chi2, const std::vector<double>& sigmas) {
+std::vector<FreeFeature> free_features(const Keyframe& keyframe, double chi2, const Optics& optics) {
   std::vector<FreeFeature> free;
   for (size_t f = 0; f < keyframe.points.size(); ++f) {
     if (keyframe.points[f] != kNoPoint) continue;
     const Keypoint& k = keyframe.features->keypoints[f];
-    const double sigma = corner_sigma(k, sigmas);
-    free.push_back({static_cast<int>(f), k.pixel.x(), k.pixel.y(), chi2 * sigma * sigma});
+    free.push_back({static_cast<int>(f), k.pixel.x(), k.pixel.y(), chi2 * optics.corner_variance(k)});
   }
   return free;
 }
@@ -71,7 +70,6 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
   const double max_cosine = std::cos(options.min_parallax_deg * M_PI / 180);
   const CameraModel& camera = optics.camera;
-  const std::vector<double> sigmas = optics.noise.corner_sigmas(optics.scale_factor);
   for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
     const Keyframe& a = *map.keyframe(newest);
     const Keyframe& b = *map.keyframe(neighbours[n].keyframe);
@@ -80,7 +78,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
     if (b_from_a.translation.norm() < 0.02) continue;  // [m] nothing can be triangulated over so short a base
     const Eigen::Matrix3d rotation_b_from_a = b_from_a.matrix3();
     const Eigen::Matrix3d essential = skew(b_from_a.translation) * rotation_b_from_a;
-    const std::vector<FreeFeature> free_b = free_features(b, kChi2Epipolar, sigmas);
+    const std::vector<FreeFeature> free_b = free_features(b, kChi2Epipolar, optics);
     struct Found {
       int feature_a, feature_b, distance;
       Eigen::Vector3d point;
@@ -107,8 +105,8 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
-        const double sigma = corner_sigma(k, sigmas);
-        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * sigma * sigma) return false;
+        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * optics.corner_variance(k))
+          return false;
         return may_show(k, in_cam.z(), optics.noise);
       };
       if (!fits(a.cam_from_world, ka) || !fits(b.cam_from_world, kb)) continue;

@@ -13,7 +13,7 @@ inline PoseObservation pose_observation(const Keypoint& feature, const Eigen::Ve
   PoseObservation o;
   o.point_in_world = point_in_world;
   o.pixel = feature.pixel.cast<double>();
-  o.pixel_sigma = corner_sigma(feature, optics);
+  o.pixel_sigma = optics.corner_sigma(feature);
   o.depth = feature.depth;
   if (feature.depth > 0) o.depth_sigma = optics.noise.depth_sigma(feature.depth);
   return o;

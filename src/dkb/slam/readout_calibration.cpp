@@ -39,7 +39,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     const Eigen::Vector2d flow = jacobian * velocity;
     const Eigen::Vector2d late = flow * (k.image_pixel.y() / optics_.camera.height - 0.5);
     const Eigen::Vector2d error = k.pixel.cast<double>() - optics_.camera.project(p);
-    const double sigma = corner_sigma(k, optics_), weight = 1 / (sigma * sigma);
+    const double weight = 1 / optics_.corner_variance(k);
     pose_pose += weight * jacobian.transpose() * jacobian;
     pose_readout += weight * jacobian.transpose() * late;
     pose_gradient += weight * jacobian.transpose() * error;

@@ -38,9 +38,8 @@ OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
 // [px^2] mean over both directions in the image, of a corner and of where a pose puts its point.
 double OdometryPoints::sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
                                       const Matrix6d& covariance) const {
-  const double sigma = corner_sigma(keypoint, optics_);
   const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(optics_.camera, point_in_cam);
-  return sigma * sigma + (jacobian * covariance * jacobian.transpose()).trace() / 2;
+  return optics_.corner_variance(keypoint) + (jacobian * covariance * jacobian.transpose()).trace() / 2;
 }
 
 double OdometryPoints::parallax_sigma(const OdometryMatch& guessed, const Rigid3& last_cam_from_world,

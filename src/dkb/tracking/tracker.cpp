@@ -22,6 +22,10 @@ constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, 
 constexpr double kGoOnAfter = 0.1;           // [s] without a pose by the images: more than a blurred one or two
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
+double square(double a) {
+  return a * a;
+}
+
 }  // namespace
 
 Tracker::Tracker(const Optics& optics, const TrackingOptions& options, uint64_t seed)
@@ -121,9 +125,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
-    PoseObservation o =
-        pose_observation(features.keypoints[static_cast<size_t>(pair.feature)], pair.point_in_world, optics_);
-    o.pixel_sigma = std::hypot(o.pixel_sigma * pair.sigma_factor, pair.parallax_sigma);
+    const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
+    PoseObservation o = pose_observation(k, pair.point_in_world, optics_);
+    o.pixel_sigma = std::sqrt(optics_.corner_variance(k) * square(pair.sigma_factor) + square(pair.parallax_sigma));
     o.depth_sigma *= pair.sigma_factor;
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
@@ -142,9 +146,9 @@ double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, cons
   for (size_t i = first; i < pairs.size(); ++i) {
     if (!pose.inlier[i]) continue;
     const Keypoint& k = features.keypoints[static_cast<size_t>(pairs[i].feature)];
-    const double sigma = std::hypot(corner_sigma(k, optics_), pairs[i].parallax_sigma);
+    const double variance = optics_.corner_variance(k) + square(pairs[i].parallax_sigma);
     const Eigen::Vector2d at = optics_.camera.project(pose.cam_from_world * pairs[i].point_in_world);
-    squares[i] = (at - k.pixel.cast<double>()).squaredNorm() / (sigma * sigma);
+    squares[i] = (at - k.pixel.cast<double>()).squaredNorm() / variance;
     of_inliers.push_back(squares[i]);
   }
   if (of_inliers.empty()) return PoseOptions().chi2_pixel;
