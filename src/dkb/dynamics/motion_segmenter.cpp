@@ -38,7 +38,7 @@ constexpr int kSupport = 5;      // cells of 3 x 3 that must agree
 constexpr double kWalk = 1.5;    // [m/s] people walk at their ease (1.3 to 1.5: Bohannon, Age and Ageing 1997)
 // [m/s] The same along the line of sight, in the mean over all ways that they may go.
 constexpr double kWalkInDepth = 2 / std::numbers::pi * kWalk;
-constexpr size_t kBlock = 640;  // [cells] worked at together
+constexpr size_t kBlockCells = 640;  // [cells] worked at together
 
 template <class T>
 std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
@@ -81,8 +81,8 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
   const int width = rays_.width(), height = rays_.height();
   for (Image<float>* i : {&tolerance_, &still_, &weighted_, &weights_}) *i = Image<float>(width, height);
   known_ = intruding_ = vacated_ = Image<uint8_t>(width, height);
-  verdict_.resize(kBlock);
-  for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlock);
+  verdict_.resize(kBlockCells);
+  for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlockCells);
 }
 
 void MotionSegmenter::reset() {
@@ -126,8 +126,8 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   find_pose(step_covariance);
   choose_views();
   // Some cells through all steps before the next: what they read and write stays in the nearest cache.
-  for (size_t first = 0; first < score().size(); first += kBlock) {
-    const CellRange block{first, std::min(kBlock, score().size() - first)};
+  for (size_t first = 0; first < score().size(); first += kBlockCells) {
+    const CellRange block{first, std::min(kBlockCells, score().size() - first)};
     find_tolerances(block);
     carry_scores(block);
     clear(still_, block);
@@ -244,7 +244,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
     const MotionView::Cell& cell = view[at];
     there_.nearest[i] = cell.nearest, there_.farthest[i] = cell.farthest;
     there_.depth[i] = cell.depth, there_.score[i] = cell.score;
-    if (i % 4 == 0) __builtin_prefetch(view.data() + std::min(at + kBlock, last));
+    if (i % 4 == 0) __builtin_prefetch(view.data() + std::min(at + kBlockCells, last));
   }
   run_vectorised(
       simd_, [count = block.count, cell = cells.data(), depth_there = projection_.depth.data(),
@@ -274,8 +274,8 @@ void MotionSegmenter::find_vacated() {
   const int width = depth.width(), height = depth.height();
   rays_.project(previous_->depth, kTooNear, current_->cam_from_world * previous_->cam_from_world.inverse(),
                 rays_.all_cells(), projection_, simd_);
-  for (size_t first = 0; first < vacated_.size(); first += kBlock) {
-    const size_t count = std::min(kBlock, vacated_.size() - first);
+  for (size_t first = 0; first < vacated_.size(); first += kBlockCells) {
+    const size_t count = std::min(kBlockCells, vacated_.size() - first);
     const int32_t* const cells = projection_.cell.data() + first;
     for (size_t i = 0; i < count; ++i)
       there_.nearest[i] = current_->nearest.data()[static_cast<size_t>(std::max(cells[i], 0))];
