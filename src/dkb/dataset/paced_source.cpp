@@ -43,6 +43,11 @@ PacedSource::~PacedSource() {
 }
 
 SourceFrame PacedSource::next() {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_ = true;
+  }
+  wake_.notify_all();
   if (std::optional<SourceFrame> frame = queue_.pop()) return std::move(*frame);
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -86,6 +91,13 @@ bool PacedSource::wait_until(Clock::time_point due) {
   }
 }
 
+// A recording decodes another frame when one is taken from it: better while the consumer rests than while it works.
+bool PacedSource::wait_until_asked(std::chrono::nanoseconds at_most) {
+  std::unique_lock lock(mutex_);
+  wake_.wait_for(lock, at_most, [&] { return stopped_ || asked_; });
+  return !stopped_;
+}
+
 SourceCounts PacedSource::counts() const {
   SourceCounts counts = source_.counts();
   counts.dropped += dropped_;
@@ -108,10 +120,15 @@ void PacedSource::run() {
       }
     left_out.skip(dropped.frame);
   };
+  std::optional<std::chrono::nanoseconds> last_due;
+  std::chrono::nanoseconds interval{};  // between the last two frames
   try {
     for (;;) {
       SourceFrame frame = source_.next();
-      if (const auto due = due_(frame)) {
+      const auto due = due_(frame);
+      if (due) {
+        if (last_due) interval = *due - *last_due;
+        last_due = due;
         const Clock::time_point at = [&] {
           const std::lock_guard lock(mutex_);
           return now();
@@ -131,7 +148,12 @@ void PacedSource::run() {
         frame.frame = left_out.with_motion(std::move(frame.frame));
         left_out = {};
       }
+      {
+        const std::lock_guard lock(mutex_);
+        asked_ = false;
+      }
       dropped_ += static_cast<int>(queue_.push_dropping_oldest(std::move(frame), leave_motion));
+      if (due && !wait_until_asked(interval)) break;
     }
   } catch (...) {
     const std::lock_guard lock(mutex_);

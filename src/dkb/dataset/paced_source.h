@@ -49,6 +49,7 @@ class PacedSource final : public Source {
   void run();
   Clock::time_point now() const;           // of the clock that can be held; `mutex_` is locked
   bool wait_until(Clock::time_point due);  // by that clock; false when stopped
+  bool wait_until_asked(std::chrono::nanoseconds at_most);
 
   const std::unique_ptr<Source> owned_;
   Source& source_;
@@ -58,6 +59,7 @@ class PacedSource final : public Source {
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopped_ = false;
+  bool asked_ = false;  // for a frame since the last one was put into the queue
   std::optional<Clock::time_point> held_since_;
   Clock::duration held_{};      // altogether, but for the time since then
   std::exception_ptr failure_;  // of the thread; written before the queue is closed

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <future>
+#include <thread>
 
 namespace dkb {
 namespace {
@@ -42,10 +44,12 @@ class ScriptedSource final : public Source {
     }
     SourceFrame next = std::move(frames_.front());
     frames_.pop_front();
+    ++given;
     return next;
   }
   std::string description() const override { return "scripted"; }
   std::promise<void> all_given;
+  std::atomic<int> given{0};
 
  private:
   Camera camera_;
@@ -96,6 +100,20 @@ TEST(PacedSource, WhatComesLateLeavesItsMotionToTheNextFrame) {
     motions.push_back(metres(next));
   EXPECT_EQ(motions, (std::vector<double>{1, 1, 3, 1}));
   EXPECT_EQ(source->counts().late, 2);
+}
+
+TEST(PacedSource, TakesTheNextFrameWhenTheConsumerIsDoneWithThisOneOrAsksTooLate) {
+  ScriptedSource scripted;
+  for (int i = 0; i < 4; ++i) scripted.add_frame(i * 500'000'000LL);
+  PacedSource source(scripted);
+  source.next();
+  source.next();
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(scripted.given, 2) << "the consumer works at the second";
+  source.next();
+  EXPECT_EQ(scripted.given, 3);
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  EXPECT_EQ(scripted.given, 4) << "who works for longer than a frame's time finds the next one in its place";
 }
 
 TEST(PacedSource, AClockThatJumpsKeepsNobodyWaiting) {
