@@ -89,7 +89,7 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
                                                       const IgnoresPoint& ignores) const {
   const auto coarse = coarse_fit(map, keyframe, features, ignores);
   if (!coarse) return std::nullopt;
-  return fit_around(map, keyframe, coarse->points, features, ignores, coarse->cam_from_world, kSearchRadii);
+  return fit_around(map, coarse->points, features, ignores, coarse->cam_from_world, kSearchRadii);
 }
 
 std::optional<PoseProposal> Relocaliser::propose_at(const Map& map, KeyframeId keyframe,
@@ -99,17 +99,15 @@ std::optional<PoseProposal> Relocaliser::propose_at(const Map& map, KeyframeId k
   std::vector<float> radii = {static_cast<float>(radius)};
   for (const float r : kSearchRadii)
     if (r <= radius) radii.push_back(r);
-  return fit_around(map, keyframe, map.keyframe(keyframe)->points, features, ignores, expected_cam_from_world, radii);
+  return fit_around(map, map.keyframe(keyframe)->points, features, ignores, expected_cam_from_world, radii);
 }
 
 // In the map around these points.
-std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, KeyframeId keyframe,
-                                                    const std::vector<PointId>& points,
+std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, const std::vector<PointId>& points,
                                                     const MatchableFeatures& features, const IgnoresPoint& ignores,
                                                     const Rigid3& expected_cam_from_world,
                                                     std::span<const float> radii) const {
   PoseProposal proposal;
-  proposal.keyframe = keyframe;
   proposal.around = local_map_candidates(points, map);
   std::erase_if(proposal.around, [&](const Candidate& c) { return ignores(c.id); });
   auto fit = fit_by_projection(proposal.around, features, optics_, expected_cam_from_world, radii);

@@ -16,7 +16,6 @@ constexpr int kMinRelocalisationInliers = 40;  // map points that the pose of a 
 
 // A pose that a similar keyframe led to, with what speaks for and against it.
 struct PoseProposal {
-  KeyframeId keyframe = kNoKeyframe;  // that led to it
   PlaceFit fit;
   std::vector<Candidate> around;  // the map there, of which `fit` tells what was seen
   // Of those that find() and propose() give:
@@ -56,7 +55,7 @@ class Relocaliser {
                                          const IgnoresPoint& ignores) const;
 
  private:
-  std::optional<PoseProposal> fit_around(const Map& map, KeyframeId keyframe, const std::vector<PointId>& points,
+  std::optional<PoseProposal> fit_around(const Map& map, const std::vector<PointId>& points,
                                          const MatchableFeatures& features, const IgnoresPoint& ignores,
                                          const Rigid3& expected_cam_from_world, std::span<const float> radii) const;
   std::optional<PlaceFit> coarse_fit(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
