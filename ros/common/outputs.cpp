@@ -53,6 +53,19 @@ ColourImageOutput draw_features(const dkb::ImageView& image, const dkb::FrameRes
   return drawn;
 }
 
+std::string hindrance_of(const dkb::FrameResult& result) {
+  if (result.ambiguous) return "not localised: what is in view may be another place that looks alike";
+  switch (result.state) {
+    case dkb::TrackingState::predicted:
+      return "carried by the motion prior";
+    case dkb::TrackingState::initialising:
+    case dkb::TrackingState::lost:
+      return "not localised";
+    default:
+      return "";
+  }
+}
+
 MoversOutput movers_of(const dkb::FrameResult& result) {
   MoversOutput out;
   out.stamp_ns = result.stamp_ns;

@@ -4,12 +4,18 @@
 
 #include <dkb_slam/slam.h>
 
+#include <string>
+#include <vector>
+
 #include "types.h"
 
 namespace dkb_ros {
 
 // The colour (or grey) image with its features: green = used, red = dynamic, yellow = outlier, grey = unused.
 ColourImageOutput draw_features(const dkb::ImageView& image, const dkb::FrameResult& result);
+
+// Why the images do not tell where a frame's camera is, for people; empty when they do.
+std::string hindrance_of(const dkb::FrameResult& result);
 
 MoversOutput movers_of(const dkb::FrameResult& result);
 CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points);

@@ -25,6 +25,21 @@ TEST(DrawFeatures, ColoursSayWhatBecameOfThem) {
   EXPECT_EQ(at(10, 8), (std::vector<int>{7, 7, 7}));
 }
 
+TEST(Hindrance, SaysWhyTheImagesDoNotTellWhereTheCameraIs) {
+  dkb::FrameResult result;
+  EXPECT_EQ(hindrance_of(result), "not localised") << "no frame has come";
+  result.state = dkb::TrackingState::tracking;
+  EXPECT_EQ(hindrance_of(result), "");
+  result.state = dkb::TrackingState::relocalised;
+  EXPECT_EQ(hindrance_of(result), "");
+  result.state = dkb::TrackingState::predicted;
+  EXPECT_EQ(hindrance_of(result), "carried by the motion prior");
+  result.state = dkb::TrackingState::lost;
+  EXPECT_EQ(hindrance_of(result), "not localised");
+  result.ambiguous = true;
+  EXPECT_NE(hindrance_of(result).find("looks alike"), std::string::npos);
+}
+
 TEST(Path, IsThinnedAndEndsWhereTheRobotIs) {
   std::vector<dkb::TrajectoryFrame> trajectory;
   for (int i = 0; i <= 100; ++i)

@@ -129,10 +129,7 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   else if (silent > 2)
     say(Level::error, "no images for " + number(silent) + " s");
   if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
-  if (slam != nullptr && state_ == dkb::TrackingState::predicted)
-    say(Level::warning, "carried by the motion prior");
-  else if (slam != nullptr && (state_ == dkb::TrackingState::lost || state_ == dkb::TrackingState::initialising))
-    say(Level::warning, "not localised");
+  if (slam != nullptr && !hindrance_.empty()) say(Level::warning, hindrance_);
   if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
   if (maps > 1) say(Level::warning, std::to_string(maps) + " maps that are not joined: poses are in the newest");
   if (d.message.empty()) d.message = dkb::name_of(state_);
@@ -143,6 +140,7 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   count("tracked", counts_.tracked);
   count("predicted", counts_.predicted);
   count("lost", counts_.lost);
+  count("ambiguous", counts_.ambiguous);
   count("dropped", dropped);
   count("unpaired", unpaired);
   count("late", late);

@@ -361,11 +361,13 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     const std::lock_guard lock(report_mutex_);
     trouble_.clear();
     state_ = result.state;
+    hindrance_ = hindrance_of(result);
     last_result_stamp_ns_ = result.stamp_ns;
     ++counts_.frames;
     counts_.tracked += result.tracked();
     counts_.predicted += result.state == dkb::TrackingState::predicted;
     counts_.lost += result.state == dkb::TrackingState::lost;
+    counts_.ambiguous += result.ambiguous;
     ++recent_.frames;
     recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
     recent_.tracking_ms.add(result.tracking_ms);

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "motion.h"
+#include "outputs.h"
 #include "pairing.h"
 #include "parameters.h"
 #include "ros_core.h"
@@ -44,7 +45,7 @@ class SlamCore final : public RosCore {
 
  private:
   struct Counts {
-    int64_t frames = 0, tracked = 0, predicted = 0, lost = 0;
+    int64_t frames = 0, tracked = 0, predicted = 0, lost = 0, ambiguous = 0;
     int64_t rejected = 0;  // pairs that the library refused
     int64_t waiting = 0;   // pairs that came before the camera and its mount were known
     int64_t priors = 0;    // pairs that had a motion prior
@@ -127,6 +128,7 @@ class SlamCore final : public RosCore {
   std::shared_ptr<dkb::Slam> slam_;  // the tracking thread makes it once the camera is known, and it alone feeds it
   int64_t last_result_stamp_ns_ = 0;
   dkb::TrackingState state_ = dkb::TrackingState::initialising;
+  std::string hindrance_ = hindrance_of({});  // of the newest result
   Counts counts_;
   Recent recent_;
   int64_t reported_dropped_ = 0;
