@@ -4,10 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <deque>
 #include <future>
-#include <thread>
 
 namespace dkb {
 namespace {
@@ -44,16 +42,24 @@ class ScriptedSource final : public Source {
     }
     SourceFrame next = std::move(frames_.front());
     frames_.pop_front();
-    ++given;
+    if (!gives_.empty()) {
+      gives_.front().set_value();
+      gives_.pop_front();
+    }
     return next;
   }
   std::string description() const override { return "scripted"; }
   std::promise<void> all_given;
-  std::atomic<int> given{0};
+  // Ready when so many frames more have been taken.
+  std::future<void> taken(size_t count) {
+    while (gives_.size() < count) gives_.emplace_back();
+    return gives_[count - 1].get_future();
+  }
 
  private:
   Camera camera_;
   std::deque<SourceFrame> frames_;
+  std::deque<std::promise<void>> gives_;
   bool ended_ = false;
 };
 
@@ -102,18 +108,20 @@ TEST(PacedSource, WhatComesLateLeavesItsMotionToTheNextFrame) {
   EXPECT_EQ(source->counts().late, 2);
 }
 
-TEST(PacedSource, TakesTheNextFrameWhenTheConsumerIsDoneWithThisOneOrAsksTooLate) {
+TEST(PacedSource, TakesTheNextFrameWhenTheConsumerIsDoneWithThisOneOrWorksForLonger) {
+  using std::chrono::milliseconds;
   ScriptedSource scripted;
   for (int i = 0; i < 4; ++i) scripted.add_frame(i * 500'000'000LL);
+  const std::future<void> third = scripted.taken(3), fourth = scripted.taken(4);
   PacedSource source(scripted);
   source.next();
   source.next();
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(scripted.given, 2) << "the consumer works at the second";
+  EXPECT_EQ(third.wait_for(milliseconds(50)), std::future_status::timeout) << "the consumer works at the second";
   source.next();
-  EXPECT_EQ(scripted.given, 3);
-  std::this_thread::sleep_for(std::chrono::milliseconds(700));
-  EXPECT_EQ(scripted.given, 4) << "who works for longer than a frame's time finds the next one in its place";
+  EXPECT_EQ(third.wait_for(milliseconds(0)), std::future_status::ready);
+  EXPECT_EQ(fourth.wait_for(milliseconds(50)), std::future_status::timeout);
+  EXPECT_EQ(fourth.wait_for(milliseconds(5000)), std::future_status::ready)
+      << "after a frame's time it is taken anyway";
 }
 
 TEST(PacedSource, AClockThatJumpsKeepsNobodyWaiting) {
