@@ -2,7 +2,6 @@
 #include "dkb/features/rgbd_features.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -48,21 +47,6 @@ float median_around(const DepthImage& depth, int x, int y, float limit) {
 
 constexpr int kAcross = 2 * CornerDepths::kReach + 1;
 constexpr int kSurface = 4;  // [px] fewer are no surface but noise
-
-struct Offset {
-  int u, v;
-};
-// The pixels around one, the nearest first, then by rows.
-constexpr auto kOutward = [] {
-  std::array<Offset, kAcross * kAcross> offsets{};
-  for (int i = 0; i < kAcross * kAcross; ++i)
-    offsets[static_cast<size_t>(i)] = {i % kAcross - CornerDepths::kReach, i / kAcross - CornerDepths::kReach};
-  const auto squared = [](const Offset& o) { return o.u * o.u + o.v * o.v; };
-  std::sort(offsets.begin(), offsets.end(), [&](const Offset& a, const Offset& b) {
-    return squared(a) != squared(b) ? squared(a) < squared(b) : a.v != b.v ? a.v < b.v : a.u < b.u;
-  });
-  return offsets;
-}();
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -107,15 +91,18 @@ float CornerDepths::nearest_around(int cx, int cy) const {
 
 // The depth, up to `limit`, that lies nearest in the image.
 CornerDepths::Depth CornerDepths::nearest_pixel(int cx, int cy, float limit) const {
-  int count = 0;
+  int least = std::numeric_limits<int>::max(), count = 0;
   Depth found;
-  for (const auto& [u, v] : kOutward) {
-    const float d = depth_(cx + u, cy + v);
-    if (!(d > 0) || d > limit) continue;
-    if (count == 0) found = {0, d, {cx + u, cy + v}};
-    if (++count == kSurface) return found;
-  }
-  return {};
+  for (int v = -kReach; v <= kReach; ++v)
+    for (int u = -kReach; u <= kReach; ++u) {
+      const float d = depth_(cx + u, cy + v);
+      if (!(d > 0) || d > limit) continue;
+      ++count;
+      if (u * u + v * v >= least) continue;
+      least = u * u + v * v;
+      found = {0, d, {cx + u, cy + v}};
+    }
+  return count >= kSurface ? found : Depth();
 }
 
 UndistortionTable::UndistortionTable(const CameraModel& camera) {
@@ -204,9 +191,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
       const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
       if (then.z() > 0.05) {
         const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
-        const float x = c.x + static_cast<float>(shift.x()), y = c.y + static_cast<float>(shift.y());
-        const bool same_pixel = std::lround(x) == std::lround(c.x) && std::lround(y) == std::lround(c.y);
-        const float z_then = same_pixel ? z : depths.at(x, y).own;
+        const float z_then = depths.at(c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y())).own;
         z = z_then > 0 ? static_cast<float>(
                              (rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
                        : 0.0f;
