@@ -3,9 +3,9 @@
 
 #include <cstddef>
 
-#include "dkb/matching/place_fit.h"
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
+#include "dkb/matching/optics.h"
 
 namespace dkb {
 

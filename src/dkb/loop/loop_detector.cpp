@@ -14,7 +14,6 @@ constexpr double kDegrees = 57.295779513082321;
 constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
 constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
 constexpr int kAreaKeyframes = 8;               // a candidate and its best covisible ones, whose points are matched
-constexpr int kMinMatches = 15;                 // by descriptor alone that make a candidate worth a try
 constexpr float kSearchRadii[] = {12, 4};       // [px] around the pose of these, and around the refined one
 constexpr double kMinShare = 0.2;               // of the area's well-known points that ought to be in view
 
@@ -159,8 +158,9 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
     const MapArea area = area_around(map, far);
-    const auto located = fit_by_descriptors(area.points, *newest->features, optics, kMinMatches,
-                                            {.min_inliers = kMinMatches, .seed = seed + static_cast<uint64_t>(id)});
+    const auto located =
+        fit_by_descriptors(area.points, *newest->features, optics, kMinPlaceMatches,
+                           {.min_inliers = kMinPlaceMatches, .seed = seed + static_cast<uint64_t>(id)});
     if (!located) continue;
     if (!merge) {
       if (path_lengths.empty()) path_lengths = path_lengths_through_map(map, id);

@@ -7,7 +7,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kMinInliers = 10;  // that a pose rests on
+constexpr int kMinInliers = RansacOptions().min_inliers;  // a pose by guided matches rests on no fewer than one without
 
 }  // namespace
 
@@ -52,8 +52,9 @@ std::optional<PlaceFit> fit_by_projection(const std::vector<Candidate>& known, c
     for (const ProjectionMatch& m : matches)
       observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
                                               known[static_cast<size_t>(m.candidate)].position, optics));
-    const PoseEstimate pose = optimise_pose(optics.camera, fit.cam_from_world, observations);
-    if (!pose.ok || pose.inliers < kMinInliers) return std::nullopt;
+    const PoseEstimate pose =
+        optimise_pose(optics.camera, fit.cam_from_world, observations, {.min_inliers = kMinInliers});
+    if (!pose.ok) return std::nullopt;
     fit.cam_from_world = pose.cam_from_world;
     fit.covariance = pose.covariance;
     fit.inliers = pose.inliers;

@@ -10,6 +10,9 @@
 
 namespace dkb {
 
+// Matches by descriptor alone that make it worth a try whether a view shows a place.
+constexpr int kMinPlaceMatches = 15;
+
 // A point that so many keyframes see is to be expected wherever it should be in view.
 inline bool well_known(const MapPoint& point) {
   return point.observations.size() >= 3;

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "dkb/matching/place_fit.h"
 #include "dkb/map/map.h"
+#include "dkb/matching/optics.h"
 #include "dkb/slam/options.h"
 
 namespace dkb {

@@ -8,9 +8,11 @@
 namespace dkb {
 namespace {
 
-constexpr double kDetail = 0.3;  // [m] points so near to each other belong to one thing, and are judged together
-constexpr int kMaxVotes = 10;    // of one point: what a camera saw before it came here is outvoted in as many frames
-constexpr int kMinPoints = 4;    // of a detail: the fewest of which three in four can look different
+// [m] Points so near to each other belong to one thing, and are judged together: of 0.05 to 0.3 the best
+// (decisions.md).
+constexpr double kDetail = 0.3;
+constexpr int kMaxVotes = 10;  // of one point: what a camera saw before it came here is outvoted in as many frames
+constexpr int kMinPoints = 4;  // of a detail: the fewest of which three in four can look different
 
 // Shares of the details that look different. Of places that a camera came back to 0.3 to 1 % do (freiburg1_xyz,
 // walking_halfsphere, the composed sequences, `loop`); of the second room of `twins` seen as the first one a tenth.

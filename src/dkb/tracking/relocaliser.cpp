@@ -12,7 +12,6 @@ namespace {
 // Of what a lost camera is tried with. All figures: chosen on the twins, where no view is a place seen before.
 constexpr size_t kCandidates = 6;          // look-alike keyframes that are tried
 constexpr size_t kNeighbours = 4;          // covisible keyframes whose points are matched along with each one's
-constexpr int kMinMatches = 15;            // by descriptor alone that make a candidate worth a try
 constexpr float kSearchRadii[] = {10, 4};  // [px] first and second search nearby that pose
 
 constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
@@ -73,7 +72,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
       const auto shared = std::count_if(p.fit.points.begin(), p.fit.points.end(), [&](PointId id) {
         return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
       });
-      return shared >= kMinMatches;
+      return shared >= kMinPlaceMatches;
     });
     if (explained) continue;
     if (auto proposal = propose_from(map, like.id, features, ignores)) {
@@ -136,7 +135,7 @@ std::optional<PlaceFit> Relocaliser::coarse_fit(const Map& map, KeyframeId id, c
   std::stable_sort(known.begin(), known.end(), before);
   known.erase(std::unique(known.begin(), known.end(), same), known.end());
   std::erase_if(known, [&](const Candidate& k) { return ignores(k.id); });
-  return fit_by_descriptors(known, features, optics_, kMinMatches, {.seed = seed_ + static_cast<uint64_t>(id)});
+  return fit_by_descriptors(known, features, optics_, kMinPlaceMatches, {.seed = seed_ + static_cast<uint64_t>(id)});
 }
 
 // How the map points look that should be in view. In a room that is only similar most are as they were, but some are
