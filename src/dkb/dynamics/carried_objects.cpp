@@ -83,8 +83,7 @@ MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {
   return wide;
 }
 
-std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, FrameIndex now,
-                                              const PastFrames& past, const ImagePyramid& pyramid) {
+std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, const PastFrames& past) {
   std::vector<LateMask> late;
   Detections detections = answer;
   box_regions(detections);
@@ -101,8 +100,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
       unite(mask.mask, with_rim(there.mask), camera_.width, camera_.height);
       late.push_back(std::move(mask));
     }
-    here = carry(detections, motions(*source, pyramid, detections.boxes), now - from, camera_.width, camera_.height,
-                 options_.carry);
+    here = carry_to(*source, *past.back().pyramid, detections, past.back().frame - from);
   }
   std::vector<Carried> next;
   for (const Detection& d : here.boxes) next.push_back({d, 0});

@@ -44,19 +44,21 @@ class CarriedObjectsTest : public ::testing::Test {
     made.image = std::move(image);
     return made;
   }
-  // Frames 0 ... last are seen one after the other, `now` the last one; `keyframes` among them.
+  // Frames 0 ... last come one after the other, `now` is the last one; `keyframes` among them.
   void see(FrameIndex last, const std::vector<FrameIndex>& keyframes = {}) {
     for (FrameIndex f = 0; f <= last; ++f) {
       PastFrame next = frame(f, std::find(keyframes.begin(), keyframes.end(), f) != keyframes.end());
-      if (f > 0) carried.follow(past, *next.pyramid);
       if (f < last)
         past.push_back(std::move(next));
       else
         now = std::move(next);
     }
   }
+  // What is detected in an earlier frame is known before objects go on to this one, as in the pipeline.
   std::vector<LateMask> receive(FrameIndex from, const Detections& detections) {
-    return carried.receive(from, detections, now.frame, past, *now.pyramid);
+    auto late = carried.receive(from, detections, past);
+    if (from < now.frame) carried.follow(past, *now.pyramid);
+    return late;
   }
   static void expect_near(const Box& box, const Box& truth, float tolerance) {
     EXPECT_NEAR(box.x, truth.x, tolerance);

@@ -110,11 +110,16 @@ Carried SceneStage::carry(const CarryTask& task) {
   Carried made;
   auto pyramid = std::make_shared<ImagePyramid>(options_.carried.flow.pyramid());
   pyramid->build(image.grey);
+  const auto receive = [&](bool of_this_frame) {
+    for (const DueDetections& d : task.due) {
+      if ((d.frame == task.index) != of_this_frame) continue;
+      auto late = objects_.receive(d.frame, d.detections, past_);
+      if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
+    }
+  };
+  receive(false);
   if (slow_stage_) objects_.follow(past_, *pyramid);
-  for (const DueDetections& d : task.due) {
-    auto late = objects_.receive(d.frame, d.detections, task.index, past_, *pyramid);
-    if (!rival_) std::move(late.begin(), late.end(), std::back_inserter(made.late_masks));
-  }
+  receive(true);
   if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
   made.mask = objects_.mover_mask();
   made.pyramid = std::move(pyramid);
