@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/rgbd_reader.h"
 
+#include <algorithm>
+
 #include "dkb/util/errors.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/util/thrown.h"
@@ -13,15 +15,11 @@ struct RgbdReader::Decoded {
   double ms = 0;
 };
 
-struct RgbdReader::Probed {
-  StoredPair pair;
-  std::optional<Decoded> decoded;
-};
-
 struct RgbdReader::Slot {
-  DatasetFrame frame;
-  double ms = 0;
-  bool ready = false;
+  StoredPair pair;
+  size_t index = 0;
+  bool begun = false;
+  std::optional<Decoded> decoded;
 };
 
 void RgbdReaderOptions::check() const {
@@ -35,7 +33,8 @@ RgbdReader::RgbdReader(PairStream pairs, const RgbdReaderOptions& options)
   probe();
   if (!options_.threaded) return;
   try {
-    for (int i = 0; i < options_.workers; ++i) workers_.emplace_back([this] { run(); });
+    threads_.emplace_back([this] { fetch_ahead(); });
+    for (int i = 0; i < options_.workers; ++i) threads_.emplace_back([this] { decode_ahead(); });
   } catch (...) {
     end();
     throw;
@@ -51,7 +50,7 @@ RgbdReader::~RgbdReader() {
 
 void RgbdReader::end() {
   stop();
-  for (std::thread& worker : workers_) worker.join();
+  for (std::thread& thread : threads_) thread.join();
 }
 
 void RgbdReader::stop() {
@@ -60,7 +59,8 @@ void RgbdReader::stop() {
     stopped_ = true;
   }
   room_.notify_all();
-  decoded_.notify_all();
+  fetched_.notify_all();
+  changed_.notify_all();
 }
 
 // Start-up pays for this, so it decodes as little as proves the point: pixels are decoded until one pair has proved
@@ -72,8 +72,9 @@ void RgbdReader::probe() {
     std::optional<StoredPair> pair = pairs_();
     if (!pair) break;
     first_stamps_.push_back(pair->stamp_ns);
-    probed_.push_back({std::move(*pair), std::nullopt});
-    Probed& probed = probed_.back();
+    probed_.push_back(std::make_shared<Slot>());
+    Slot& probed = *probed_.back();
+    probed.pair = std::move(*pair);
     std::string wrong;
     try {
       wrong = probed.pair.mismatch();
@@ -103,89 +104,132 @@ RgbdReader::Decoded RgbdReader::decode(const StoredPair& pair) {
   return decoded;
 }
 
-std::optional<RgbdReader::Probed> RgbdReader::fetch() {
-  std::optional<Probed> next;
+std::shared_ptr<RgbdReader::Slot> RgbdReader::fetch() {
+  std::shared_ptr<Slot> next;
   if (!probed_.empty()) {
     next = std::move(probed_.front());
     probed_.pop_front();
   } else if (std::optional<StoredPair> pair = pairs_()) {
-    next = Probed{std::move(*pair), std::nullopt};
+    next = std::make_shared<Slot>();
+    next->pair = std::move(*pair);
   }
+  if (!next) return nullptr;
+  next->begun = next->decoded.has_value();
+  next->index = next_index_++;
   return next;
 }
 
-RgbdReader::Slot RgbdReader::decoded(Probed next, size_t index) {
-  StoredPair& pair = next.pair;
-  Decoded decoded = next.decoded ? std::move(*next.decoded) : decode(pair);
-  return {DatasetFrame{index, pair.timestamp, pair.stamp_ns, pair.depth_stamp_ns, std::move(pair.stamp),
-                       std::move(decoded.image), std::move(pair.prior), std::move(decoded.skipped)},
-          decoded.ms, true};
-}
-
-// Pairs are taken from the recording by one worker at a time, which adds the pair's place in the order before it lets
-// the next one do so.
-void RgbdReader::run() {
+// Threads for idle work may get no time beside other programs. This one has its share of the cores: it takes pairs from
+// the recording, and decodes what somebody waits for.
+void RgbdReader::fetch_ahead() {
   set_thread_priority(ThreadPriority::background);
   std::unique_lock lock(mutex_);
-  while (true) {
-    room_.wait(lock, [this] {
-      return stopped_ || ended_ || (!fetching_ && ahead_.size() < static_cast<size_t>(options_.queue));
-    });
-    if (stopped_ || ended_) return;
-    fetching_ = true;
-    lock.unlock();
-    std::optional<Probed> pair;
-    std::exception_ptr failure;
-    try {
-      pair = fetch();
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    lock.lock();
-    fetching_ = false;
-    if (!pair) {
-      ended_ = true, failure_ = failure;
-      room_.notify_all();
-      decoded_.notify_one();
-      return;
-    }
-    const size_t index = next_index_++;
-    Slot& slot = ahead_.emplace_back();
-    room_.notify_one();
-    lock.unlock();
-    Slot made = decoded(std::move(*pair), index);
-    lock.lock();
-    slot = std::move(made);
-    decoded_.notify_one();
+  while (!stopped_) {
+    if (!full())
+      fetch_one(lock);
+    else if (const std::shared_ptr<Slot> slot = waited_for())
+      fill(lock, slot);
+    else
+      room_.wait(lock);
   }
 }
 
-DatasetFrame RgbdReader::hand_out(Slot slot) {
-  times_.add("decoding", slot.ms);
-  return std::move(slot.frame);
+void RgbdReader::fetch_one(std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  std::shared_ptr<Slot> next;
+  std::exception_ptr failure;
+  try {
+    next = fetch();
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  if (next) {
+    ahead_.push_back(std::move(next));
+    fetched_.notify_one();
+  } else {
+    ended_ = true, failure_ = failure;
+    fetched_.notify_all();
+  }
+  changed_.notify_one();
+}
+
+void RgbdReader::decode_ahead() {
+  set_thread_priority(ThreadPriority::idle);
+  std::unique_lock lock(mutex_);
+  while (true) {
+    fetched_.wait(lock, [this] { return stopped_ || ended_ || next_to_decode(); });
+    if (stopped_) return;
+    const std::shared_ptr<Slot> slot = next_to_decode();
+    if (!slot) return;
+    fill(lock, slot);
+  }
+}
+
+std::shared_ptr<RgbdReader::Slot> RgbdReader::next_to_decode() const {
+  const auto slot = std::find_if(ahead_.begin(), ahead_.end(), [](const auto& s) { return !s->begun; });
+  return slot == ahead_.end() ? nullptr : *slot;
+}
+
+// What nobody has begun first. When nothing is left to begin, the oldest pair once more: no clock decides whether the
+// thread that has begun it is given time.
+std::shared_ptr<RgbdReader::Slot> RgbdReader::waited_for() const {
+  if (!waiting_ || oldest_ready()) return nullptr;
+  if (auto slot = next_to_decode()) return slot;
+  return ahead_.empty() ? nullptr : ahead_.front();
+}
+
+bool RgbdReader::oldest_ready() const {
+  return ahead_.empty() ? ended_ : ahead_.front()->decoded.has_value();
+}
+
+bool RgbdReader::full() const {
+  return ended_ || ahead_.size() >= static_cast<size_t>(options_.queue);
+}
+
+void RgbdReader::fill(std::unique_lock<std::mutex>& lock, const std::shared_ptr<Slot>& slot) {
+  slot->begun = true;
+  lock.unlock();
+  Decoded made = decode(slot->pair);
+  lock.lock();
+  if (slot->decoded) return;
+  slot->decoded = std::move(made);
+  changed_.notify_one();
+}
+
+DatasetFrame RgbdReader::hand_out(Slot& slot) {
+  times_.add("decoding", slot.decoded->ms);
+  const StoredPair& pair = slot.pair;
+  return {slot.index,    pair.timestamp,
+          pair.stamp_ns, pair.depth_stamp_ns,
+          pair.stamp,    std::move(slot.decoded->image),
+          pair.prior,    std::move(slot.decoded->skipped)};
 }
 
 std::optional<DatasetFrame> RgbdReader::next() {
   std::unique_lock lock(mutex_);
-  if (stopped_) return std::nullopt;
   if (!options_.threaded) {
+    if (stopped_) return std::nullopt;
     lock.unlock();
-    std::optional<Probed> pair = fetch();
-    if (!pair) return std::nullopt;
-    Slot made = decoded(std::move(*pair), next_index_++);
+    const std::shared_ptr<Slot> slot = fetch();
+    if (slot && !slot->decoded) slot->decoded = decode(slot->pair);
     lock.lock();
-    return hand_out(std::move(made));
+    if (!slot) return std::nullopt;
+    return hand_out(*slot);
   }
-  decoded_.wait(lock, [this] { return stopped_ || (ahead_.empty() ? ended_ : ahead_.front().ready); });
+  waiting_ = !oldest_ready();
+  if (waiting_) room_.notify_one();
+  changed_.wait(lock, [this] { return stopped_ || oldest_ready(); });
+  waiting_ = false;
   if (stopped_) return std::nullopt;
   if (ahead_.empty()) {
     if (failure_) std::rethrow_exception(failure_);
     return std::nullopt;
   }
-  Slot oldest = std::move(ahead_.front());
+  const std::shared_ptr<Slot> oldest = std::move(ahead_.front());
   ahead_.pop_front();
   room_.notify_one();
-  return hand_out(std::move(oldest));
+  return hand_out(*oldest);
 }
 
 StageTimes RgbdReader::times() const {

@@ -37,7 +37,9 @@ struct DatasetFrame {
 };
 
 // Decodes the pairs of a recording ahead of the consumer, several at once, and hands them out in order. Not copyable;
-// one consumer. The same recording gives the same frames, whatever the timing.
+// one consumer. The same recording gives the same frames, whatever the timing. Decoding takes what time of the cores
+// nobody else wants; for a consumer that waits one more thread decodes, so that a recording is read where other
+// programs leave no such time, too.
 class RgbdReader {
  public:
   // Probes the first pairs: throws InputError when none of them decodes, or when one that decodes has another size than
@@ -61,31 +63,39 @@ class RgbdReader {
 
  private:
   struct Decoded;
-  struct Probed;
   struct Slot;
+  using Slots = std::deque<std::shared_ptr<Slot>>;  // in the recording's order
   void probe();
-  void run();
+  void fetch_ahead();
+  void fetch_one(std::unique_lock<std::mutex>& lock);
+  void decode_ahead();
   void end();
-  // The next pair of the recording. One thread at a time.
-  std::optional<Probed> fetch();
+  // The next pair of the recording, nothing at its end. One thread at a time.
+  std::shared_ptr<Slot> fetch();
   static Decoded decode(const StoredPair& pair);
-  static Slot decoded(Probed pair, size_t index);
-  DatasetFrame hand_out(Slot slot);
+  // Decodes without the lock. Two threads may do so at once; the first result counts.
+  void fill(std::unique_lock<std::mutex>& lock, const std::shared_ptr<Slot>& slot);
+  std::shared_ptr<Slot> next_to_decode() const;  // nothing when all pairs ahead are decoded or being decoded
+  std::shared_ptr<Slot> waited_for() const;      // what to decode for a consumer that waits
+  bool oldest_ready() const;                     // so is the end of the recording
+  bool full() const;                             // no more pairs will come before one is handed out
+  DatasetFrame hand_out(Slot& slot);
 
   const PairStream pairs_;
   const RgbdReaderOptions options_;
-  std::deque<Probed> probed_;
+  Slots probed_;
   std::vector<int64_t> first_stamps_;
 
   mutable std::mutex mutex_;         // guards what follows
-  std::condition_variable room_;     // for a worker to begin the next pair
-  std::condition_variable decoded_;  // the oldest pair, or the recording has ended
-  std::deque<Slot> ahead_;           // in the recording's order; a worker fills the slot that it added
-  size_t next_index_ = 0;
-  bool fetching_ = false, ended_ = false, stopped_ = false;
+  std::condition_variable room_;     // for one more pair ahead, or the consumer waits
+  std::condition_variable fetched_;  // a pair to decode, or the recording has ended
+  std::condition_variable changed_;  // a pair fetched or decoded, or the recording has ended
+  Slots ahead_;
+  size_t next_index_ = 0;  // of the thread that fetches
+  bool ended_ = false, stopped_ = false, waiting_ = false;
   std::exception_ptr failure_;  // of the stream of pairs, after its last pair
   StageTimes times_;
-  std::vector<std::thread> workers_;
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace dkb

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -150,8 +152,8 @@ class Stream {
     pair.mismatch = [] { return ""; };
     pair.decode = [this, n = given_++] {
       // The third pair is ready after the fourth alone.
-      if (n == 3) fourth_.set_value();
-      if (n == 2 && fourth_.get_future().wait_for(std::chrono::seconds(60)) != std::future_status::ready)
+      if (n == 3) std::call_once(begun_, [this] { fourth_.set_value(); });
+      if (n == 2 && has_begun_.wait_for(std::chrono::seconds(60)) != std::future_status::ready)
         throw InputError("the fourth pair waits for the third");
       return std::make_shared<RgbdImage>();
     };
@@ -161,6 +163,8 @@ class Stream {
  private:
   int given_ = 0;
   std::promise<void> fourth_;
+  std::shared_future<void> has_begun_ = fourth_.get_future().share();
+  std::once_flag begun_;
 };
 
 TEST_F(RgbdReaderTest, TwoPairsAreDecodedAtOnceAndHandedOutInOrderAndAnErrorAfterThem) {
@@ -174,6 +178,46 @@ TEST_F(RgbdReaderTest, TwoPairsAreDecodedAtOnceAndHandedOutInOrderAndAnErrorAfte
   }
   for (int again = 0; again < 2; ++again)
     EXPECT_EQ(test::input_error_of([&] { reader.next(); }), "the recording is torn");
+}
+
+// Four pairs. Who decodes the second one first gets no further until it is let go, as a thread that other programs
+// leave no time.
+class StarvedStream {
+ public:
+  std::optional<StoredPair> operator()() {
+    if (given_ == 4) return std::nullopt;
+    StoredPair pair;
+    pair.stamp_ns = given_;
+    pair.mismatch = [] { return ""; };
+    pair.decode = [this, n = given_++] {
+      if (n == 1 && !starved_.exchange(true)) {
+        begun.set_value();
+        let_go.get_future().wait();
+      }
+      return std::make_shared<RgbdImage>();
+    };
+    return pair;
+  }
+  std::promise<void> begun, let_go;
+
+ private:
+  int given_ = 0;
+  std::atomic<bool> starved_ = false;
+};
+
+TEST_F(RgbdReaderTest, APairWhoseThreadGetsNoTimeIsDecodedByWhoWaitsForIt) {
+  const auto stream = std::make_shared<StarvedStream>();
+  RgbdReader reader([stream] { return (*stream)(); }, {.queue = 3, .probed = 1});
+  stream->begun.get_future().wait();
+  for (int n = 0; n < 4; ++n) {
+    const std::optional<DatasetFrame> frame = reader.next();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->stamp_ns, n);
+    EXPECT_NE(frame->image, nullptr);
+  }
+  EXPECT_FALSE(reader.next().has_value());
+  stream->let_go.set_value();
+  EXPECT_EQ(reader.times().summaries().at("decoding").count, 4U);
 }
 
 TEST_F(RgbdReaderTest, StopsAtAnyTime) {

@@ -14,8 +14,8 @@
 
 namespace dkb {
 
-// One colour and one depth image as they are stored. The functions may be called on any thread, those of
-// different pairs at once.
+// One colour and one depth image as they are stored. The functions may be called on any thread, by several at
+// once.
 struct StoredPair {
   double timestamp = 0;                      // [s] colour
   int64_t stamp_ns = 0, depth_stamp_ns = 0;  // exactly

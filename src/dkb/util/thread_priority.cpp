@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #if defined(__linux__)
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -18,6 +19,8 @@ void set_thread_priority([[maybe_unused]] ThreadPriority priority) {
   const auto self = static_cast<id_t>(syscall(SYS_gettid));
   if (priority == ThreadPriority::background)
     setpriority(PRIO_PROCESS, self, std::min(getpriority(PRIO_PROCESS, self) + kStep, kLowest));
+  const sched_param none{};
+  if (priority == ThreadPriority::idle) sched_setscheduler(0, SCHED_IDLE, &none);  // 0: the calling thread
 #endif
 }
 

@@ -3,10 +3,12 @@
 
 namespace dkb {
 
-enum class ThreadPriority { normal, background };
+// `background` steps back behind tracking where cores are few. `idle` work is done where nothing else wants the core,
+// and what else wakes up takes such a core at once: for work that another thread does when somebody waits for it.
+enum class ThreadPriority { normal, background, idle };
 
-// Background work steps back behind tracking where cores are few. Raising the priority again takes privileges: give it
-// to a thread once, when it starts. In a dataset run no result depends on it. Only on Linux, elsewhere nothing happens.
+// Raising the priority again takes privileges: give it to a thread once, when it starts. In a dataset run no result
+// depends on it. Only on Linux, elsewhere nothing happens.
 void set_thread_priority(ThreadPriority priority);
 
 }  // namespace dkb
