@@ -119,10 +119,9 @@ std::shared_ptr<RgbdReader::Slot> RgbdReader::fetch() {
   return next;
 }
 
-// Threads for idle work may get no time beside other programs. This one has its share of the cores: it takes pairs from
-// the recording, and decodes what somebody waits for.
+// Threads for idle work may get no time beside other programs. This one has the share of any other: it takes pairs from
+// the recording, and decodes what somebody waits for, who does nothing else meanwhile.
 void RgbdReader::fetch_ahead() {
-  set_thread_priority(ThreadPriority::background);
   std::unique_lock lock(mutex_);
   while (!stopped_) {
     if (!full())
