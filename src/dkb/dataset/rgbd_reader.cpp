@@ -156,12 +156,13 @@ void RgbdReader::fetch_one(std::unique_lock<std::mutex>& lock) {
 void RgbdReader::decode_ahead() {
   set_thread_priority(ThreadPriority::idle);
   std::unique_lock lock(mutex_);
-  while (true) {
-    fetched_.wait(lock, [this] { return stopped_ || ended_ || next_to_decode(); });
-    if (stopped_) return;
-    const std::shared_ptr<Slot> slot = next_to_decode();
-    if (!slot) return;
-    fill(lock, slot);
+  while (!stopped_) {
+    if (const std::shared_ptr<Slot> slot = next_to_decode())
+      fill(lock, slot);
+    else if (ended_)
+      return;
+    else
+      fetched_.wait(lock);
   }
 }
 

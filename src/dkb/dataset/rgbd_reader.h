@@ -47,7 +47,7 @@ class RgbdReader {
   // Single bad pairs are handed out as skipped.
   RgbdReader(PairStream pairs, const RgbdReaderOptions& options);
   RgbdReader(std::vector<DatasetPair> pairs, const CameraModel& camera, const RgbdReaderOptions& options);
-  ~RgbdReader();  // stops the workers; never waits for more than the pairs being decoded
+  ~RgbdReader();  // stops the threads; never waits for more than the pairs being decoded
   RgbdReader(const RgbdReader&) = delete;
   RgbdReader& operator=(const RgbdReader&) = delete;
 

@@ -205,7 +205,7 @@ class StarvedStream {
   std::atomic<bool> starved_ = false;
 };
 
-TEST_F(RgbdReaderTest, APairWhoseThreadGetsNoTimeIsDecodedByWhoWaitsForIt) {
+TEST_F(RgbdReaderTest, APairWhoseThreadGetsNoTimeIsDecodedForWhoWaitsForIt) {
   const auto stream = std::make_shared<StarvedStream>();
   RgbdReader reader([stream] { return (*stream)(); }, {.queue = 3, .probed = 1});
   stream->begun.get_future().wait();
