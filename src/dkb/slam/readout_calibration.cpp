@@ -35,6 +35,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     const Eigen::Vector3d p = frame.cam_from_world * *position;
     if (p.z() < 0.1) continue;
     const Keypoint& k = frame.features->keypoints[f];
+    if (k.lent_depth > 0) continue;  // beside a depth step it slides along the outline, which no pose explains either
     const Eigen::Matrix<double, 2, 6> jacobian = pixel_by_motion(optics_.camera, p);
     const Eigen::Vector2d flow = jacobian * velocity;
     const Eigen::Vector2d late = flow * (k.image_pixel.y() / optics_.camera.height - 0.5);
