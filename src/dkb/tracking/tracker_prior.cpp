@@ -29,13 +29,12 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   MotionPrior step;
   const double seconds = timestamp - last_->timestamp;
   step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
-  // A camera whose velocity is not known yet is taken to stand: what moves before it is not to take it along.
-  const VelocityFilter filter = velocity_ ? filter_ : VelocityFilter::at_rest();
-  step.covariance = seconds * seconds * filter.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
   // Nothing corrects the translation: an acceleration since the camera was seen is off by half its time squared.
   const auto off = [](double t) { return 0.25 * kAccelerationSd * kAccelerationSd * t * t * t * t; };
-  const double variance = off(timestamp - last_seen_) - off(last_->timestamp - last_seen_);
+  double variance = off(timestamp - last_seen_) - off(last_->timestamp - last_seen_);
+  if (!velocity_) variance += seconds * seconds * kSpeedSd * kSpeedSd;
   step.covariance = Vector6d::Constant(variance).asDiagonal();
   step.previous_from_current.rotation = prior->previous_from_current.rotation;
   step.covariance.bottomRightCorner<3, 3>() = prior->covariance.bottomRightCorner<3, 3>();
@@ -48,7 +47,7 @@ std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const
   const bool told = input.prior != nullptr && !input.prior->rotation_only;
   const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
   const Vector6d variance = whole.covariance.diagonal();
-  const bool known = velocity_ && variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
+  const bool known = variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
   const Rigid3 cam_from_world = whole.previous_from_current.inverse();
   if (!(told || known) || !plausible_motion(cam_from_world, input.timestamp)) return std::nullopt;

@@ -55,5 +55,33 @@ TEST_F(ExpectedCamera, GoesOnWithoutTheImagesWhereTooFewPointsAreInView) {
   EXPECT_EQ(see(4, 7, step_to(4)).state, TrackingState::predicted);
 }
 
+// The second frame of a map: nobody knows yet how fast the camera moves, and most of the corners are on somebody who
+// gets up. The depth of what stands still says that the camera does.
+TEST_F(TrackerTest, TheFirstStepFollowsTheSurfacesAndNotMostCorners) {
+  for (const bool told : {true, false}) {
+    tracker = Tracker(scene.optics(), {}, 1);
+    map = {};
+    keyframe_shows.clear();
+    index = -1;
+    publish(start(on_path(0)));
+    ++index;
+    view = scene.look(on_path(0), {.pixel_noise = 0.3, .seed = 2});
+    RgbdFeatures features = *view.features;
+    for (size_t f = 0; f < features.size(); ++f)
+      if (f % 10 < 7) features.keypoints[f].pixel.y() -= 20;
+    features.grid = KeypointGrid(features.keypoints, features.width, features.height);
+    const MotionPrior step{{}, false, axis_covariance(0.005, 0.004)};
+    const FakeFeatures fake(std::make_shared<const RgbdFeatures>(std::move(features)));
+    const TrackedFrame frame = tracker.track(
+        {.index = index, .timestamp = index * kFrameTime, .features = fake, .step = told ? &step : nullptr});
+    ASSERT_EQ(frame.state, TrackingState::tracking);
+    const double turned = vector_from_rotation(frame.cam_from_world.rotation).norm();
+    if (told)
+      EXPECT_LT(turned, 0.005);
+    else
+      EXPECT_GT(turned, 0.03) << "the test has no somebody who takes the camera along";
+  }
+}
+
 }  // namespace
 }  // namespace dkb

@@ -79,8 +79,7 @@ std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::
 // Where the camera is expected: by what is known of the step where there is anything, else by the motion so far.
 std::vector<Rigid3> Tracker::expected_poses(double dt, const TrackingInput& input) const {
   std::vector<Rigid3> steps;
-  if (input.step != nullptr && (velocity_ || input.prior != nullptr))
-    steps.push_back(input.step->previous_from_current.inverse());
+  if (input.step != nullptr) steps.push_back(input.step->previous_from_current.inverse());
   if (velocity_) steps.push_back(expected_motion(dt));
   for (Rigid3& step : steps) step = step * last_->cam_from_world;
   return steps;
