@@ -6,12 +6,12 @@
 namespace dkb {
 
 // What a camera in a hand or on a robot may do while nothing tells of it: standard deviations, in each axis, of its
-// accelerations, and of its velocity before the first is known. That is what the fastest hand-held sequences of the TUM
-// RGB-D benchmark have on average: 0.43 m/s and 50 degrees/s (Sturm et al., IROS 2012, table I).
+// accelerations, and of its velocity before the first is known. In all that is what the TUM RGB-D benchmark's hand-held
+// walks through a room have on average (fr1/360, desk, desk2, room: 0.35 m/s, 31 degrees/s; Sturm et al., IROS 2012).
 inline constexpr double kAccelerationSd = 2.0;         // [m/s^2]
 inline constexpr double kAngularAccelerationSd = 6.0;  // [rad/s^2]
-inline constexpr double kSpeedSd = 0.25;               // [m/s]
-inline constexpr double kAngularSpeedSd = 0.5;         // [rad/s]
+inline constexpr double kSpeedSd = 0.2;                // [m/s]
+inline constexpr double kAngularSpeedSd = 0.3;         // [rad/s]
 
 // [translation, rotation] of the same variance in each axis.
 inline Matrix6d axis_covariance(double position_sd, double rotation_sd) {
