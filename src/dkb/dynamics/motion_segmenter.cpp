@@ -62,6 +62,14 @@ void for_supported(const Image<uint8_t>& marks, const Visit& visit) {
   }
 }
 
+// Whether something `z` away, known to `tolerance`, stands in space that a cell saw empty, whose depths are `near` to
+// `far` [m].
+constexpr auto kStandsBefore = [](float z, float tolerance, float near, float far,
+                                  const SensorNoise& noise) DKB_KERNEL_BODY {
+  const float of_both = std::max(tolerance, static_cast<float>(noise.surface_tolerance(near)));
+  return z + of_both + kSlope * (far - near) < near;
+};
+
 void clear(Image<float>& image, CellRange range) {
   std::fill_n(image.data() + range.first, range.count, 0.0f);
 }
@@ -257,9 +265,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
           const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
           const bool known = (cell[i] >= 0) & (depth[i] > 0) & (far > 0);
           const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
-          const float margin =
-              std::max(tolerated, static_cast<float>(noise.surface_tolerance(near))) + kSlope * (far - near);
-          intruding[i] |= known & (depth_then[i] > 0) & (z + margin < near) ? 1 : 0;
+          intruding[i] |= known & (depth_then[i] > 0) & kStandsBefore(z, tolerated, near, far, noise) ? 1 : 0;
           still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
         }
       });
@@ -293,8 +299,8 @@ void MotionSegmenter::find_vacated() {
     if (vacated_.data()[i] == 0) continue;
     const auto at = static_cast<size_t>(projection_.cell[i]);
     const float z = projection_.depth[i], near = current_->nearest.data()[at], far = current_->farthest.data()[at];
-    const auto tolerance = static_cast<float>(std::max(noise_.surface_tolerance(z), noise_.surface_tolerance(near)));
-    vacated_.data()[i] = far > 0 && z + tolerance + kSlope * (far - near) < near ? 1 : 0;
+    const auto tolerance = static_cast<float>(noise_.surface_tolerance(z));
+    vacated_.data()[i] = far > 0 && kStandsBefore(z, tolerance, near, far, noise_) ? 1 : 0;
   }
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto walked = static_cast<float>(kWalkInDepth * interval);

@@ -14,7 +14,6 @@ constexpr double kDegrees = 57.295779513082321;
 constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
 constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
 constexpr int kAreaKeyframes = 8;               // a candidate and its best covisible ones, whose points are matched
-constexpr float kSearchRadii[] = {12, 4};       // [px] around the pose of these, and around the refined one
 constexpr double kMinShare = 0.2;               // of the area's well-known points that ought to be in view
 
 // Keyframes around the newest one that show the area just there as well.

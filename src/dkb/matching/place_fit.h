@@ -36,6 +36,10 @@ struct PlaceFit {
 std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, const MatchableFeatures& matchable,
                                            const Optics& optics, int min_matches, const RansacOptions& ransac);
 
+// [px] around where known points are expected by a pose that few of them told, and around where the pose refined on
+// what was found there puts them. Chosen on the twins, where no view is a place seen before.
+inline constexpr float kSearchRadii[] = {10, 4};
+
 // The pose near an expected one: known points are matched where they should be in view and the pose is refined on them,
 // within the first radius [px], then from there within the next. Nothing when too few for a pose are found.
 // Deterministic.

@@ -10,9 +10,8 @@ namespace dkb {
 namespace {
 
 // Of what a lost camera is tried with. All figures: chosen on the twins, where no view is a place seen before.
-constexpr size_t kCandidates = 6;          // look-alike keyframes that are tried
-constexpr size_t kNeighbours = 4;          // covisible keyframes whose points are matched along with each one's
-constexpr float kSearchRadii[] = {10, 4};  // [px] first and second search nearby that pose
+constexpr size_t kCandidates = 6;  // look-alike keyframes that are tried
+constexpr size_t kNeighbours = 4;  // covisible keyframes whose points are matched along with each one's
 
 constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
 constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
