@@ -64,11 +64,10 @@ void for_supported(const Image<uint8_t>& marks, const Visit& visit) {
 
 // Whether something `z` away, known to `tolerance`, stands in space that a cell saw empty, whose depths are `near` to
 // `far` [m].
-constexpr auto kStandsBefore = [](float z, float tolerance, float near, float far,
-                                  const SensorNoise& noise) DKB_KERNEL_BODY {
+inline bool stands_before(float z, float tolerance, float near, float far, const SensorNoise& noise) {
   const float of_both = std::max(tolerance, static_cast<float>(noise.surface_tolerance(near)));
   return z + of_both + kSlope * (far - near) < near;
-};
+}
 
 void clear(Image<float>& image, CellRange range) {
   std::fill_n(image.data() + range.first, range.count, 0.0f);
@@ -265,7 +264,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
           const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
           const bool known = (cell[i] >= 0) & (depth[i] > 0) & (far > 0);
           const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
-          intruding[i] |= known & (depth_then[i] > 0) & kStandsBefore(z, tolerated, near, far, noise) ? 1 : 0;
+          intruding[i] |= known & (depth_then[i] > 0) & stands_before(z, tolerated, near, far, noise) ? 1 : 0;
           still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
         }
       });
@@ -300,7 +299,7 @@ void MotionSegmenter::find_vacated() {
     const auto at = static_cast<size_t>(projection_.cell[i]);
     const float z = projection_.depth[i], near = current_->nearest.data()[at], far = current_->farthest.data()[at];
     const auto tolerance = static_cast<float>(noise_.surface_tolerance(z));
-    vacated_.data()[i] = far > 0 && kStandsBefore(z, tolerance, near, far, noise_) ? 1 : 0;
+    vacated_.data()[i] = far > 0 && stands_before(z, tolerance, near, far, noise_) ? 1 : 0;
   }
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto walked = static_cast<float>(kWalkInDepth * interval);
