@@ -261,6 +261,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     if (visible[i]) in_view.push_back(candidates[i].id);
   visibility_.add_visible(std::move(in_view));
   visibility_.add_visible(std::move(matched));
+  frame.matched = points;
   frame.points.assign(points.size(), kNoPoint);
   frame.outlier.assign(points.size(), 0);
   frame.odometry.assign(points.size(), std::nullopt);
@@ -316,8 +317,8 @@ Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
 }
 
 // Features and pose as they are when the camera's motion within the image is known. The frame keeps what it has when
-// that does not explain it.
-void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& made, TrackedFrame& frame) const {
+// that does not explain it: returns false.
+bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& made, TrackedFrame& frame) const {
   auto features = made.at(velocity);
   std::vector<Pair> pairs;
   pairs.reserve(frame.points.size());
@@ -331,9 +332,9 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
     if (frame.odometry[f] && !frame.odometry[f]->moves)
       pairs.push_back(odometry_pair(static_cast<int>(f), *frame.odometry[f], frame.cam_from_world));
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
-  if (!pose.ok) return;
+  if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
-  if (inliers < options_.min_inliers) return;
+  if (inliers < options_.min_inliers) return false;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -345,6 +346,7 @@ void Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   frame.features = std::move(features);
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
+  return true;
 }
 
 // `expected`: where to look first; may be null.
@@ -468,6 +470,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     const Vector6d before = velocity_.value_or(step);
     if (input.start != nullptr && last_->starts_map) remake_start(input.start->at(step), frame);
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
+    if (seen_before) leave_out_mover(input.features, frame);
     velocity_ = seen_before ? velocity_to(frame) : step;
     const double seconds = frame.timestamp - last_->timestamp;
     if (seen_before) filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);

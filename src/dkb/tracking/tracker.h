@@ -125,7 +125,8 @@ class Tracker {
   void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, double now);
   Vector6d velocity_to(const TrackedFrame& frame) const;
-  void refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
+  bool refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
+  void leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const;
   void remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next);
   bool established(PointId id, double now) const;
   static void drop_unmatched_suspects(TrackedFrame& frame);

@@ -98,5 +98,26 @@ TEST_F(FirstStep, IsAsLongAsACameraUsuallyGoesWhereARotationAloneIsTold) {
   EXPECT_NEAR(std::sqrt(step->covariance(5, 5)), 0.001, 1e-9);
 }
 
+// Somebody near the camera, whom the map holds as still, walks off by a little in each frame.
+TEST(WhoWalksOff, DoesNotTakeTheCameraAlong) {
+  constexpr size_t kOfBody = 90;
+  TestScene scene(900, 1, 0.7, 2.5);
+  Random random(3);
+  for (size_t p = 0; p < kOfBody; ++p)
+    scene.points[p] = {random.uniform(-0.15, 0.1), random.uniform(-0.2, 0.2), random.uniform(0.45, 0.55)};
+  Tracker tracker(scene.optics(), {}, 1);
+  const MotionPrior stands{{}, false, axis_covariance(0.002, 0.004)};
+  for (int i = 0; i < 8; ++i) {
+    for (size_t p = 0; p < kOfBody; ++p) scene.points[p].x() += i > 2 ? 0.01 : 0.0;
+    const View view = scene.look({}, {.pixel_noise = 0.4, .depth_noise = 0.002, .seed = static_cast<uint64_t>(i + 1)});
+    const FakeFeatures features(view.features);
+    const TrackedFrame frame =
+        tracker.track({.index = i, .timestamp = i * kFrameTime, .features = features, .step = &stands});
+    ASSERT_EQ(frame.state, TrackingState::tracking) << i;
+    EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
+    if (i == 0) tracker.make_keyframe(0, frame);
+  }
+}
+
 }  // namespace
 }  // namespace dkb

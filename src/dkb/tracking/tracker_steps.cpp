@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "dkb/matching/pose_observation.h"
+#include "dkb/solver/second_motion.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -122,6 +124,29 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
       return true;
   }
   return false;
+}
+
+// Somebody whose points the map holds as still walks off: one motion does not explain all matches. The pose is then by
+// those of the camera's own motion.
+void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const {
+  if (!frame.predicted || !frame.predicted->weighs) return;
+  std::vector<size_t> matched;
+  std::vector<PoseObservation> observations;
+  for (size_t f = 0; f < frame.matched.size(); ++f) {
+    if (frame.matched[f] == kNoPoint) continue;
+    matched.push_back(f);
+    observations.push_back(pose_observation(frame.features->keypoints[f], *position(frame.matched[f]), optics_));
+  }
+  const PosePrior prior{frame.predicted->cam_from_world, frame.predicted->covariance.inverse()};
+  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, prior, options_.min_inliers);
+  if (!moves) return;
+  TrackedFrame by_still = frame;
+  by_still.inliers = static_cast<int>(std::count(moves->begin(), moves->end(), 0));
+  for (size_t i = 0; i < matched.size(); ++i) {
+    by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
+    by_still.outlier[matched[i]] = (*moves)[i];
+  }
+  if (refine_at_velocity(velocity_to(frame), features, by_still)) frame = std::move(by_still);
 }
 
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {

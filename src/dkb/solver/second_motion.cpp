@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/solver/second_motion.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "dkb/solver/relative_pose.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kFreedom = 4;       // of Student's t
+constexpr double kFarthest = 60;     // squared error beyond which a match is wrong by any motion
+constexpr double kWrong = 20;        // the most that a match costs, as one of a squared error of 110
+constexpr double kApart = 2;         // the cost of a neighbour of the other motion
+constexpr size_t kNeighbours = 5;    // of a match, beside each other in the image and in depth
+constexpr double kDepthRatio = 0.2;  // of depths that are as far apart as a tenth of the image is wide
+constexpr size_t kQuarters = 4;      // of the matches by depth, between which near and far are told apart at first
+constexpr int kRounds = 5;           // of what is of which motion, and of the motions
+constexpr size_t kMinMoving = 20;    // matches that tell a motion
+constexpr double kInfoOfBody = 1e2;  // [1/m^2, 1/rad^2] of a body's motion beside the camera's: 0.1 m, 0.1 rad
+// What a match costs that moves, beside its error. Nothing moves in fr1_xyz, and there a second motion saves 0.15 for
+// each of its matches as a median and 0.8 at most (lens, shutter and depth are not as modelled); where somebody walks
+// off, 2.7 to 5 (pauses).
+constexpr double kMoves = 1.5;
+
+double cost_of(double squared_error) {
+  return std::min((kFreedom + 2) * std::log1p(squared_error / kFreedom), kWrong);
+}
+double weight_of(double squared_error) {
+  return (kFreedom + 2) / (kFreedom + squared_error);
+}
+
+// Half the second derivative and half the derivative of a sum of squares about a perturbation of zero.
+struct Normal {
+  Matrix6d h = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+
+  void add(double weight, const Normal& other) {
+    h += weight * other.h;
+    g += weight * other.g;
+  }
+  Vector6d solve() const { return -h.ldlt().solve(g); }
+};
+
+Normal any_motion() {
+  return {Matrix6d::Identity() * kInfoOfBody, Vector6d::Zero()};
+}
+
+// A match whose error over its standard deviations is e + J d at the pose after the perturbation d.
+struct Match {
+  size_t observation;
+  double depth;  // [m]
+  Eigen::Vector3d error;
+  Eigen::Matrix<double, 3, 6> jacobian;
+
+  double squared_error(const Vector6d& d) const { return (error + jacobian * d).squaredNorm(); }
+  Normal normal() const { return {jacobian.transpose() * jacobian, jacobian.transpose() * error}; }
+};
+
+Match linearise(const CameraModel& camera, const Eigen::Vector3d& q, const PoseObservation& o, size_t observation) {
+  const double inverse = 1 / q.z(), fx = camera.fx * inverse / o.pixel_sigma, fy = camera.fy * inverse / o.pixel_sigma;
+  const double inv_depth_sigma = o.depth > 0 ? 1 / o.depth_sigma : 0;
+  Match m{observation, q.z(), {}, {}};
+  m.error << (camera.project(q) - o.pixel) / o.pixel_sigma, (q.z() - o.depth) * inv_depth_sigma;
+  Eigen::Matrix3d by_point;
+  by_point << fx, 0, -fx * q.x() * inverse, 0, fy, -fy * q.y() * inverse, 0, 0, inv_depth_sigma;
+  Eigen::Matrix3d turned;  // q x w
+  turned << 0, -q.z(), q.y(), q.z(), 0, -q.x(), -q.y(), q.x(), 0;
+  m.jacobian << -by_point, by_point * turned;
+  return m;
+}
+
+std::vector<Match> matches_of(const CameraModel& camera, const Rigid3& pose,
+                              std::span<const PoseObservation> observations) {
+  std::vector<Match> matches;
+  matches.reserve(observations.size());
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const Eigen::Vector3d q = pose * observations[i].point_in_world;
+    if (!(q.z() > 0)) continue;
+    const Match m = linearise(camera, q, observations[i], i);
+    if (m.error.squaredNorm() <= kFarthest) matches.push_back(m);
+  }
+  return matches;
+}
+
+using Labels = std::vector<uint8_t>;  // per match: of which motion it is
+
+// The nearer of the matches as one motion and the farther ones as the other, in each of the ways in which a search
+// begins. None where it saves less than a body must, to let each have its own, in all of them (score test: Rao, 1948).
+std::vector<Labels> near_and_far(const std::vector<Match>& matches) {
+  std::vector<double> depth;
+  depth.reserve(matches.size());
+  for (const Match& m : matches) depth.push_back(m.depth);
+  std::array<double, kQuarters - 1> limit;
+  for (size_t k = 0; k < limit.size(); ++k) {
+    const auto at = depth.begin() + static_cast<std::ptrdiff_t>((k + 1) * depth.size() / kQuarters);
+    std::nth_element(depth.begin(), at, depth.end());
+    limit[k] = *at;
+  }
+  std::array<Normal, kQuarters> quarter;
+  for (const Match& m : matches) {
+    const auto q = static_cast<size_t>(std::upper_bound(limit.begin(), limit.end(), m.depth) - limit.begin());
+    quarter[q].add(weight_of(m.error.squaredNorm()), m.normal());
+  }
+  double saved = 0;
+  for (size_t k = 0; k < limit.size(); ++k) {
+    std::array<Normal, 2> side{any_motion(), any_motion()};
+    for (size_t q = 0; q < kQuarters; ++q) side[q <= k].add(1, quarter[q]);
+    saved = std::max(saved, -side[0].g.dot(side[0].solve()) - side[1].g.dot(side[1].solve()));
+  }
+  std::vector<Labels> ways;
+  if (saved < kMoves * static_cast<double>(kMinMoving)) return ways;
+  for (double farthest : limit) {
+    Labels& label = ways.emplace_back();
+    label.reserve(matches.size());
+    for (const Match& m : matches) label.push_back(m.depth < farthest);
+  }
+  return ways;
+}
+
+struct Motion {
+  Vector6d d = Vector6d::Zero();  // perturbation of the pose, [m, rad]
+  Matrix6d information = Matrix6d::Identity();
+};
+
+// Each of two motions, what is of which, and what all of it costs.
+struct TwoMotions {
+  Labels label;
+  std::array<Motion, 2> motion;
+  double cost = 0;
+
+  double count(uint8_t of) const { return static_cast<double>(std::count(label.begin(), label.end(), of)); }
+};
+
+// What a sum is over: the matches of one motion.
+struct Part {
+  const Labels& label;
+  uint8_t of;
+};
+
+class MotionProblem {
+ public:
+  MotionProblem(const std::vector<Match>& matches, std::span<const PoseObservation> observations, double width)
+      : matches_(matches) {
+    normal_.reserve(matches_.size());
+    for (const Match& m : matches_) normal_.push_back(m.normal());
+    find_neighbours(observations, width);
+  }
+
+  // That fits best, sought from `motion` on.
+  Motion fit(const Part& part, Motion motion, int steps) const {
+    for (int step = 0; step < steps; ++step) {
+      Normal sum = any_motion();
+      for (size_t i = 0; i < matches_.size(); ++i)
+        if (part.label[i] == part.of) sum.add(weight_of(matches_[i].squared_error(motion.d)), normal_[i]);
+      motion = {sum.solve(), sum.h};
+    }
+    return motion;
+  }
+  double cost(const Part& part, const Motion& motion) const {
+    double sum = 0;
+    for (size_t i = 0; i < matches_.size(); ++i)
+      if (part.label[i] == part.of) sum += cost_of(matches_[i].squared_error(motion.d));
+    return sum;
+  }
+
+  // Nothing where one of the motions is left with too few matches.
+  std::optional<TwoMotions> two_motions(Labels first) const {
+    TwoMotions both;
+    both.label = std::move(first);
+    std::vector<std::array<double, 2>> cost(matches_.size());
+    for (int round = 0; round < kRounds; ++round) {
+      if (std::min(both.count(0), both.count(1)) < kMinMoving) return std::nullopt;
+      for (uint8_t m : {0, 1}) {
+        both.motion[m] = fit({both.label, m}, both.motion[m], 2);
+        for (size_t i = 0; i < matches_.size(); ++i) cost[i][m] = cost_of(matches_[i].squared_error(both.motion[m].d));
+      }
+      Labels next(matches_.size());
+      for (size_t i = 0; i < matches_.size(); ++i)
+        next[i] = cost[i][1] + kApart * apart(both.label, i, 1) < cost[i][0] + kApart * apart(both.label, i, 0);
+      const bool settled = next == both.label;
+      both.label = std::move(next);
+      if (settled) break;
+    }
+    for (size_t i = 0; i < matches_.size(); ++i)
+      both.cost += cost[i][both.label[i]] + kApart * apart(both.label, i, both.label[i]);
+    return both;
+  }
+
+ private:
+  void find_neighbours(std::span<const PoseObservation> observations, double width) {
+    std::vector<Eigen::Vector3d> place;  // in tenths of the image's width
+    place.reserve(matches_.size());
+    for (const Match& m : matches_) {
+      const Eigen::Vector2d at = observations[m.observation].pixel / (0.1 * width);
+      place.emplace_back(at.x(), at.y(), std::log(m.depth) / kDepthRatio);
+    }
+    neighbours_.resize(place.size());
+    std::vector<std::pair<double, uint32_t>> others(place.size() - 1);
+    for (size_t i = 0; i < place.size(); ++i) {
+      auto other = others.begin();
+      for (size_t k = 0; k < place.size(); ++k)
+        if (k != i) *other++ = {(place[k] - place[i]).squaredNorm(), static_cast<uint32_t>(k)};
+      std::nth_element(others.begin(), others.begin() + kNeighbours, others.end());
+      for (size_t k = 0; k < kNeighbours; ++k) neighbours_[i][k] = others[k].second;
+    }
+  }
+  // Neighbours that are not of that motion.
+  double apart(const Labels& label, size_t i, uint8_t of) const {
+    double count = 0;
+    for (uint32_t k : neighbours_[i]) count += label[k] != of;
+    return count;
+  }
+
+  const std::vector<Match>& matches_;
+  std::vector<Normal> normal_;
+  std::vector<std::array<uint32_t, kNeighbours>> neighbours_;
+};
+
+// What it costs that the camera has made this motion and not the expected one, by Student's t in six dimensions.
+double cost_as_expected(const Motion& motion, const Rigid3& pose, const PosePrior& prior) {
+  const auto r = solver::relative_pose_residual(pose, prior.cam_from_world, Rigid3());
+  const Vector6d off = r.error + r.jacobian_a * motion.d;
+  const Matrix6d covariance =
+      prior.information.inverse() + r.jacobian_a * motion.information.inverse() * r.jacobian_a.transpose();
+  return (kFreedom + 6) * std::log1p(off.dot(covariance.ldlt().solve(off)) / kFreedom);
+}
+
+}  // namespace
+
+std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
+                                                  std::span<const PoseObservation> observations, const PosePrior& prior,
+                                                  int min_still) {
+  std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
+  if (matches.size() < kMinMoving + static_cast<size_t>(min_still)) return std::nullopt;
+  std::vector<Labels> ways = near_and_far(matches);
+  if (ways.empty()) return std::nullopt;
+  const MotionProblem problem(matches, observations, camera.width);
+  std::optional<TwoMotions> both;
+  for (Labels& way : ways) {
+    auto found = problem.two_motions(std::move(way));
+    if (found && (!both || found->cost < both->cost)) both = std::move(found);
+  }
+  if (!both) return std::nullopt;
+
+  std::array<double, 2> cost;  // more, if the one or the other is the camera's motion
+  for (uint8_t m : {0, 1})
+    cost[m] = cost_as_expected(both->motion[m], cam_from_world, prior) + kMoves * both->count(1 - m);
+  const uint8_t of_camera = cost[1] < cost[0];
+  if (both->count(of_camera) < min_still) return std::nullopt;
+  const Labels one(matches.size(), 0);
+  const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, {}, 4));
+  if (both->cost + kMoves * both->count(1 - of_camera) >= cost_of_one) return std::nullopt;
+  std::vector<uint8_t> moves(observations.size(), 0);
+  for (size_t i = 0; i < matches.size(); ++i) moves[matches[i].observation] = both->label[i] != of_camera;
+  return moves;
+}
+
+}  // namespace dkb

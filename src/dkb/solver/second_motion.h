@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dkb/geometry/camera.h"
+#include "dkb/solver/pose_optimiser.h"
+
+namespace dkb {
+
+// Whether two motions explain what one pose explains badly: somebody whose points the map holds as still walks off, and
+// a pose between his motion and the camera's keeps most matches within their limits. One match more or less that does
+// not fit says little then, but a body is many that fit each other.
+//
+// Each match is of one of two motions (expectation maximisation), with Student's t of pose_optimiser for its errors and
+// a cost for each of its nearest neighbours that is of the other one (Potts). It starts from what is near against what
+// is far, since only what is near can turn and shift a camera that sees more of the room than of him. Two motions are
+// believed where they take enough off the cost of one. Which of them is the camera's is told by the cost of both with
+// the `prior`. All is linear about the pose.
+//
+// Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
+// where fewer than `min_still` or 10 observations would be of either. Deterministic.
+std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
+                                                  std::span<const PoseObservation> observations, const PosePrior& prior,
+                                                  int min_still);
+
+}  // namespace dkb

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/solver/second_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "dkb/util/random.h"
+
+namespace dkb {
+namespace {
+
+struct SceneOptions {
+  int room = 150, body = 90;                   // points
+  Eigen::Vector3d moved = {0.012, -0.004, 0};  // [m] the body
+  double wrong = 0;                            // share of matches that show something else
+  uint64_t seed = 1;
+};
+
+// A camera moves a little before a room 0.8 to 1.6 m away and somebody who stands half a metre away.
+struct BodyInRoom {
+  CameraModel camera;
+  Rigid3 cam_from_world{rotation_from_vector({0.01, -0.02, 0.005}), {0.02, -0.01, 0.005}};
+  std::vector<PoseObservation> observations;
+  std::vector<uint8_t> of_body;
+
+  explicit BodyInRoom(const SceneOptions& options) {
+    Random random(options.seed);
+    const auto see = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& moved) {
+      const Eigen::Vector3d q = cam_from_world * Eigen::Vector3d(point + moved);
+      PoseObservation o;
+      o.point_in_world = point;
+      o.pixel_sigma = 1.2;
+      o.pixel = camera.project(q) + Eigen::Vector2d(random.normal(), random.normal());
+      if (random.uniform() < 0.7) {
+        o.depth_sigma = 0.003 * q.z() * q.z() + 0.001;
+        o.depth = q.z() + 0.6 * o.depth_sigma * random.normal();
+      }
+      if (random.uniform() < options.wrong)
+        o.pixel += Eigen::Vector2d(random.uniform(-40, 40), random.uniform(-40, 40));
+      observations.push_back(o);
+    };
+    for (int i = 0; i < options.room; ++i) {
+      const double z = random.uniform(0.8, 1.6);
+      see({random.uniform(-0.55, 0.55) * z, random.uniform(-0.4, 0.4) * z, z}, Eigen::Vector3d::Zero());
+    }
+    for (int i = 0; i < options.body; ++i)
+      see({random.uniform(-0.15, 0.1), random.uniform(-0.2, 0.2), random.uniform(0.45, 0.55)}, options.moved);
+    of_body.assign(static_cast<size_t>(options.room), 0);
+    of_body.resize(observations.size(), 1);
+  }
+
+  PoseEstimate estimate(const std::vector<uint8_t>* moves = nullptr) const {
+    std::vector<PoseObservation> still;
+    for (size_t i = 0; i < observations.size(); ++i)
+      if (moves == nullptr || !(*moves)[i]) still.push_back(observations[i]);
+    return optimise_pose(camera, cam_from_world, still);
+  }
+  double error(const PoseEstimate& pose) const {
+    return (centre_in_world(pose.cam_from_world) - centre_in_world(cam_from_world)).norm();
+  }
+  // The pose is expected where it is, or `off` from there in the camera's axes.
+  PosePrior prior(const Eigen::Vector3d& off = Eigen::Vector3d::Zero()) const {
+    Vector6d sd;
+    sd << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.004);
+    return {Rigid3(Eigen::Quaterniond::Identity(), off) * cam_from_world,
+            Matrix6d(sd.cwiseProduct(sd).cwiseInverse().asDiagonal())};
+  }
+  std::optional<std::vector<uint8_t>> look(const PosePrior& prior) const {
+    return second_motion(camera, estimate().cam_from_world, observations, prior, 20);
+  }
+  std::optional<std::vector<uint8_t>> look() const { return look(prior()); }
+  // Shares of the room's and of the body's matches that are said to move.
+  std::pair<double, double> moving(const std::vector<uint8_t>& moves) const {
+    std::array<double, 2> count{}, said{};
+    for (size_t i = 0; i < moves.size(); ++i) ++count[of_body[i]], said[of_body[i]] += moves[i];
+    return {said[0] / count[0], said[1] / count[1]};
+  }
+};
+
+TEST(SecondMotion, IsThatOfSomebodyWhoTakesThePoseAlong) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const BodyInRoom scene({.seed = seed});
+    const PoseEstimate between = scene.estimate();
+    EXPECT_GT(between.inliers, 0.7 * static_cast<double>(scene.observations.size())) << "no gate would tell";
+    const auto moves = scene.look();
+    ASSERT_TRUE(moves) << seed;
+    const auto [room, body] = scene.moving(*moves);
+    EXPECT_LT(room, 0.05) << seed;
+    EXPECT_GT(body, 0.9) << seed;
+    EXPECT_GT(scene.error(between), 0.004) << seed;
+    EXPECT_LT(scene.error(scene.estimate(&*moves)), 0.0025) << seed;
+  }
+}
+
+TEST(SecondMotion, IsNotSeenWhereEverythingStands) {
+  for (uint64_t seed = 1; seed <= 100; ++seed)
+    EXPECT_FALSE(BodyInRoom({.moved = {0, 0, 0}, .seed = seed}).look()) << seed;
+}
+
+TEST(SecondMotion, IsNotMadeOfWrongMatches) {
+  for (uint64_t seed = 1; seed <= 100; ++seed)
+    EXPECT_FALSE(BodyInRoom({.moved = {0, 0, 0}, .wrong = 0.2, .seed = seed}).look()) << seed;
+}
+
+TEST(SecondMotion, IsFoundAmongWrongMatches) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const BodyInRoom scene({.wrong = 0.15, .seed = seed});
+    const auto moves = scene.look();
+    ASSERT_TRUE(moves) << seed;
+    EXPECT_LT(scene.error(scene.estimate(&*moves)), 0.003) << seed;
+  }
+}
+
+// As many matches are of the one as of the other: what is expected decides.
+TEST(SecondMotion, IsTheOneThatWasNotExpected) {
+  const Eigen::Vector3d step(0.02, 0, 0);
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const BodyInRoom scene({.room = 100, .body = 100, .moved = step, .seed = seed});
+    const auto by_room = scene.look(), by_body = scene.look(scene.prior(step));
+    ASSERT_TRUE(by_room && by_body) << seed;
+    EXPECT_LT(scene.moving(*by_room).first, 0.1) << seed;
+    EXPECT_GT(scene.moving(*by_room).second, 0.9) << seed;
+    EXPECT_GT(scene.moving(*by_body).first, 0.9) << seed;
+    EXPECT_LT(scene.moving(*by_body).second, 0.1) << seed;
+  }
+}
+
+TEST(SecondMotion, LeavesEnoughForThePose) {
+  const BodyInRoom scene({});
+  const Rigid3 pose = scene.estimate().cam_from_world;
+  EXPECT_TRUE(second_motion(scene.camera, pose, scene.observations, scene.prior(), 20));
+  EXPECT_FALSE(second_motion(scene.camera, pose, scene.observations, scene.prior(), 200));
+  EXPECT_FALSE(second_motion(scene.camera, pose, {}, scene.prior(), 0));
+}
+
+}  // namespace
+}  // namespace dkb
