@@ -20,7 +20,7 @@ constexpr size_t kNeighbours = 5;    // of a match, beside each other in the ima
 constexpr double kDepthRatio = 0.2;  // of depths that are as far apart as a tenth of the image is wide
 constexpr size_t kQuarters = 4;      // of the matches by depth, between which near and far are told apart at first
 constexpr int kRounds = 5;           // of what is of which motion, and of the motions
-constexpr size_t kMinMoving = 20;    // matches that tell a motion
+constexpr double kSmallest = 0.125;  // of the matches: fewer do not take a robust pose along
 constexpr double kInfoOfBody = 1e2;  // [1/m^2, 1/rad^2] of a body's motion beside the camera's: 0.1 m, 0.1 rad
 // What a match costs that moves, beside its error. Nothing moves in fr1_xyz, and there a second motion saves 0.15 for
 // each of its matches as a median and 0.8 at most (lens, shutter and depth are not as modelled); where somebody walks
@@ -113,7 +113,7 @@ std::vector<Labels> near_and_far(const std::vector<Match>& matches) {
     saved = std::max(saved, -side[0].g.dot(side[0].solve()) - side[1].g.dot(side[1].solve()));
   }
   std::vector<Labels> ways;
-  if (saved < kMoves * static_cast<double>(kMinMoving)) return ways;
+  if (saved < kMoves * kSmallest * static_cast<double>(matches.size())) return ways;
   for (double farthest : limit) {
     Labels& label = ways.emplace_back();
     label.reserve(matches.size());
@@ -174,7 +174,8 @@ class MotionProblem {
     both.label = std::move(first);
     std::vector<std::array<double, 2>> cost(matches_.size());
     for (int round = 0; round < kRounds; ++round) {
-      if (std::min(both.count(0), both.count(1)) < kMinMoving) return std::nullopt;
+      if (std::min(both.count(0), both.count(1)) < kSmallest * static_cast<double>(matches_.size()))
+        return std::nullopt;
       for (uint8_t m : {0, 1}) {
         both.motion[m] = fit({both.label, m}, both.motion[m], 2);
         for (size_t i = 0; i < matches_.size(); ++i) cost[i][m] = cost_of(matches_[i].squared_error(both.motion[m].d));
@@ -236,7 +237,7 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
                                                   std::span<const PoseObservation> observations, const PosePrior& prior,
                                                   int min_still) {
   std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
-  if (matches.size() < kMinMoving + static_cast<size_t>(min_still)) return std::nullopt;
+  if (matches.size() < std::max(static_cast<size_t>(min_still), 2 * kNeighbours)) return std::nullopt;
   std::vector<Labels> ways = near_and_far(matches);
   if (ways.empty()) return std::nullopt;
   const MotionProblem problem(matches, observations, camera.width);

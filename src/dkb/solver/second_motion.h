@@ -22,7 +22,7 @@ namespace dkb {
 // the `prior`. All is linear about the pose.
 //
 // Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
-// where fewer than `min_still` or 10 observations would be of either. Deterministic.
+// where fewer than `min_still` observations would be of the camera's, or an eighth of either. Deterministic.
 std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
                                                   std::span<const PoseObservation> observations, const PosePrior& prior,
                                                   int min_still);
