@@ -94,7 +94,19 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   std::optional<Rigid3> pose;
   for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, input))
     if (!pose) pose = track_last_frame(expected, search_radius(kRadiusLastFrame), features, points);
-  if (!pose) pose = match_last_frame(frame, points);
+  const auto shown = [](const std::vector<PointId>& of) {
+    return std::count_if(of.begin(), of.end(), [](PointId p) { return p != kNoPoint; });
+  };
+  // Where most of what was shown is not found where it is expected, it may be elsewhere.
+  if (!pose || 2 * shown(points) < shown(last_->points)) {
+    std::vector<PointId> elsewhere(frame.points.size(), kNoPoint);
+    const std::optional<Rigid3> other = match_last_frame(frame, elsewhere);
+    if (other && (!pose || shown(elsewhere) > shown(points))) {
+      pose = other;
+      points = std::move(elsewhere);
+      if (frame.predicted && !frame.predicted->agrees(*pose)) frame.predicted->weighs = false;
+    }
+  }
   if (!pose) pose = track_last_frame(last_->cam_from_world, kRadiusWide, features, points);
   if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
