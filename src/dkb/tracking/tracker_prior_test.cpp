@@ -123,7 +123,7 @@ class WhoWalksOff : public ::testing::Test {
   }
 
   static constexpr size_t kOfBody = 90;
-  TestScene scene{900, 1, 0.7, 2.5};
+  TestScene scene{1500, 1, 0.7, 2.5};
   Tracker tracker{scene.optics(), {}, 1};
   FrameIndex index = -1;
 };
@@ -135,16 +135,6 @@ TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongByALittleInEachFrame) {
     ASSERT_EQ(frame.state, TrackingState::tracking) << i;
     EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
   }
-}
-
-// At a low rate he goes a long way between two frames, and depth may have taken his motion for the camera's.
-TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongWhereTheExpectationIsHis) {
-  const Rigid3 seen = TestScene::camera_at({0.05, 0, 0}, {0, 0.03, 0}),
-               expected = TestScene::camera_at({-0.06, 0.02, 0}, {0, -0.07, 0});
-  move_body(seen.inverse() * expected);
-  const TrackedFrame frame = see(seen, MotionPrior{expected.inverse(), false, axis_covariance(0.006, 0.01)});
-  EXPECT_EQ(frame.state, TrackingState::tracking);
-  EXPECT_LT(distance_between(frame.cam_from_world, seen), 0.005);
 }
 
 }  // namespace

@@ -97,8 +97,8 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   const auto shown = [](const std::vector<PointId>& of) {
     return std::count_if(of.begin(), of.end(), [](PointId p) { return p != kNoPoint; });
   };
-  // Where most of what was shown is not found where it is expected, it may be elsewhere.
-  if (!pose || 2 * shown(points) < shown(last_->points)) {
+  // Where little of what was shown is found where it is expected, it may be elsewhere.
+  if (!pose || 4 * shown(points) < shown(last_->points)) {
     std::vector<PointId> elsewhere(frame.points.size(), kNoPoint);
     const std::optional<Rigid3> other = match_last_frame(frame, elsewhere);
     if (other && (!pose || shown(elsewhere) > shown(points))) {
