@@ -14,6 +14,8 @@ namespace dkb {
 // Variance of errors in the plane, in units of the one that they were divided by, told by the median of their squares,
 // which the tails hardly move. 20 errors of variance 1 stand beside those at hand. Reorders `squares`, at least one.
 double variance_by_median(std::span<double> squares);
+// Degrees of freedom of Student's t, by which errors with tails are weighed.
+inline constexpr double kStudentFreedom = 4;
 // Of the squares of errors in the plane by Student's t with four degrees of freedom, nine of ten are below so many
 // times that variance: twice the quantile of F(2, 4).
 inline constexpr double kStudent90 = 8.65;

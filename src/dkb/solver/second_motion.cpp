@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "dkb/solver/relative_pose.h"
 
 namespace dkb {
 namespace {
 
-constexpr double kFreedom = 4;       // of Student's t
 constexpr double kFarthest = 60;     // squared error beyond which a match is wrong by any motion
 constexpr double kWrong = 20;        // the most that a match costs, as one of a squared error of 110
 constexpr double kApart = 2;         // the cost of a neighbour of the other motion
@@ -28,10 +26,10 @@ constexpr double kInfoOfBody = 1e2;  // [1/m^2, 1/rad^2] of a body's motion besi
 constexpr double kMoves = 1.5;
 
 double cost_of(double squared_error) {
-  return std::min((kFreedom + 2) * std::log1p(squared_error / kFreedom), kWrong);
+  return std::min((kStudentFreedom + 2) * std::log1p(squared_error / kStudentFreedom), kWrong);
 }
 double weight_of(double squared_error) {
-  return (kFreedom + 2) / (kFreedom + squared_error);
+  return (kStudentFreedom + 2) / (kStudentFreedom + squared_error);
 }
 
 // Half the second derivative and half the derivative of a sum of squares about a perturbation of zero.
@@ -228,7 +226,7 @@ double cost_as_expected(const Motion& motion, const Rigid3& pose, const PosePrio
   const Vector6d off = r.error + r.jacobian_a * motion.d;
   const Matrix6d covariance =
       prior.information.inverse() + r.jacobian_a * motion.information.inverse() * r.jacobian_a.transpose();
-  return (kFreedom + 6) * std::log1p(off.dot(covariance.ldlt().solve(off)) / kFreedom);
+  return (kStudentFreedom + 6) * std::log1p(off.dot(covariance.ldlt().solve(off)) / kStudentFreedom);
 }
 
 }  // namespace
@@ -236,7 +234,7 @@ double cost_as_expected(const Motion& motion, const Rigid3& pose, const PosePrio
 std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
                                                   std::span<const PoseObservation> observations, const PosePrior& prior,
                                                   int min_still) {
-  std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
+  const std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
   if (matches.size() < std::max(static_cast<size_t>(min_still), 2 * kNeighbours)) return std::nullopt;
   std::vector<Labels> ways = near_and_far(matches);
   if (ways.empty()) return std::nullopt;
