@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "dkb/solver/relative_pose.h"
-
 namespace dkb {
 namespace {
 
@@ -23,7 +21,7 @@ constexpr double kInfoOfBody = 1e2;  // [1/m^2, 1/rad^2] of a body's motion besi
 // What a match costs that moves, beside its error. Nothing moves in fr1_xyz, and there a second motion saves 0.15 for
 // each of its matches as a median and 0.8 at most (lens, shutter and depth are not as modelled); where somebody walks
 // off, 2.7 to 5 (pauses).
-constexpr double kMoves = 1.5;
+constexpr double kMoves = 1.1;
 
 double cost_of(double squared_error) {
   return std::min((kStudentFreedom + 2) * std::log1p(squared_error / kStudentFreedom), kWrong);
@@ -220,20 +218,18 @@ class MotionProblem {
   std::vector<std::array<uint32_t, kNeighbours>> neighbours_;
 };
 
-// What it costs that the camera has made this motion and not the expected one, by Student's t in six dimensions.
-double cost_as_expected(const Motion& motion, const Rigid3& pose, const PosePrior& prior) {
-  const auto r = solver::relative_pose_residual(pose, prior.cam_from_world, Rigid3());
-  const Vector6d off = r.error + r.jacobian_a * motion.d;
-  const Matrix6d covariance =
-      prior.information.inverse() + r.jacobian_a * motion.information.inverse() * r.jacobian_a.transpose();
-  return (kStudentFreedom + 6) * std::log1p(off.dot(covariance.ldlt().solve(off)) / kStudentFreedom);
+// The motion of what is farther away: a body hides what stands behind it, and only what is near can turn and shift a
+// camera that sees more of the room than of it.
+uint8_t farther(const TwoMotions& both, const std::vector<Match>& matches) {
+  std::array<double, 2> log_depth{};
+  for (size_t i = 0; i < matches.size(); ++i) log_depth[both.label[i]] += std::log(matches[i].depth);
+  return log_depth[1] / both.count(1) > log_depth[0] / both.count(0);
 }
 
 }  // namespace
 
 std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
-                                                  std::span<const PoseObservation> observations, const PosePrior& prior,
-                                                  int min_still) {
+                                                  std::span<const PoseObservation> observations, int min_still) {
   const std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
   if (matches.size() < std::max(static_cast<size_t>(min_still), 2 * kNeighbours)) return std::nullopt;
   std::vector<Labels> ways = near_and_far(matches);
@@ -246,10 +242,7 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
   }
   if (!both) return std::nullopt;
 
-  std::array<double, 2> cost;  // more, if the one or the other is the camera's motion
-  for (uint8_t m : {0, 1})
-    cost[m] = cost_as_expected(both->motion[m], cam_from_world, prior) + kMoves * both->count(1 - m);
-  const uint8_t of_camera = cost[1] < cost[0];
+  const uint8_t of_camera = farther(*both, matches);
   if (both->count(of_camera) < min_still) return std::nullopt;
   const Labels one(matches.size(), 0);
   const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, {}, 4));

@@ -80,6 +80,7 @@ struct TrackingInput {
   const MotionPrior* prior = nullptr;    // by something beside the camera; may be null
   const MotionPrior* step = nullptr;     // the same motion as the surfaces in view show it as well; may be null
   const FrameFeatures* start = nullptr;  // of the frame before, if a map starts with it
+  bool movers = false;                   // are looked for: some of what the map holds as still may move
   bool may_start_map = true;             // else a frame that finds no map stays without a pose
 };
 

@@ -470,7 +470,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     const Vector6d before = velocity_.value_or(step);
     if (input.start != nullptr && last_->starts_map) remake_start(input.start->at(step), frame);
     refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
-    if (seen_before) leave_out_mover(input.features, frame);
+    if (seen_before && input.movers) leave_out_mover(input.features, frame);
     velocity_ = seen_before ? velocity_to(frame) : step;
     const double seconds = frame.timestamp - last_->timestamp;
     if (seen_before) filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);

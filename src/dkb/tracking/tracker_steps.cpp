@@ -141,7 +141,6 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
 // Somebody whose points the map holds as still walks off: one motion does not explain all matches. The pose is then by
 // those of the camera's own motion.
 void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const {
-  if (!frame.predicted || !frame.predicted->weighs) return;
   std::vector<size_t> matched;
   std::vector<PoseObservation> observations;
   for (size_t f = 0; f < frame.matched.size(); ++f) {
@@ -149,8 +148,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     matched.push_back(f);
     observations.push_back(pose_observation(frame.features->keypoints[f], *position(frame.matched[f]), optics_));
   }
-  const PosePrior prior{frame.predicted->cam_from_world, frame.predicted->covariance.inverse()};
-  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, prior, options_.min_inliers);
+  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers);
   if (!moves) return;
   TrackedFrame by_still = frame;
   by_still.inliers = static_cast<int>(std::count(moves->begin(), moves->end(), 0));
