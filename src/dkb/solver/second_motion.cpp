@@ -218,12 +218,12 @@ class MotionProblem {
   std::vector<std::array<uint32_t, kNeighbours>> neighbours_;
 };
 
-// The motion of what is farther away: a body hides what stands behind it, and only what is near can turn and shift a
-// camera that sees more of the room than of it.
-uint8_t farther(const TwoMotions& both, const std::vector<Match>& matches) {
-  std::array<double, 2> log_depth{};
-  for (size_t i = 0; i < matches.size(); ++i) log_depth[both.label[i]] += std::log(matches[i].depth);
-  return log_depth[1] / both.count(1) > log_depth[0] / both.count(0);
+// The motion of the room, which has the most surface. A match stands for as much of it as an image shows there: with
+// the square of its depth. A body that takes the camera along is near.
+uint8_t of_most_surface(const TwoMotions& both, const std::vector<Match>& matches) {
+  std::array<double, 2> surface{};
+  for (size_t i = 0; i < matches.size(); ++i) surface[both.label[i]] += matches[i].depth * matches[i].depth;
+  return surface[1] > surface[0];
 }
 
 }  // namespace
@@ -242,7 +242,7 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
   }
   if (!both) return std::nullopt;
 
-  const uint8_t of_camera = farther(*both, matches);
+  const uint8_t of_camera = of_most_surface(*both, matches);
   if (both->count(of_camera) < min_still) return std::nullopt;
   const Labels one(matches.size(), 0);
   const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, {}, 4));

@@ -18,8 +18,8 @@ namespace dkb {
 // Each match is of one of two motions (expectation maximisation), with Student's t of pose_optimiser for its errors and
 // a cost for each of its nearest neighbours that is of the other one (Potts). It starts from what is near against what
 // is far, since only what is near can turn and shift a camera that sees more of the room than of him. Two motions are
-// believed where they take enough off the cost of one. Which of them is the camera's is told by the cost of both with
-// the `prior`. All is linear about the pose.
+// believed where they take enough off the cost of one. The camera's is that of the matches with the most surface. All
+// is linear about the pose.
 //
 // Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
 // where fewer than `min_still` observations would be of the camera's, or an eighth of either. Deterministic.
