@@ -160,6 +160,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   if (!moves) return;
   TrackedFrame by_still = frame;
   by_still.inliers = static_cast<int>(std::count(moves->begin(), moves->end(), 0));
+  if (by_still.predicted) by_still.predicted->weighs = false;  // the surfaces that it comes from are his as well
   for (size_t i = 0; i < matched.size(); ++i) {
     by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
     by_still.outlier[matched[i]] = (*moves)[i];
