@@ -137,6 +137,12 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   return optimise_pose(optics_.camera, initial, observations, options, &prior);
 }
 
+double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, const RgbdFeatures& features) const {
+  const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
+  const Eigen::Vector2d at = optics_.camera.project(cam_from_world * pair.point_in_world);
+  return (at - k.pixel.cast<double>()).squaredNorm() / (optics_.corner_variance(k) + square(pair.parallax_sigma));
+}
+
 // Visual-odometry points weigh little in a pose, and the limits of an inlier widen with their sigmas: a shoe that goes
 // 3 px a frame was within them. What has moved is told by what these points leave in this frame instead; it starts anew
 // where it is now. Returns the limit, for squared errors over their variance.
@@ -145,10 +151,7 @@ double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, cons
   std::vector<double> squares(pairs.size()), of_inliers;
   for (size_t i = first; i < pairs.size(); ++i) {
     if (!pose.inlier[i]) continue;
-    const Keypoint& k = features.keypoints[static_cast<size_t>(pairs[i].feature)];
-    const double variance = optics_.corner_variance(k) + square(pairs[i].parallax_sigma);
-    const Eigen::Vector2d at = optics_.camera.project(pose.cam_from_world * pairs[i].point_in_world);
-    squares[i] = (at - k.pixel.cast<double>()).squaredNorm() / variance;
+    squares[i] = squared_error(pairs[i], pose.cam_from_world, features);
     of_inliers.push_back(squares[i]);
   }
   if (of_inliers.empty()) return PoseOptions().chi2_pixel;

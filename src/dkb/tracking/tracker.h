@@ -96,6 +96,8 @@ class Tracker {
     double parallax_sigma = 0;  // [px] by not knowing the depth
   };
   Pair odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const;
+  // Of a pair's pixel, over the variance of a corner in one frame.
+  double squared_error(const Pair& pair, const Rigid3& cam_from_world, const RgbdFeatures& features) const;
   double forget_strays(const std::vector<Pair>& pairs, size_t first, const PoseEstimate& pose,
                        const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,

@@ -165,7 +165,18 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
     by_still.outlier[matched[i]] = (*moves)[i];
   }
-  if (refine_at_velocity(velocity_to(frame), features, by_still)) frame = std::move(by_still);
+  // So are some of the points that are followed from frame to frame: those that fit are the room's.
+  const auto followed =
+      std::exchange(by_still.odometry, std::vector<std::optional<OdometryMatch>>(frame.odometry.size()));
+  if (!refine_at_velocity(velocity_to(frame), features, by_still)) return;
+  for (size_t f = 0; f < followed.size(); ++f) {
+    if (!followed[f]) continue;
+    const Pair pair = odometry_pair(static_cast<int>(f), *followed[f], by_still.cam_from_world);
+    if (followed[f]->moves ||
+        squared_error(pair, by_still.cam_from_world, *by_still.features) <= PoseOptions().chi2_pixel)
+      by_still.odometry[f] = followed[f];
+  }
+  frame = std::move(by_still);
 }
 
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
