@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace dkb {
 namespace {
@@ -197,13 +198,20 @@ class MotionProblem {
       place.emplace_back(at.x(), at.y(), std::log(m.depth) / kDepthRatio);
     }
     neighbours_.resize(place.size());
-    std::vector<std::pair<double, uint32_t>> others(place.size() - 1);
     for (size_t i = 0; i < place.size(); ++i) {
-      auto other = others.begin();
-      for (size_t k = 0; k < place.size(); ++k)
-        if (k != i) *other++ = {(place[k] - place[i]).squaredNorm(), static_cast<uint32_t>(k)};
-      std::nth_element(others.begin(), others.begin() + kNeighbours, others.end());
-      for (size_t k = 0; k < kNeighbours; ++k) neighbours_[i][k] = others[k].second;
+      std::array<double, kNeighbours> nearest;  // squared distances, rising
+      nearest.fill(std::numeric_limits<double>::infinity());
+      for (size_t k = 0; k < place.size(); ++k) {
+        const double distance = (place[k] - place[i]).squaredNorm();
+        if (distance >= nearest.back() || k == i) continue;
+        size_t at = kNeighbours - 1;
+        for (; at > 0 && distance < nearest[at - 1]; --at) {
+          nearest[at] = nearest[at - 1];
+          neighbours_[i][at] = neighbours_[i][at - 1];
+        }
+        nearest[at] = distance;
+        neighbours_[i][at] = static_cast<uint32_t>(k);
+      }
     }
   }
   // Neighbours that are not of that motion.
