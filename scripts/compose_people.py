@@ -149,37 +149,45 @@ WAYS = {
 }
 
 
+def place_figures(figures, way, truth, start, stamp):
+    """The figures of a way in the world."""
+    rotation, origin = truth.at(start)
+    camera = (truth.at(stamp)[1] - origin) @ rotation
+    placed = []
+    for figure, goes in WAYS[way]:
+        at, turn = goes(stamp - start, camera)
+        (p, colours), c, s = figures[figure], np.cos(turn), np.sin(turn)
+        turned = np.stack([c * p[:, 0] + s * p[:, 2], p[:, 1], c * p[:, 2] - s * p[:, 0]], 1)
+        placed.append(((turned + at) @ rotation.T + origin, colours))
+    return placed
+
+
+def draw_before(room, figures, pose):
+    """Depth and colour of what stands before the room's depth, and where that is."""
+    z, colour = draw(figures, *pose, room.shape)
+    mask = cv2.medianBlur((z < room).astype(np.uint8), 3) > 0
+    return z, colour, mask & np.isfinite(z)
+
+
 def compose(sequence, figures, way, out):
     random, truth, pairs = np.random.default_rng(1), Truth(sequence / "groundtruth.txt"), pairs_of(sequence)
     for part in ("rgb", "depth", "masks"):
         (out / part).mkdir(parents=True, exist_ok=True)
     start = float(pairs[0][0])
-    first_rotation, first_place = truth.at(start)
     for row in pairs:
         image, depth = cv2.imread(str(sequence / row[1])), cv2.imread(str(sequence / row[3]), -1)
         behind = np.where(depth == 0, np.inf, depth / PER_METRE)
         around = cv2.erode(np.where(np.isfinite(behind), behind, 9), np.ones((9, 9)))
 
-        def seen_at(stamp):
-            rotation, place = truth.at(stamp)
-            world = []
-            for figure, goes in WAYS[way]:
-                at, turn = goes(stamp - start, (place - first_place) @ first_rotation)
-                (p, colours), c, s = figures[figure], np.cos(turn), np.sin(turn)
-                turned = np.stack([c * p[:, 0] + s * p[:, 2], p[:, 1], c * p[:, 2] - s * p[:, 0]], 1)
-                world.append(((turned + at) @ first_rotation.T + first_place, colours))
-            z, colour = draw(world, rotation, place, depth.shape)
-            mask = cv2.medianBlur((z < np.where(depth == 0, around, behind)).astype(np.uint8), 3) > 0
-            return z, colour, mask & np.isfinite(z)
-
-        _, colour, mask = seen_at(float(row[0]))
+        room = np.where(depth == 0, around, behind)
+        _, colour, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[0])), truth.at(float(row[0])))
         soft = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 0.8)[..., None] * mask[..., None]
         image = (colour * soft + image * (1 - soft)).astype(np.uint8)
         image[mask] = cv2.GaussianBlur(image, (0, 0), 0.7)[mask]
         cv2.imwrite(str(out / row[1]), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
         cv2.imwrite(str(out / "masks" / (pathlib.Path(row[1]).stem + ".png")), mask.astype(np.uint8) * 255)
 
-        z, _, mask = seen_at(float(row[2]))
+        z, _, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[2])), truth.at(float(row[2])))
         noisy = np.where(mask, z, 0)
         noisy = noisy + random.normal(0, 1, z.shape) * (0.0012 + 0.0019 * (noisy - 0.4) ** 2)
         whole = cv2.erode(mask.astype(np.uint8), np.ones((3, 3))) > 0

@@ -215,7 +215,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .prior = frame.prior() ? &*frame.prior() : nullptr,
                                          .step = scene.step ? &*scene.step : nullptr,
                                          .start = start ? &*start : nullptr,
-                                         .movers = scene.segmented,
+                                         .movers = scenes_.compares_depth(),
                                          .may_start_map = !localize_only_});
   if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;

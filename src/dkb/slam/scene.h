@@ -28,7 +28,6 @@ struct Scene {
   std::vector<FeatureReason> rejected;
   std::vector<Detection> boxes;      // in this image
   std::optional<MotionPrior> step;   // since the frame before: by depth beside what was expected, else a prior's
-  bool segmented = false;            // depth was compared with earlier depth, for movers
   MoverMask mask;                    // where movers are (default filter only)
   std::vector<LateMask> late_masks;  // where they were in earlier keyframes, as detections have shown since
 };

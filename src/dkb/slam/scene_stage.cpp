@@ -194,7 +194,6 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   unite(given, carried.mask, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
   const MoverMask moving = take_motion(scene.boxes);
-  scene.segmented = motion_.has_value();
   if (motion_ && motion_->aligned_step()) scene.step = motion_->aligned_step();
 
   watch = Stopwatch();

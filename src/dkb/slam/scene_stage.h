@@ -88,6 +88,8 @@ class SceneStage {
   // Of the frame that was begun.
   Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const Expectation& expected);
 
+  // Depth is held against earlier depth in each frame, whatever detects movers.
+  bool compares_depth() const { return motion_.has_value(); }
   int keyframes_looked_at() const { return rival_ ? rival_->keyframes_looked_at() : 0; }
   // [frames] after which no late mask of a keyframe can come any more.
   int memory() const { return schedule_.latency + schedule_.every; }

@@ -15,12 +15,8 @@ namespace {
 
 using solver::CameraPose;
 
-// Errors have tails that a Gaussian has not: of lines of text, the match in the row beside fits within the limit, and
-// such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
-// freedom (Lange, Little and Taylor, JASA 1989), about a scale that each pose's own observations tell.
-
 constexpr double kMedianChi2 = 1.386;  // of two degrees of freedom
-// By such weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average, claim
+// By Student's weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average, claim
 // 1 / 1.084: E[w^2 x] / 2 / E[24 / (4 + x)^2]^2 with w = 6 / (4 + x) and x of two degrees of freedom.
 constexpr double kClaim = 1 / (1.0925 * 1.084);
 constexpr double kUsualScale = 20;  // observations of the sigmas as given that stand beside those at hand

@@ -14,7 +14,9 @@ namespace dkb {
 // Variance of errors in the plane, in units of the one that they were divided by, told by the median of their squares,
 // which the tails hardly move. 20 errors of variance 1 stand beside those at hand. Reorders `squares`, at least one.
 double variance_by_median(std::span<double> squares);
-// Degrees of freedom of Student's t, by which errors with tails are weighed.
+// Errors have tails that a Gaussian has not: of lines of text, the match in the row beside fits within the limit, and
+// such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
+// freedom (Lange, Little and Taylor, JASA 1989), in a pose about a scale that its own observations tell.
 inline constexpr double kStudentFreedom = 4;
 // Of the squares of errors in the plane by Student's t with four degrees of freedom, nine of ten are below so many
 // times that variance: twice the quantile of F(2, 4).

@@ -21,7 +21,7 @@ constexpr double kSmallest = 0.125;  // of the matches: fewer do not take a robu
 constexpr double kInfoOfBody = 1e2;  // [1/m^2, 1/rad^2] of a body's motion beside the camera's: 0.1 m, 0.1 rad
 // What a match costs that moves, beside its error. Nothing moves in fr1_xyz, and there a second motion saves 0.15 for
 // each of its matches as a median and 0.8 at most (lens, shutter and depth are not as modelled); where somebody walks
-// off, 2.7 to 5 (pauses).
+// off, 1 to 5.
 constexpr double kMoves = 1.1;
 
 double cost_of(double squared_error) {
@@ -119,15 +119,10 @@ std::vector<Labels> near_and_far(const std::vector<Match>& matches) {
   return ways;
 }
 
-struct Motion {
-  Vector6d d = Vector6d::Zero();  // perturbation of the pose, [m, rad]
-  Matrix6d information = Matrix6d::Identity();
-};
-
 // Each of two motions, what is of which, and what all of it costs.
 struct TwoMotions {
   Labels label;
-  std::array<Motion, 2> motion;
+  std::array<Vector6d, 2> motion{Vector6d::Zero(), Vector6d::Zero()};  // perturbations of the pose, [m, rad]
   double cost = 0;
 
   double count(uint8_t of) const { return static_cast<double>(std::count(label.begin(), label.end(), of)); }
@@ -149,19 +144,19 @@ class MotionProblem {
   }
 
   // That fits best, sought from `motion` on.
-  Motion fit(const Part& part, Motion motion, int steps) const {
+  Vector6d fit(const Part& part, Vector6d motion, int steps) const {
     for (int step = 0; step < steps; ++step) {
       Normal sum = any_motion();
       for (size_t i = 0; i < matches_.size(); ++i)
-        if (part.label[i] == part.of) sum.add(weight_of(matches_[i].squared_error(motion.d)), normal_[i]);
-      motion = {sum.solve(), sum.h};
+        if (part.label[i] == part.of) sum.add(weight_of(matches_[i].squared_error(motion)), normal_[i]);
+      motion = sum.solve();
     }
     return motion;
   }
-  double cost(const Part& part, const Motion& motion) const {
+  double cost(const Part& part, const Vector6d& motion) const {
     double sum = 0;
     for (size_t i = 0; i < matches_.size(); ++i)
-      if (part.label[i] == part.of) sum += cost_of(matches_[i].squared_error(motion.d));
+      if (part.label[i] == part.of) sum += cost_of(matches_[i].squared_error(motion));
     return sum;
   }
 
@@ -175,7 +170,7 @@ class MotionProblem {
         return std::nullopt;
       for (uint8_t m : {0, 1}) {
         both.motion[m] = fit({both.label, m}, both.motion[m], 2);
-        for (size_t i = 0; i < matches_.size(); ++i) cost[i][m] = cost_of(matches_[i].squared_error(both.motion[m].d));
+        for (size_t i = 0; i < matches_.size(); ++i) cost[i][m] = cost_of(matches_[i].squared_error(both.motion[m]));
       }
       Labels next(matches_.size());
       for (size_t i = 0; i < matches_.size(); ++i)
@@ -226,11 +221,10 @@ class MotionProblem {
   std::vector<std::array<uint32_t, kNeighbours>> neighbours_;
 };
 
-// The motion of the room, which has the most surface. A match stands for as much of it as an image shows there: with
-// the square of its depth. A body that takes the camera along is near.
+// The motion of the room. A body that takes the camera along is near.
 uint8_t of_most_surface(const TwoMotions& both, const std::vector<Match>& matches) {
   std::array<double, 2> surface{};
-  for (size_t i = 0; i < matches.size(); ++i) surface[both.label[i]] += matches[i].depth * matches[i].depth;
+  for (size_t i = 0; i < matches.size(); ++i) surface[both.label[i]] += surface_around(matches[i].depth);
   return surface[1] > surface[0];
 }
 
@@ -253,7 +247,7 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
   const uint8_t of_camera = of_most_surface(*both, matches);
   if (both->count(of_camera) < min_still) return std::nullopt;
   const Labels one(matches.size(), 0);
-  const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, {}, 4));
+  const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, Vector6d::Zero(), 4));
   if (both->cost + kMoves * both->count(1 - of_camera) >= cost_of_one) return std::nullopt;
   std::vector<uint8_t> moves(observations.size(), 0);
   for (size_t i = 0; i < matches.size(); ++i) moves[matches[i].observation] = both->label[i] != of_camera;

@@ -11,6 +11,13 @@
 
 namespace dkb {
 
+// How much of a surface a match stands for, in any unit: as much as the image shows around it, which grows with the
+// square of its depth. Of two motions or poses that part of the matches agree with each, the camera's is the one with
+// the most surface: the room has more of it than whoever hides it.
+inline double surface_around(double depth) {
+  return depth * depth;
+}
+
 // Whether two motions explain what one pose explains badly: somebody whose points the map holds as still walks off, and
 // a pose between his motion and the camera's keeps most matches within their limits. One match more or less that does
 // not fit says little then, but a body is many that fit each other.
@@ -18,7 +25,7 @@ namespace dkb {
 // Each match is of one of two motions (expectation maximisation), with Student's t of pose_optimiser for its errors and
 // a cost for each of its nearest neighbours that is of the other one (Potts). It starts from what is near against what
 // is far, since only what is near can turn and shift a camera that sees more of the room than of him. Two motions are
-// believed where they take enough off the cost of one. The camera's is that of the matches with the most surface. All
+// believed where they take enough off the cost of one. The camera's is the one with the most surface. All
 // is linear about the pose.
 //
 // Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the last frame to this one.
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "dkb/matching/pose_observation.h"
@@ -98,14 +97,13 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   const auto shown = [](const std::vector<PointId>& of) {
     return std::count_if(of.begin(), of.end(), [](PointId p) { return p != kNoPoint; });
   };
-  // Seen from a pose, each point stands for as much of a surface as an image shows there: with the square of its depth.
   const auto surface = [&](const std::vector<PointId>& of, const Rigid3& from) {
     double sum = 0;
     for (PointId id : of)
-      if (id != kNoPoint) sum += std::pow((from * *position(id)).z(), 2);
+      if (id != kNoPoint) sum += surface_around((from * *position(id)).z());
     return sum;
   };
-  // Where little of what was shown is found where it is expected, it may be elsewhere: the room has the most surface.
+  // Where little of what was shown is found where it is expected, it may be elsewhere.
   if (!pose || 4 * shown(points) < shown(last_->points)) {
     std::vector<PointId> elsewhere(frame.points.size(), kNoPoint);
     const std::optional<Rigid3> other = match_last_frame(frame, elsewhere);
