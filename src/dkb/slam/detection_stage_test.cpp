@@ -179,7 +179,7 @@ TEST(DetectionStage, EndsWithTheWorkInHandAndDropsTheRest) {
 }
 
 TEST(DetectionStage, OnlyWhatCountsAtOnceMustBeOfferedBeforeItIsTaken) {
-  ScriptedDetector detector;
+  ScriptedDetector detector, another;  // one each: a stage asks its own on its own thread
   const auto late = stage_of(detector, {.every = 1, .latency = 1});
   EXPECT_TRUE(late->answers_at_once()) << "the first answer counts at its own frame";
   late->offer(0, frame_at(0));
@@ -194,7 +194,7 @@ TEST(DetectionStage, OnlyWhatCountsAtOnceMustBeOfferedBeforeItIsTaken) {
     }
     late->offer(frame, frame_at(frame));
   }
-  const auto prompt = stage_of(detector, {.every = 1, .latency = 0});
+  const auto prompt = stage_of(another, {.every = 1, .latency = 0});
   prompt->offer(0, frame_at(0));
   EXPECT_TRUE(prompt->answers_at_once());
 }
