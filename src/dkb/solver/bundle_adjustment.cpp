@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "dkb/solver/ba_layout.h"
 #include "dkb/solver/nielsen_damping.h"
@@ -221,37 +223,86 @@ class BundleAdjuster {
     return saved;
   }
 
+  // f H^-1: H are the normal equations, and f is how much farther apart the pulls of the image's parts move the camera
+  // than their claim has it. What is off in one part is off together, in all keyframes that see it. Motions count as
+  // they claim, and the claim of all as one part more.
   std::optional<Matrix6d> covariance(int free) {
     if (free < 0) return std::nullopt;
     linearise();
     double unused = 0;
     if (!solve(kNoDamping, unused)) return std::nullopt;
-    Matrix6d inverse;
+    solver::PoseColumns columns(static_cast<Eigen::Index>(gradient_.size()), 6);  // of H^-1
     std::vector<double> column(gradient_.size());
     for (int k = 0; k < 6; ++k) {
       std::fill(column.begin(), column.end(), 0.0);
       column[static_cast<size_t>(6 * free + k)] = 1;
       cholesky_.solve(column);
-      inverse.col(k) = Eigen::Map<const Vector6d>(column.data() + 6 * free);
+      columns.col(k) = Eigen::Map<const Eigen::VectorXd>(column.data(), columns.rows());
     }
-    if (!inverse.allFinite()) return std::nullopt;
-    return variance_factor() * 0.5 * (inverse + inverse.transpose());
+    if (!columns.allFinite()) return std::nullopt;
+    const Matrix6d inverse = columns.middleRows<6>(6 * free);
+    const Matrix6d claimed = 0.5 * (inverse + inverse.transpose());
+
+    const std::vector<Vector6d> pulls = pulls_of_pairs();
+    std::map<std::pair<int, int>, Vector6d> parts;
+    for (int p = 0; p < layout_.points; ++p) {
+      Vector6d moves = Vector6d::Zero();
+      for (int pair = layout_.pair_first[p]; pair < layout_.pair_first[p + 1]; ++pair)
+        moves += columns.middleRows<6>(6 * layout_.pair_camera[pair]).transpose() * pulls[static_cast<size_t>(pair)];
+      parts.try_emplace(part_of(p, layout_.camera_of_free[free]), Vector6d::Zero()).first->second += moves;
+    }
+    Matrix6d scatter = layout_.motions->propagated(state_.poses, columns);
+    for (const auto& [part, moves] : parts) scatter += moves * moves.transpose();
+    const double n = static_cast<double>(parts.size()), factor = claimed.llt().solve(scatter).trace() / 6;
+    if (!std::isfinite(factor)) return std::nullopt;
+    return (n * factor + 1) / (n + 1) * claimed;
   }
 
-  // The sum of squared errors by that of its expectation: one for each number observed, less one for each that was
-  // fitted.
-  double variance_factor() {
-    double squares = 0;
-    for (int c = 0; c < layout_.cameras; ++c) squares += kernels_.ba_cost(input(c, state_));
-    int observed = 0;
-    std::vector<uint8_t> seen(static_cast<size_t>(layout_.points) + 1, 0);
-    for (size_t e = 0; e < layout_.observation_of_entry.size(); ++e) {
-      if (array(kUsedWeight)[e] == 0) continue;
-      observed += array(kUsedInvDepthSigma)[e] > 0 ? 3 : 2;
-      seen[static_cast<size_t>(layout_.point_of_entry[e])] = 1;
+  // By place in the image of a camera.
+  std::pair<int, int> part_of(int point, int camera) const {
+    const CameraModel& model = problem_.camera;
+    const double size = model.width / kPartsAcross;
+    const Eigen::Vector3d at =
+        state_.poses[camera] * Eigen::Map<const Eigen::Vector3d>(state_.points.data() + 4 * static_cast<size_t>(point));
+    const double z = std::max(std::abs(at.z()), options_.depth_in_front);
+    const auto cell = [&](double f, double x) {
+      return static_cast<int>(std::floor(std::clamp(f * x / z / size, -1e6, 1e6)));
+    };
+    return {cell(model.fx, at.x()), cell(model.fy, at.y())};
+  }
+
+  // Of each pair of a point and a free camera: the gradient by the camera, with the point eliminated.
+  std::vector<Vector6d> pulls_of_pairs() {
+    std::vector<Vector6d> pulls(static_cast<size_t>(layout_.pairs()) + 1, Vector6d::Zero());
+    const CameraModel& model = problem_.camera;
+    for (int c = 0; c < layout_.cameras; ++c) {
+      if (layout_.free_of_camera[c] < 0) continue;
+      for (int e = layout_.camera_first[c]; e < layout_.camera_first[c + 1]; ++e) {
+        const double weight = array(kUsedWeight)[e], depth_weight = array(kUsedInvDepthSigma)[e];
+        if (weight == 0) continue;
+        const double* point = state_.points.data() + 4 * static_cast<size_t>(layout_.point_of_entry[e]);
+        const Eigen::Vector3d at = state_.poses[c] * Eigen::Map<const Eigen::Vector3d>(point);
+        const Eigen::Vector2d off = model.project(at) - Eigen::Vector2d(array(kU)[e], array(kV)[e]);
+        const double information = weight * array(kInvSigma)[e] * array(kInvSigma)[e] / at.z();
+        const double by_x = information * model.fx * off.x(), by_y = information * model.fy * off.y();
+        const double by_z = depth_weight * depth_weight * (at.z() - array(kDepth)[e]);
+        const Eigen::Vector3d pull(by_x, by_y, by_z - (at.x() * by_x + at.y() * by_y) / at.z());
+        Vector6d& sum = pulls[static_cast<size_t>(layout_.pair_of_entry[e])];
+        sum.head<3>() -= pull;
+        sum.tail<3>() -= at.cross(pull);
+      }
     }
-    const int fitted = 6 * layout_.free_cameras() + 3 * static_cast<int>(std::count(seen.begin(), seen.end(), 1));
-    return observed > fitted + kEnoughFreedom ? squares / (observed - fitted) : 1;
+    for (int p = 0; p < layout_.points; ++p) {
+      const double* f = factors_.data() + static_cast<size_t>(kPointStride) * p;
+      if (f[0] == 0) continue;
+      // L^-T L^-1 g of the point
+      const double z = f[8] * f[5], y = (f[7] - f[4] * z) * f[3], x = (f[6] - f[1] * y - f[2] * z) * f[0];
+      for (int pair = layout_.pair_first[p]; pair < layout_.pair_first[p + 1]; ++pair) {
+        const double* w = pair_sums_.data() + static_cast<size_t>(kPairStride) * pair;
+        for (int k = 0; k < 6; ++k) pulls[static_cast<size_t>(pair)][k] -= w[k] * x + w[6 + k] * y + w[12 + k] * z;
+      }
+    }
+    return pulls;
   }
 
   double descend(double present, int iterations, int& total) {
@@ -290,7 +341,7 @@ class BundleAdjuster {
   }
 
   static constexpr double kMinDiagonal = 1e-6;
-  static constexpr int kEnoughFreedom = 100;  // a factor from so many is known to 14%
+  static constexpr double kPartsAcross = 16;  // parts of an image in a row (measured, docs/decisions.md)
   static constexpr double kNoDamping = 1e-9;  // leaves what nothing determines solvable
 
   BaProblem& problem_;

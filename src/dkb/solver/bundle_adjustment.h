@@ -54,8 +54,9 @@ struct BaResult {
   int iterations = 0;     // accepted and rejected steps of all rounds
   int outliers = 0;
   // Of the camera that was asked for, where the fixed cameras are known exactly: the inverse of the normal equations at
-  // the end, times the variance factor (what the errors are, by what was claimed; Triggs et al. 2000, section 9). Right
-  // perturbation of world_from_cam, [translation m, rotation rad]; null where the observations leave it open.
+  // the end, times how much farther apart the parts of its image pull than they claim (Liang and Zeger, "Longitudinal
+  // data analysis using generalized linear models", 1986). Right perturbation of world_from_cam, [translation m, rotation
+  // rad]; null where the observations leave it open.
   std::optional<Matrix6d> covariance;
 };
 

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
+#include <array>
+#include <map>
+#include <utility>
 
 #include "dkb/solver/ceres_test_oracle.h"
 #include "dkb/solver/test_world.h"
@@ -306,14 +308,15 @@ TEST(BundleAdjustment, RefusesIndicesThatDoNotFit) {
   EXPECT_THROW(bundle_adjust(problem, options), InvalidOption);
 }
 
-// Squared errors of the last camera by the covariance that was told of it, per degree of freedom: mean of 60 worlds.
-double normalised_error(double pixel_noise, double depth_share) {
+// Squared errors of the last camera by the covariance that was told of it, per degree of freedom: mean of 60 worlds. In
+// each part of each image depths have an error of this standard deviation [m] in common.
+double normalised_error(double pixel_noise, double depth_share, int points = 150, double common_depth_error = 0) {
   constexpr int kWorlds = 60;
   double sum = 0;
   for (uint64_t seed = 1; seed <= kWorlds; ++seed) {
     TestWorld world({.cameras = 6,
                      .fixed = 2,
-                     .points = 150,
+                     .points = points,
                      .pixel_noise = pixel_noise,
                      .depth_share = depth_share,
                      .pose_error = 0.005,
@@ -322,6 +325,15 @@ double normalised_error(double pixel_noise, double depth_share) {
     BaOptions options = to_convergence();
     options.chi2_pixel = options.chi2_depth = 1e6;
     world.problem.asked = 5;
+    Random random(seed);
+    std::map<std::array<int, 3>, double> common;
+    for (BaObservation& o : world.problem.observations) {
+      const Eigen::Vector3d at = world.cam_from_world[5] * world.points[static_cast<size_t>(o.point)];
+      const std::array<int, 3> part = {o.camera, static_cast<int>(std::floor(10 * at.x() / at.z())),
+                                       static_cast<int>(std::floor(10 * at.y() / at.z()))};
+      if (!common.contains(part)) common[part] = common_depth_error * random.normal();
+      if (o.depth > 0) o.depth += common[part];
+    }
     const BaResult result = bundle_adjust(world.problem, options);
     if (!result.covariance) return -1;
     const Vector6d error = tangent_from_rigid3(world.problem.cam_from_world[5] * world.cam_from_world[5].inverse());
@@ -339,7 +351,13 @@ TEST(BundleAdjustment, TheCovarianceKnowsWhenErrorsAreLargerThanClaimed) {
   EXPECT_NEAR(normalised_error(2, 0), 1, 0.25);
 }
 
-TEST(BundleAdjustment, TheCovarianceIsTheInverseOfTheNormalEquations) {
+TEST(BundleAdjustment, TheCovarianceKnowsOfErrorsThatPointsSideBySideHaveInCommon) {
+  // 6.5 if errors are taken to be independent. The parts that have an error in common are 50 px wide here and in other
+  // places than those that are told apart, so that a half of what is in common is seen.
+  EXPECT_LT(normalised_error(1, 1, 1500, 0.02), 3);
+}
+
+TEST(BundleAdjustment, TheCovarianceIsTheInverseOfTheNormalEquationsByWhatPartsOfTheImagePull) {
   TestWorld world({.cameras = 5, .fixed = 2, .points = 120, .pixel_noise = 1, .seed = 3});
   world.problem.asked = 3;
   const BaResult result = bundle_adjust(world.problem, to_convergence());
@@ -355,9 +373,7 @@ TEST(BundleAdjustment, TheCovarianceIsTheInverseOfTheNormalEquations) {
                            o.depth > 0 ? (c.z() - o.depth) * o.inv_depth_sigma : 0.0);
   };
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
-  double squares = 0;
-  int rows = 0;
-  std::set<int> seen;
+  std::map<std::pair<int, int>, Eigen::VectorXd> pulls;
   for (size_t i = 0; i < p.observations.size(); ++i) {
     const BaObservation& o = p.observations[i];
     const Rigid3& pose = p.cam_from_world[static_cast<size_t>(o.camera)];
@@ -365,9 +381,6 @@ TEST(BundleAdjustment, TheCovarianceIsTheInverseOfTheNormalEquations) {
     const Eigen::Vector3d here = residual(o, pose, point);
     const double corner = o.depth > 0 ? 7.815 : 5.991, square = here.squaredNorm();
     if (square > corner) continue;  // an outlier
-    squares += square;
-    seen.insert(o.point);
-    rows += o.depth > 0 ? 3 : 2;
     Eigen::Matrix<double, 3, 9> jacobian;
     constexpr double kStep = 1e-6;
     for (int k = 0; k < 9; ++k) {
@@ -379,15 +392,29 @@ TEST(BundleAdjustment, TheCovarianceIsTheInverseOfTheNormalEquations) {
     std::vector<int> at;
     for (int k = 0; k < 6; ++k) at.push_back(o.camera < 2 ? -1 : 6 * (o.camera - 2) + k);
     for (int k = 0; k < 3; ++k) at.push_back(18 + 3 * o.point + k);
+    const Eigen::Vector3d asked = p.cam_from_world[3] * point;
+    const double side = p.camera.width / 16.0;
+    const std::pair<int, int> part(static_cast<int>(std::floor(p.camera.fx * asked.x() / asked.z() / side)),
+                                   static_cast<int>(std::floor(p.camera.fy * asked.y() / asked.z() / side)));
+    Eigen::VectorXd& pull = pulls.try_emplace(part, Eigen::VectorXd::Zero(n)).first->second;
+    for (int a = 0; a < 9; ++a)
+      if (at[static_cast<size_t>(a)] >= 0) pull[at[static_cast<size_t>(a)]] += jacobian.col(a).dot(here);
     for (int a = 0; a < 9; ++a)
       for (int b = 0; b < 9; ++b)
         if (at[static_cast<size_t>(a)] >= 0 && at[static_cast<size_t>(b)] >= 0)
           normal(at[static_cast<size_t>(a)], at[static_cast<size_t>(b)]) += jacobian.col(a).dot(jacobian.col(b));
   }
   normal.diagonal().array() += 1e-9;
-  const Matrix6d expected = normal.ldlt().solve(Eigen::MatrixXd::Identity(n, n)).block<6, 6>(6, 6);
-  const Matrix6d by_scale = expected * (squares / (rows - 18 - 3 * static_cast<int>(seen.size())));
-  EXPECT_LT((*result.covariance - by_scale).norm(), 0.02 * by_scale.norm());
+  const Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Matrix6d claimed = inverse.block<6, 6>(6, 6);
+  double factor = 0;
+  for (const auto& [part, pull] : pulls) {
+    const Vector6d moves = inverse.middleRows<6>(6) * pull;
+    factor += moves.dot(claimed.llt().solve(moves)) / 6;
+  }
+  const auto parts = static_cast<double>(pulls.size());
+  const Matrix6d expected = (parts * factor + 1) / (parts + 1) * claimed;
+  EXPECT_LT((*result.covariance - expected).norm(), 0.02 * expected.norm());
 }
 
 TEST(BundleAdjustment, AFixedCameraHasNoCovarianceAndNobodyIsAskedByItself) {

@@ -68,6 +68,13 @@ double PoseEdges::cost(const std::vector<Rigid3>& poses) const {
   return total;
 }
 
+// The information of an edge as its kernel weighs it.
+Matrix6d PoseEdges::weighed(const PoseEdge& edge, const Vector6d& error) const {
+  const double s = error.dot(edge.information * error);
+  const bool beyond = edge.robust && s > huber_chi2_;
+  return (beyond ? std::sqrt(huber_chi2_ / s) : 1.0) * edge.information;
+}
+
 void PoseEdges::add(const std::vector<Rigid3>& poses, std::vector<double>& blocks,
                     std::vector<double>& gradient) const {
   const auto block = [&](int entry) {
@@ -81,9 +88,7 @@ void PoseEdges::add(const std::vector<Rigid3>& poses, std::vector<double>& block
     const Placed& at = placed_[k];
     if (at.outlier) continue;
     const auto r = relative_pose_residual(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
-    const double s = r.error.dot(e.information * r.error);
-    const bool beyond = e.robust && s > huber_chi2_;
-    const Matrix6d information = (beyond ? std::sqrt(huber_chi2_ / s) : 1.0) * e.information;
+    const Matrix6d information = weighed(e, r.error);
     const Matrix6d weighted_a = r.jacobian_a.transpose() * information;
     const Matrix6d weighted_b = r.jacobian_b.transpose() * information;
     if (at.free_a >= 0) {
@@ -102,6 +107,21 @@ void PoseEdges::add(const std::vector<Rigid3>& poses, std::vector<double>& block
       block(at.ab) += weighted_a * r.jacobian_b;
     }
   }
+}
+
+Matrix6d PoseEdges::propagated(const std::vector<Rigid3>& poses, const PoseColumns& columns) const {
+  Matrix6d sum = Matrix6d::Zero();
+  for (size_t k = 0; k < edges_.size(); ++k) {
+    const PoseEdge& e = edges_[k];
+    const Placed& at = placed_[k];
+    if (at.outlier) continue;
+    const auto r = relative_pose_residual(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
+    Matrix6d moves = Matrix6d::Zero();
+    if (at.free_a >= 0) moves += r.jacobian_a * columns.middleRows<6>(6 * at.free_a);
+    if (at.free_b >= 0) moves += r.jacobian_b * columns.middleRows<6>(6 * at.free_b);
+    sum += moves.transpose() * weighed(e, r.error) * moves;
+  }
+  return sum;
 }
 
 }  // namespace dkb::solver

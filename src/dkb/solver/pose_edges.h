@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct PoseEdge {
 
 namespace dkb::solver {
 
+// Six numbers that follow from those of the free poses, by these: 6 rows per free pose.
+using PoseColumns = Eigen::Matrix<double, Eigen::Dynamic, 6>;
+
 // What edges between poses add to a least-squares problem in the poses: cost, gradient, and 6x6 blocks of the normal
 // equations by right perturbations of world_from_cam. Deterministic.
 class PoseEdges {
@@ -41,6 +45,8 @@ class PoseEdges {
   double cost(const std::vector<Rigid3>& cam_from_world) const;
   // Adds to the blocks of the pattern and to the gradient (6 numbers per free pose).
   void add(const std::vector<Rigid3>& cam_from_world, std::vector<double>& blocks, std::vector<double>& gradient) const;
+  // columns^T E columns, E the blocks that add() adds.
+  Matrix6d propagated(const std::vector<Rigid3>& cam_from_world, const PoseColumns& columns) const;
 
  private:
   struct Placed {
@@ -48,6 +54,8 @@ class PoseEdges {
     int block_a = -1, block_b = -1, ab = -1;  // entries of the pattern
     bool outlier = false;
   };
+  Matrix6d weighed(const PoseEdge& edge, const Vector6d& error) const;
+
   const std::vector<PoseEdge>& edges_;
   double huber_chi2_;
   size_t free_ = 0;
