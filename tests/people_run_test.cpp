@@ -265,6 +265,11 @@ TEST(PeopleControl, BoxesBesideThePeopleAreNoticed) {
   // The pose may be right all the same: matches that show a second motion are left out.
   EXPECT_GT(run.features.leak, 0.15);
   EXPECT_GT(run.map_points_on_people, 20) << "right boxes may leave so many";
+  // What takes boxes at their word, and looks at nothing else, lets them in as if there were no filter.
+  const PeopleRun blind(temp / "blind", {"--detector", "file", "--boxes", temp / "boxes.txt"}, {"--filter", "box"});
+  EXPECT_GT(blind.online_ape, 0.02) << "[m]; twice what a filter may leave";
+  EXPECT_GT(blind.features.leak, 0.2);
+  EXPECT_GE(blind.map_points_on_people, 40) << "twice what a filter may leave";
 }
 
 TEST(PeopleControl, MasksOfEarlierFramesAreNoticed) {
