@@ -292,14 +292,14 @@ class BundleAdjuster {
         sum.tail<3>() -= at.cross(pull);
       }
     }
+    std::fill(camera_step_.begin(), camera_step_.end(), 0.0);
     for (int p = 0; p < layout_.points; ++p) {
-      const double* f = factors_.data() + static_cast<size_t>(kPointStride) * p;
-      if (f[0] == 0) continue;
-      // L^-T L^-1 g of the point
-      const double z = f[8] * f[5], y = (f[7] - f[4] * z) * f[3], x = (f[6] - f[1] * y - f[2] * z) * f[0];
+      solve_point(p, kNoDamping);
+      const double* step = point_step_.data() + 4 * static_cast<size_t>(p);
       for (int pair = layout_.pair_first[p]; pair < layout_.pair_first[p + 1]; ++pair) {
         const double* w = pair_sums_.data() + static_cast<size_t>(kPairStride) * pair;
-        for (int k = 0; k < 6; ++k) pulls[static_cast<size_t>(pair)][k] -= w[k] * x + w[6 + k] * y + w[12 + k] * z;
+        for (int k = 0; k < 6; ++k)
+          pulls[static_cast<size_t>(pair)][k] += w[k] * step[0] + w[6 + k] * step[1] + w[12 + k] * step[2];
       }
     }
     return pulls;
