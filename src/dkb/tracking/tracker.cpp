@@ -390,11 +390,21 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   for (size_t f = 0; f < frame.features->size(); ++f)
     with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
   if (with_depth < options_.initial_points) return false;
-  if (state_ != TrackingState::initialising) {
+  // Nothing followed from the map's first frame: the map begins again, without what that frame made.
+  const auto step =
+      expected == nullptr && last_ && last_->starts_map ? expected_step(frame.timestamp, nullptr) : std::nullopt;
+  if (state_ != TrackingState::initialising && !step) {
     if (!lost_since_) lost_since_ = frame.timestamp;
     // Where the way here is known and the map's points are not found, there are none.
     const double wait = expected != nullptr ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
     if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
+  }
+  if (step) {
+    frame.predicted = pose_after(*step);
+    expected = &*frame.predicted;
+    std::vector<PointId> made = last_->points;
+    std::erase(made, kNoPoint);
+    retract(made);
   }
   frame.inliers = with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : start_;

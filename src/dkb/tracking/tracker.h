@@ -109,6 +109,7 @@ class Tracker {
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
+  PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
   void forget_velocity();

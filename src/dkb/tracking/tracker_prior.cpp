@@ -41,17 +41,22 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   return step;
 }
 
+PosePrediction Tracker::pose_after(const MotionPrior& step) const {
+  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, step);
+  return {whole.previous_from_current.inverse(), whole.covariance};
+}
+
 std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
   if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
     return std::nullopt;
   const bool told = input.prior != nullptr && !input.prior->rotation_only;
-  const MotionPrior whole = joined({last_->cam_from_world.inverse(), false, last_->covariance}, *input.step);
-  const Vector6d variance = whole.covariance.diagonal();
+  PosePrediction pose = pose_after(*input.step);
+  const Vector6d variance = pose.covariance.diagonal();
   const bool known = variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
-  const Rigid3 cam_from_world = whole.previous_from_current.inverse();
-  if (!(told || known) || !plausible_motion(cam_from_world, input.timestamp)) return std::nullopt;
-  return PosePrediction{cam_from_world, whole.covariance, input.prior == nullptr};
+  if (!(told || known) || !plausible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
+  pose.weighs = input.prior == nullptr;
+  return pose;
 }
 
 bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {

@@ -92,6 +92,7 @@ TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
 
 TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
   publish(start());
+  track(on_path(0));
   const TestScene other(700, 99);
   for (int f = 0; f < 3; ++f) {
     ++index;
@@ -102,6 +103,7 @@ TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
 
 TEST_F(TrackerTest, LostBeforeTheFirstMapArrivesItWaitsForIt) {
   const KeyframePacket packet = start();
+  track({});
   black = true;
   EXPECT_EQ(track({}).state, TrackingState::lost);
   black = false;
@@ -238,6 +240,24 @@ TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   EXPECT_EQ(o.state, TrackingState::relocalised) << "the old map is not forgotten";
   EXPECT_EQ(tracker.map().root(o.reference), 0);
   EXPECT_LT(distance_between(o.cam_from_world, on_path(2)), 1e-4);
+}
+
+TEST_F(TrackerTest, AMapFromWhoseFirstFrameNothingFollowsBeginsAgain) {
+  publish(start(on_path(0)));
+  scene = TestScene(700, 99);
+  const TrackedFrame o = track(on_path(0));
+  ASSERT_EQ(o.state, TrackingState::tracking) << "nobody waits for a map of one frame";
+  EXPECT_TRUE(o.starts_map);
+  EXPECT_EQ(o.reference, 0) << "the same map";
+  EXPECT_NEAR(std::sqrt(o.covariance(0, 0)), kSpeedSd * kFrameTime, 0.1 * kSpeedSd * kFrameTime)
+      << "the camera may have moved meanwhile";
+  const KeyframePacket packet = insert(o);
+  EXPECT_EQ(packet.retracted.size(), map.point_count()) << "what the first frame made is gone";
+  publish(packet);
+  EXPECT_EQ(map.roots(), std::vector<KeyframeId>{0});
+  EXPECT_EQ(track(on_path(1)).state, TrackingState::tracking);
+  scene = TestScene(700, 5);
+  EXPECT_EQ(track(on_path(2)).state, TrackingState::lost) << "of a map that was followed more is expected";
 }
 
 TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
