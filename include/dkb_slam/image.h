@@ -5,6 +5,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dkb_slam/version.h"
@@ -39,6 +43,27 @@ struct ImageView {
   }
 };
 
+namespace detail {
+
+// Leaves what is made without a value as it is: an image that is about to be written need not be filled before.
+template <class T>
+struct NoFill : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = NoFill<U>;
+  };
+  template <class U>
+  void construct(U*) noexcept {
+    static_assert(std::is_trivially_copyable_v<U>);
+  }
+  template <class U, class V>
+  void construct(U* at, V&& value) {
+    ::new (static_cast<void*>(at)) U(std::forward<V>(value));
+  }
+};
+
+}  // namespace detail
+
 /// Owning, densely packed, row-major image. Pixel (x, y): x right, y down, (0, 0) is the centre of the top-left pixel.
 template <class T>
 class Image {
@@ -46,6 +71,13 @@ class Image {
   Image() = default;
   Image(int width, int height, T fill = T{})
       : width_(width), height_(height), data_(static_cast<size_t>(width) * static_cast<size_t>(height), fill) {}
+  /// Each pixel must be written before it is read.
+  static Image unfilled(int width, int height) {
+    Image image;
+    image.width_ = width, image.height_ = height;
+    image.data_.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+    return image;
+  }
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -63,7 +95,7 @@ class Image {
 
  private:
   int width_ = 0, height_ = 0;
-  std::vector<T> data_;
+  std::vector<T, detail::NoFill<T>> data_;
 };
 
 /// A colour, 8 bits a channel.

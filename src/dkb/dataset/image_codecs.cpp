@@ -55,7 +55,7 @@ DepthImage metres(Image<float> depth, const Camera& camera) {
 }
 
 DepthImage metres(const Image<uint16_t>& units, const Camera& camera) {
-  DepthImage depth(units.width(), units.height());
+  auto depth = DepthImage::unfilled(units.width(), units.height());
   depth_from_units(units.data(), units.size(), camera, depth.data());
   return depth;
 }

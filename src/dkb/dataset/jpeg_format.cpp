@@ -185,10 +185,10 @@ void decode_jpeg(std::string_view bytes, const std::string& name, Picture* pictu
   require_side_lengths(reader.width(), reader.height(), name);
   const int width = static_cast<int>(reader.width()), height = static_cast<int>(reader.height());
   if (reader.grey()) {
-    picture->grey = GreyImage(width, height);
+    picture->grey = GreyImage::unfilled(width, height);
     if (!reader.read_pixels(picture->grey.data(), static_cast<size_t>(width))) fail(name, reader);
   } else {
-    picture->colour = ColourImage(width, height);
+    picture->colour = ColourImage::unfilled(width, height);
     if (!reader.read_pixels(reinterpret_cast<uint8_t*>(picture->colour.data()), 3 * static_cast<size_t>(width)))
       fail(name, reader);
     picture->grey = grey_from_colour(picture->colour);

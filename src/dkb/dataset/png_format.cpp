@@ -152,7 +152,7 @@ std::string encode(Samples samples, const Image<Pixel>& image, int compression) 
 
 template <class Pixel>
 Image<Pixel> decode(Samples samples, std::string_view bytes, const std::string& name, const ImageHeader& header) {
-  Image<Pixel> image(header.width, header.height);
+  auto image = Image<Pixel>::unfilled(header.width, header.height);
   auto* out = reinterpret_cast<uint8_t*>(image.data());
   if (formats::decode_plain_png(bytes, header.width, header.height, sizeof(Pixel), out)) return image;
   PngReader reader(bytes);

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <iterator>
-#include <map>
 #include <vector>
 
 #include "dkb/map/ids.h"
@@ -20,18 +18,22 @@ class PointEvidence {
     // After a gap a frame is no more than one look: four are needed at any rate.
     const double seconds = std::clamp(timestamp - timestamp_, 0.0, kMaxLook);
     timestamp_ = timestamp;
-    auto found = still.begin();
-    for (auto suspect = suspicion_.begin(); suspect != suspicion_.end();) {
-      found = std::lower_bound(found, still.end(), suspect->first);
-      const bool stands = found != still.end() && *found == suspect->first;
-      suspect = stands && (suspect->second -= 2 * seconds) <= 0 ? suspicion_.erase(suspect) : std::next(suspect);
+    auto at = suspects_.begin();
+    for (PointId point : still) {
+      at = std::lower_bound(at, suspects_.end(), point, before);
+      if (at == suspects_.end()) break;
+      if (at->point == point) at->seconds -= 2 * seconds;
+    }
+    std::erase_if(suspects_, [](const Suspect& s) { return s.seconds <= 0; });
+    for (PointId point : on_mover) {
+      at = std::lower_bound(suspects_.begin(), suspects_.end(), point, before);
+      if (at == suspects_.end() || at->point != point) at = suspects_.insert(at, {point, 0});
+      at->seconds += seconds;
     }
     std::vector<PointId> convicted;
-    for (PointId point : on_mover)
-      if ((suspicion_[point] += seconds) >= kConvicting) convicted.push_back(point);
-    std::sort(convicted.begin(), convicted.end());
-    convicted.erase(std::unique(convicted.begin(), convicted.end()), convicted.end());
-    for (PointId point : convicted) suspicion_.erase(point);
+    for (const Suspect& s : suspects_)
+      if (s.seconds >= kConvicting) convicted.push_back(s.point);
+    std::erase_if(suspects_, [](const Suspect& s) { return s.seconds >= kConvicting; });
     return convicted;
   }
 
@@ -40,8 +42,14 @@ class PointEvidence {
   static constexpr double kConvicting = 0.32;
   static constexpr double kMaxLook = 0.1;  // [s]
 
-  double timestamp_ = 0;                 // of the frame weighed last
-  std::map<PointId, double> suspicion_;  // [s]
+  struct Suspect {
+    PointId point = kNoPoint;
+    double seconds = 0;  // against it
+  };
+  static bool before(const Suspect& s, PointId point) { return s.point < point; }
+
+  double timestamp_ = 0;           // of the frame weighed last
+  std::vector<Suspect> suspects_;  // by increasing point
 };
 
 }  // namespace dkb

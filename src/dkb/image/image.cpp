@@ -51,7 +51,7 @@ struct WithinRange {
 }  // namespace
 
 GreyImage grey_from_colour(const ColourImage& colour) {
-  GreyImage grey(colour.width(), colour.height());
+  auto grey = GreyImage::unfilled(colour.width(), colour.height());
   const Rgb* in = colour.data();
   uint8_t* out = grey.data();
   const size_t n = colour.size();

@@ -11,7 +11,7 @@ namespace dkb {
 ColourImage copy_colour(const ImageView& view) {
   const bool blue_first = view.format == PixelFormat::bgr8 || view.format == PixelFormat::bgra8;
   const int step = bytes_per_pixel(view.format);
-  ColourImage image(view.width, view.height);
+  auto image = ColourImage::unfilled(view.width, view.height);
   for (int y = 0; y < view.height; ++y) {
     const uint8_t* in = view.row(y);
     Rgb* out = image.row(y);
@@ -22,13 +22,13 @@ ColourImage copy_colour(const ImageView& view) {
 }
 
 GreyImage copy_grey(const ImageView& view) {
-  GreyImage image(view.width, view.height);
+  auto image = GreyImage::unfilled(view.width, view.height);
   for (int y = 0; y < view.height; ++y) std::memcpy(image.row(y), view.row(y), view.row_bytes());
   return image;
 }
 
 DepthImage copy_depth(const ImageView& view, const Camera& camera) {
-  DepthImage image(view.width, view.height);
+  auto image = DepthImage::unfilled(view.width, view.height);
   std::vector<uint16_t> units(view.format == PixelFormat::depth_u16 ? static_cast<size_t>(view.width) : 0);
   const auto width = static_cast<size_t>(view.width);
   for (int y = 0; y < view.height; ++y) {  // rows need not be aligned

@@ -124,7 +124,7 @@ DepthImage raw_depth(const RecordedImage& image, const Camera& range) {
 DepthImage dequantised(const RecordedImage& image, const Camera& range) {
   const Image<uint16_t> values =
       formats::decode_png16(image.stored, image.name, read_image_header(image.stored, image.name));
-  DepthImage depth(values.width(), values.height());
+  auto depth = DepthImage::unfilled(values.width(), values.height());
   for (size_t i = 0; i < values.size(); ++i) {
     const uint16_t value = values.data()[i];
     depth.data()[i] = value == 0 ? 0 : image.quantised[0] / (static_cast<float>(value) - image.quantised[1]);

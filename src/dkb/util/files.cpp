@@ -2,27 +2,41 @@
 #include "dkb/util/files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <memory>
 
 #include "dkb/util/errors.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kFirstPiece = 1 << 16;  // [bytes]
+
+}  // namespace
 
 std::string read_file(const fs::path& path) {
   std::error_code ec;
   if (fs::is_directory(path, ec)) throw InputError(path.string() + ": is a folder, a file was expected");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path.string() + ": cannot be read (" + std::strerror(errno) + ")");
-  std::ostringstream content;
-  content << in.rdbuf();
-  if (in.bad()) throw InputError(path.string() + ": reading fails half-way");
-  return std::move(content).str();
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"), std::fclose);
+  if (!file) throw InputError(path.string() + ": cannot be read (" + std::strerror(errno) + ")");
+  struct stat about {};
+  const bool sized = ::fstat(::fileno(file.get()), &about) == 0 && about.st_size > 0;
+  // With room for the read that finds the end. What is no plain file does not tell its size.
+  std::string content(sized ? static_cast<size_t>(about.st_size) + 1 : kFirstPiece, '\0');
+  size_t size = 0;
+  while (const size_t n = std::fread(content.data() + size, 1, content.size() - size, file.get())) {
+    size += n;
+    if (size == content.size()) content.resize(2 * size);
+  }
+  if (std::ferror(file.get()) != 0) throw InputError(path.string() + ": reading fails half-way");
+  content.resize(size);
+  return content;
 }
 
 void write_file_atomically(const fs::path& path, std::string_view content) {

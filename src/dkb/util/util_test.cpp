@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 #include <vector>
 
@@ -115,6 +117,22 @@ TEST(Files, AtomicWriteReplacesTheWholeFile) {
   for ([[maybe_unused]] const auto& e : fs::directory_iterator(folder)) ++entries;
   EXPECT_EQ(entries, 1u) << "no temporary file is left behind";
   fs::remove_all(folder);
+}
+
+TEST(Files, AreReadWholeWhetherTheyTellTheirSizeOrNot) {
+  const fs::path path = fs::path(::testing::TempDir()) / (std::to_string(::getpid()) + "dkb_read_file_test");
+  std::string content;
+  for (const size_t size : {0, 1, 65535, 65536, 65537, 300000}) {
+    while (content.size() < size) content += static_cast<char>(content.size() * 7 / 3);
+    write_file_atomically(path, content);
+    EXPECT_EQ(read_file(path), content);
+    fs::remove(path);
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+    std::thread writer([&] { std::ofstream(path, std::ios::binary) << content; });
+    EXPECT_EQ(read_file(path), content) << "from a pipe";
+    writer.join();
+    fs::remove(path);
+  }
 }
 
 TEST(Files, AnUnwritablePlaceIsNamed) {
