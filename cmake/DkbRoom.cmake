@@ -54,13 +54,25 @@ function(dkb_unit_test program label)
   set(${label} ${found} PARENT_SCOPE)
 endfunction()
 
-# dkb_room(NAME [NOT_INSTALLED] SOURCES a.cpp ... TESTS a_test.cpp ... DEPENDS lower rooms and libraries PRIVATE_DEPENDS ... TEST_DEPENDS ...)
+# One program of a room's tests; LOOK_AT: files beside theirs that may have to do with threads.
+function(dkb_room_tests name suffix)
+  cmake_parse_arguments(PROGRAM "" "" "FILES;LOOK_AT;DEPENDS" ${ARGN})
+  set(program dkb_${name}${suffix})
+  add_executable(${program} ${PROGRAM_FILES})
+  dkb_unit_test(${program} label ${PROGRAM_FILES} ${PROGRAM_LOOK_AT})
+  target_link_libraries(${program} PRIVATE dkb_${name} dkb_warnings ${PROGRAM_DEPENDS} GTest::gtest GTest::gtest_main)
+  gtest_discover_tests(${program} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS ${label})
+endfunction()
+
+# dkb_room(NAME [NOT_INSTALLED] SOURCES a.cpp ... TESTS a_test.cpp ... THREAD_TESTS ... DEPENDS lower rooms and libraries
+#          PRIVATE_DEPENDS ... TEST_DEPENDS ...)
 #
 # One folder, one static library dkb_NAME, one test program dkb_NAME_test. A room names only rooms below it. The
 # executable and the tests link rooms; users link their objects as one library (Library.cmake), of which a room that is
-# NOT_INSTALLED is no part.
+# NOT_INSTALLED is no part. Where only the THREAD_TESTS have to do with the room's threads, they are a program of their
+# own, and ThreadSanitizer, which makes a test twenty times slower, leaves out the others.
 function(dkb_room name)
-  cmake_parse_arguments(ROOM "NOT_INSTALLED" "" "SOURCES;TESTS;DEPENDS;PRIVATE_DEPENDS;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(ROOM "NOT_INSTALLED" "" "SOURCES;TESTS;THREAD_TESTS;DEPENDS;PRIVATE_DEPENDS;TEST_DEPENDS" ${ARGN})
   if(ROOM_SOURCES)
     add_library(dkb_${name} STATIC ${ROOM_SOURCES})
     set(scope PUBLIC)
@@ -75,10 +87,10 @@ function(dkb_room name)
   if(NOT ROOM_NOT_INSTALLED)
     set_property(GLOBAL APPEND PROPERTY DKB_ROOMS dkb_${name})
   endif()
-  if(BUILD_TESTING AND ROOM_TESTS)
-    add_executable(dkb_${name}_test ${ROOM_TESTS})
-    dkb_unit_test(dkb_${name}_test label ${ROOM_SOURCES} ${ROOM_TESTS})
-    target_link_libraries(dkb_${name}_test PRIVATE dkb_${name} dkb_warnings ${ROOM_TEST_DEPENDS} GTest::gtest GTest::gtest_main)
-    gtest_discover_tests(dkb_${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS ${label})
+  if(BUILD_TESTING AND ROOM_THREAD_TESTS)
+    dkb_room_tests(${name} _threads_test FILES ${ROOM_THREAD_TESTS} LOOK_AT ${ROOM_SOURCES} DEPENDS ${ROOM_TEST_DEPENDS})
+    dkb_room_tests(${name} _test FILES ${ROOM_TESTS} DEPENDS ${ROOM_TEST_DEPENDS})
+  elseif(BUILD_TESTING AND ROOM_TESTS)
+    dkb_room_tests(${name} _test FILES ${ROOM_TESTS} LOOK_AT ${ROOM_SOURCES} DEPENDS ${ROOM_TEST_DEPENDS})
   endif()
 endfunction()

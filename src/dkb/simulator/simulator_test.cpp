@@ -10,12 +10,6 @@
 #include <fstream>
 #include <map>
 
-#include "dkb/dataset/camera_file.h"
-#include "dkb/dataset/trajectory_file.h"
-#include "dkb/dataset/tum_dataset.h"
-#include "dkb/simulator/sequence_writer.h"
-#include "dkb/util/errors.h"
-#include "dkb/util/files.h"
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
@@ -294,39 +288,6 @@ TEST(Simulator, BoxesMasksAndPositionsAgree) {
     EXPECT_GT(m.position_in_world.z(), 0);
     EXPECT_LT(m.position_in_world.z(), 2);
   }
-}
-
-TEST_F(SimulatorFiles, OneAndTwoThreadsWriteTheSameBytes) {
-  const Simulator s(small("crowd", 4));
-  SequenceWriterOptions one, two;
-  one.threads = 1;
-  write_sequence(s, folder_ / "1", {}, one);
-  write_sequence(Simulator(small("crowd", 4)), folder_ / "2", {}, two);
-  int files = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "1")) {
-    if (!entry.is_regular_file()) continue;
-    ++files;
-    EXPECT_EQ(read_file(entry.path()), read_file(folder_ / "2" / fs::relative(entry.path(), folder_ / "1")))
-        << entry.path();
-  }
-  EXPECT_EQ(files, 3 * 4 + 7);
-}
-
-TEST_F(SimulatorFiles, SequenceReadsBackAsATumDataset) {
-  const Simulator s(small("rush", 5));
-  int reported = 0;
-  write_sequence(s, folder_, [&](int n) { reported = n; });
-  EXPECT_EQ(reported, 5);
-  const TumDataset data = open_tum_dataset(folder_);
-  EXPECT_EQ(data.pairs.size(), 5U);
-  EXPECT_EQ(read_trajectory(folder_ / "groundtruth.txt").size(), 5U);
-  EXPECT_EQ(choose_camera("", folder_).camera.fx, s.camera().fx);
-  for (const DatasetPair& p : data.pairs) EXPECT_TRUE(fs::exists(folder_ / "masks" / (p.stamp + ".png")));
-}
-
-TEST_F(SimulatorFiles, FolderThatCannotBeMadeIsAnOutputError) {
-  file("taken", "");
-  EXPECT_THROW(write_sequence(Simulator(small("rush", 1)), folder_ / "taken"), OutputError);
 }
 
 TEST_F(SimulatorFiles, CameraFollowsAGivenPath) {
