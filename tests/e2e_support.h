@@ -9,21 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "dkb/util/test_folder.h"
+
 namespace dkb::test {
-
-// A folder of its own, removed at the end.
-class TempFolder {
- public:
-  TempFolder();
-  ~TempFolder();
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 struct Finished {
   int exit_code = -1;  // 1000 + signal when a signal ended it

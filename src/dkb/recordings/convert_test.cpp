@@ -81,7 +81,7 @@ class ConvertTest : public testing::Test {
     expect_same(out);
   }
 
-  Scratch scratch;
+  TempFolder scratch;
   ConvertOptions options;
   std::vector<std::string> warnings;
   std::string camera_text;

@@ -51,7 +51,7 @@ long peak_memory_mb() {
 }
 
 TEST(MessageStream, WhatIsWrittenIsReadBackInOrder) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::vector<Kept> messages = sample(5);
   for (const Kind& kind : kinds()) {
     SCOPED_TRACE(label(kind));
@@ -73,7 +73,7 @@ TEST(MessageStream, WhatIsWrittenIsReadBackInOrder) {
 }
 
 TEST(MessageStream, OtherTopicsThanTheSelectedArePassedOver) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::vector<Kept> messages = sample(5);
   for (const Kind& kind : kinds()) {
     SCOPED_TRACE(label(kind));
@@ -89,7 +89,7 @@ TEST(MessageStream, OtherTopicsThanTheSelectedArePassedOver) {
 
 // One warning, and what was read is the beginning of what was written, as far as the bytes reach.
 TEST(MessageStream, RecordingsThatAreCutOffAreReadUpToTheCut) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::vector<Kept> messages = sample(6, 40'000);
   for (const Kind& kind : kinds()) {
     SCOPED_TRACE(label(kind));
@@ -117,7 +117,7 @@ TEST(MessageStream, RecordingsThatAreCutOffAreReadUpToTheCut) {
 }
 
 TEST(MessageStream, ABrokenChunkIsLeftOutAndTold) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::vector<Kept> messages = sample(5);
   for (const Kind& kind : kinds()) {
     if (kind.compression == Compression::none && kind.name == "a.bag"s) continue;  // no checksum tells
@@ -152,7 +152,7 @@ std::string bag_field(const std::string& name, const std::string& value) {
 }
 
 TEST(MessageStream, WhatAFileClaimsSetsNoMemoryAside) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::string begin =
       "#ROSBAG V2.0\n" + bag_record(bag_field("op", "\x03") + bag_field("index_pos", "\0\0\0\0\0\0\0\0"s), 0, "");
   const std::string most = "\xFF\xFF\xFF\xFF";
@@ -212,7 +212,7 @@ std::string plain_mcap(const std::string& encoding) {
 }
 
 TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
-  const Scratch scratch;
+  const TempFolder scratch;
   write_bytes(scratch / "plain", plain_mcap("cdr"));
   const auto stream = open_messages(scratch / "plain");
   ASSERT_EQ(stream->topics().size(), 1U);
@@ -227,7 +227,7 @@ TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
 
 // Each entry of the index costs as much as the record it names.
 TEST(MessageStream, AnMcapIndexThatNamesOneTextManyTimesIsReadInTime) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const auto text = [](const std::string& value) {
     ByteWriter out;
     out.u32(static_cast<uint32_t>(value.size())), out.raw(value);
@@ -251,7 +251,7 @@ TEST(MessageStream, AnMcapIndexThatNamesOneTextManyTimesIsReadInTime) {
 }
 
 TEST(MessageStream, EncodingsOfOthersAreToldWhenThereIsNothingElse) {
-  const Scratch scratch;
+  const TempFolder scratch;
   write_bytes(scratch / "plain", plain_mcap("protobuf"));
   const auto stream = open_messages(scratch / "plain");
   EXPECT_FALSE(stream->next());
@@ -261,7 +261,7 @@ TEST(MessageStream, EncodingsOfOthersAreToldWhenThereIsNothingElse) {
 }
 
 TEST(MessageStream, WhatIsNoRecordingIsNamed) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const auto error = [&](const std::string& bytes) {
     write_bytes(scratch / "x.bag", bytes);
     return input_error_of([&] { open_messages(scratch / "x.bag"); });
@@ -276,7 +276,7 @@ TEST(MessageStream, WhatIsNoRecordingIsNamed) {
 }
 
 TEST(MessageStream, UnknownCompressionIsNamed) {
-  const Scratch scratch;
+  const TempFolder scratch;
   write_bytes(scratch / "x.bag", "#ROSBAG V2.0\n" + bag_record(bag_field("op", "\x03"), 0, "") +
                                      bag_record(bag_field("op", "\x05") + bag_field("compression", "rar"), 3, "abc"));
   const auto stream = open_messages(scratch / "x.bag");
@@ -284,7 +284,7 @@ TEST(MessageStream, UnknownCompressionIsNamed) {
 }
 
 TEST(MessageStream, FolderNamesItsFilesInOrder) {
-  const Scratch scratch;
+  const TempFolder scratch;
   std::filesystem::create_directories(scratch / "trip");
   const std::vector<Kept> messages = sample(4, 1000);
   write_sample(scratch / "trip/b.mcap", {messages.begin(), messages.begin() + 3});
@@ -315,7 +315,7 @@ TEST(MessageStream, FolderNamesItsFilesInOrder) {
 }
 
 TEST(MessageStream, DamagedRecordingsDoNothingWorseThanEnd) {
-  const Scratch scratch;
+  const TempFolder scratch;
   const std::vector<Kept> messages = sample(12, 300);
   const long before = peak_memory_mb();
   Random random(11);

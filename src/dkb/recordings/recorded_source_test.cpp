@@ -59,7 +59,7 @@ class RecordedSourceTest : public testing::Test {
     return input_error_of([&] { open(list); });
   }
 
-  Scratch scratch;
+  TempFolder scratch;
   SourceOptions options;
 };
 

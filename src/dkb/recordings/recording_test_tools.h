@@ -12,27 +12,9 @@
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
 #include "dkb/util/files.h"
+#include "dkb/util/test_folder.h"
 
 namespace dkb::test {
-
-// A folder that is gone with the test.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = (std::filesystem::temp_directory_path() / "dkb-recordings-XXXXXX").string();
-    if (mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  ~Scratch() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
   std::filesystem::remove(path);  // writing over a file makes some file systems wait for the disk

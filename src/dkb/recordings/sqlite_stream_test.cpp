@@ -42,7 +42,7 @@ std::string row(int id, int topic, int64_t ns, const char* hex) {
 }
 
 TEST(SqliteMessages, AreReadInTheOrderOfTheirTime) {
-  const Scratch scratch;
+  const TempFolder scratch;
   run_sql(scratch / "a.db3", kTables + row(1, 1, 30, "6969") + row(2, 2, 10, "6868") + row(3, 1, 20, "6A6A"));
   const auto stream = open_messages(scratch / "a.db3");
   ASSERT_EQ(stream->topics().size(), 2U);
@@ -58,7 +58,7 @@ TEST(SqliteMessages, AreReadInTheOrderOfTheirTime) {
 }
 
 TEST(SqliteMessages, TopicsThatCannotBeConvertedAreTold) {
-  const Scratch scratch;
+  const TempFolder scratch;
   run_sql(scratch / "a.db3", kTables + row(1, 1, 30, "6969") + row(2, 3, 10, "6868") +
                                  "INSERT INTO topics VALUES(3, '/path', 'nav_msgs/msg/Path', 'cdr', '');");
   std::vector<std::string> warnings;
@@ -73,7 +73,7 @@ TEST(SqliteMessages, TopicsThatCannotBeConvertedAreTold) {
 }
 
 TEST(SqliteMessages, NothingIsWrittenBesideTheFile) {
-  const Scratch scratch;
+  const TempFolder scratch;
   std::filesystem::create_directory(scratch / "x?%#");
   const auto path = scratch / "x?%#/a.db3";
   run_sql(path, "PRAGMA journal_mode = WAL;"s + kTables + row(1, 1, 30, "6969"));
@@ -82,7 +82,7 @@ TEST(SqliteMessages, NothingIsWrittenBesideTheFile) {
 }
 
 TEST(SqliteMessages, OtherDatabasesAreRefused) {
-  const Scratch scratch;
+  const TempFolder scratch;
   run_sql(scratch / "a.db3", "CREATE TABLE cars(id INTEGER);");
   EXPECT_NE(input_error_of([&] { open_messages(scratch / "a.db3"); }).find("no tables `topics` and `messages`"),
             std::string::npos);
@@ -93,7 +93,7 @@ TEST(SqliteMessages, OtherDatabasesAreRefused) {
 }
 
 TEST(SqliteMessages, DamagedFilesDoNothingWorseThanEnd) {
-  const Scratch scratch;
+  const TempFolder scratch;
   std::string rows = "PRAGMA page_size = 1024;"s + kTables;
   for (int i = 1; i <= 40; ++i) rows += row(i, i % 3, i * 7 % 40, "6969");
   run_sql(scratch / "a.db3", rows);

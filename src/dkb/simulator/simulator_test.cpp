@@ -6,16 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <map>
 
 #include "dkb/util/test_errors.h"
+#include "dkb/util/test_folder.h"
 
 namespace dkb {
 namespace {
-
-namespace fs = std::filesystem;
 
 SimulatorOptions small(const std::string& scene, int frames = 0) {
   return test::small_images(scene, frames, 320, 240);
@@ -31,18 +29,11 @@ std::string error_of(const SimulatorOptions& o) {
 
 class SimulatorFiles : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("dkb_simulator_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   std::string file(const std::string& name, const std::string& text) {
     std::ofstream(folder_ / name) << text;
     return (folder_ / name).string();
   }
-  fs::path folder_;
+  test::TempFolder folder_;
 };
 
 TEST(Simulator, DepthOfOneFrameProjectsOntoDepthOfAnother) {

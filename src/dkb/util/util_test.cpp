@@ -19,6 +19,7 @@
 #include "dkb/util/quantile.h"
 #include "dkb/util/radix_sort.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_folder.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
 
@@ -120,7 +121,8 @@ TEST(Files, AtomicWriteReplacesTheWholeFile) {
 }
 
 TEST(Files, AreReadWholeWhetherTheyTellTheirSizeOrNot) {
-  const fs::path path = fs::path(::testing::TempDir()) / (std::to_string(::getpid()) + "dkb_read_file_test");
+  const test::TempFolder folder;
+  const fs::path path = folder / "file";
   std::string content;
   for (const size_t size : {0, 1, 65535, 65536, 65537, 300000}) {
     while (content.size() < size) content += static_cast<char>(content.size() * 7 / 3);
