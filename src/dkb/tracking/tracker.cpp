@@ -18,8 +18,6 @@ constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map poin
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
 constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth, which err together
-constexpr double kStartSd = 1e-3;            // [m, rad] of a map's first pose, which is exact by definition
-constexpr double kGoOnAfter = 0.1;           // [s] without a pose by the images: more than a blurred one or two
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
 double square(double a) {
@@ -381,44 +379,6 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& i
   last_ = std::move(before_loss);
   state_ = before;
   return false;
-}
-
-// A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight. Where
-// a prior tells how the camera came here, the old map goes on instead, with a keyframe that shows nothing of it.
-bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
-  int with_depth = 0;
-  for (size_t f = 0; f < frame.features->size(); ++f)
-    with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
-  if (with_depth < options_.initial_points) return false;
-  // Nothing followed from the map's first frame: the map begins again, without what that frame made.
-  const auto step =
-      expected == nullptr && last_ && last_->starts_map ? expected_step(frame.timestamp, nullptr) : std::nullopt;
-  if (state_ != TrackingState::initialising && !step) {
-    if (!lost_since_) lost_since_ = frame.timestamp;
-    // Where the way here is known and the map's points are not found, there are none.
-    const double wait = expected != nullptr ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
-    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
-  }
-  if (step) {
-    frame.predicted = pose_after(*step);
-    expected = &*frame.predicted;
-    std::vector<PointId> made = last_->points;
-    std::erase(made, kNoPoint);
-    retract(made);
-  }
-  frame.inliers = with_depth;
-  frame.cam_from_world = last_ ? last_->cam_from_world : start_;
-  frame.covariance = Matrix6d::Identity() * (kStartSd * kStartSd);
-  if (expected != nullptr) {
-    frame.cam_from_world = expected->cam_from_world;
-    frame.covariance = expected->covariance;
-    frame.reference = last_->reference;
-    frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
-  }
-  drop_unmatched_suspects(frame);
-  candidates_made_.reset();
-  if (expected == nullptr) forget_velocity();
-  return true;
 }
 
 TrackedFrame Tracker::track(const TrackingInput& input) {

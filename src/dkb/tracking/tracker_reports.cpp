@@ -100,34 +100,4 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
   return packet;
 }
 
-// The first frame of a map is seen at a velocity that nobody knows yet. Left as it is, a map made in a turn is sheared,
-// and the next frame, whose features are straight, fits it at a wrong angle.
-void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next) {
-  for (auto it = provisional_.begin(); it != provisional_.end();) {
-    ProvisionalPoint& p = it->second;
-    const Keypoint& k = features->keypoints[static_cast<size_t>(p.feature)];
-    if (p.keyframe != last_->reference) {
-      ++it;
-    } else if (k.depth > 0) {
-      p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), k.depth);
-      ++it;
-    } else {
-      last_->points[static_cast<size_t>(p.feature)] = kNoPoint;
-      std::replace(next.points.begin(), next.points.end(), p.id, kNoPoint);
-      it = provisional_.erase(it);
-    }
-  }
-  last_->features = features;
-  next.start_features = std::move(features);
-}
-
-void Tracker::remake(const TrackedFrame& next, KeyframePacket& packet) const {
-  packet.features = next.start_features;
-  std::erase_if(packet.new_points, [this](ProvisionalPoint& p) {
-    const auto now = provisional_.find(p.id);
-    if (now != provisional_.end()) p = now->second;
-    return now == provisional_.end();
-  });
-}
-
 }  // namespace dkb

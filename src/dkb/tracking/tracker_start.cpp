@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a map starts.
+#include <algorithm>
+#include <utility>
+
+#include "dkb/tracking/tracker.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kStartSd = 1e-3;   // [m, rad] of a map's first pose, which is exact by definition
+constexpr double kGoOnAfter = 0.1;  // [s] without a pose by the images: more than a blurred one or two
+
+}  // namespace
+
+// A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight. Where
+// a prior tells how the camera came here, the old map goes on instead, with a keyframe that shows nothing of it.
+bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
+  int with_depth = 0;
+  for (size_t f = 0; f < frame.features->size(); ++f)
+    with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
+  if (with_depth < options_.initial_points) return false;
+  // Nothing followed from the map's first frame: the map begins again, without what that frame made.
+  const auto step =
+      expected == nullptr && last_ && last_->starts_map ? expected_step(frame.timestamp, nullptr) : std::nullopt;
+  if (state_ != TrackingState::initialising && !step) {
+    if (!lost_since_) lost_since_ = frame.timestamp;
+    // Where the way here is known and the map's points are not found, there are none.
+    const double wait = expected != nullptr ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
+    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
+  }
+  if (step) {
+    frame.predicted = pose_after(*step);
+    expected = &*frame.predicted;
+    std::vector<PointId> made = last_->points;
+    std::erase(made, kNoPoint);
+    retract(made);
+  }
+  frame.inliers = with_depth;
+  frame.cam_from_world = last_ ? last_->cam_from_world : start_;
+  frame.covariance = Matrix6d::Identity() * (kStartSd * kStartSd);
+  if (expected != nullptr) {
+    frame.cam_from_world = expected->cam_from_world;
+    frame.covariance = expected->covariance;
+    frame.reference = last_->reference;
+    frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
+  }
+  drop_unmatched_suspects(frame);
+  candidates_made_.reset();
+  if (expected == nullptr) forget_velocity();
+  return true;
+}
+
+// The first frame of a map is seen at a velocity that nobody knows yet. Left as it is, a map made in a turn is sheared,
+// and the next frame, whose features are straight, fits it at a wrong angle.
+void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next) {
+  for (auto it = provisional_.begin(); it != provisional_.end();) {
+    ProvisionalPoint& p = it->second;
+    const Keypoint& k = features->keypoints[static_cast<size_t>(p.feature)];
+    if (p.keyframe != last_->reference) {
+      ++it;
+    } else if (k.depth > 0) {
+      p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), k.depth);
+      ++it;
+    } else {
+      last_->points[static_cast<size_t>(p.feature)] = kNoPoint;
+      std::replace(next.points.begin(), next.points.end(), p.id, kNoPoint);
+      it = provisional_.erase(it);
+    }
+  }
+  last_->features = features;
+  next.start_features = std::move(features);
+}
+
+void Tracker::remake(const TrackedFrame& next, KeyframePacket& packet) const {
+  packet.features = next.start_features;
+  std::erase_if(packet.new_points, [this](ProvisionalPoint& p) {
+    const auto now = provisional_.find(p.id);
+    if (now != provisional_.end()) p = now->second;
+    return now == provisional_.end();
+  });
+}
+
+}  // namespace dkb
