@@ -6,9 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <new>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include "dkb_slam/version.h"
@@ -55,10 +53,6 @@ struct NoFill : std::allocator<T> {
   template <class U>
   void construct(U*) noexcept {
     static_assert(std::is_trivially_copyable_v<U>);
-  }
-  template <class U, class V>
-  void construct(U* at, V&& value) {
-    ::new (static_cast<void*>(at)) U(std::forward<V>(value));
   }
 };
 
