@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dense/floor_plane.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -59,8 +59,7 @@ FloorPlane refined(const std::vector<Facet>& facets, FloorPlane plane) {
     }
     if (weight <= 0) break;
     mean /= weight;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(squares / weight - mean * mean.transpose());
-    Eigen::Vector3d normal = solver.eigenvectors().col(0);
+    Eigen::Vector3d normal = spectrum(Eigen::Matrix3d(squares / weight - mean * mean.transpose())).vectors.col(0);
     if (normal.dot(plane.up) < 0) normal = -normal;
     plane = {normal, normal.dot(mean), weight};
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dynamics/depth_alignment.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "dkb/geometry/decompositions.h"
 
 namespace dkb {
 namespace {
@@ -108,14 +108,14 @@ class HangingTogether {
 // those of the information in units of the expectation's standard deviations.
 void keep_what_is_known(const Matrix6d& expected_covariance, const Matrix6d& noise, Matrix6d* information,
                         Vector6d* gradient) {
-  const Matrix6d unit = expected_covariance.llt().matrixL(), whitened = unit.inverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.transpose() * *information * unit);
+  const Matrix6d unit = cholesky_root(expected_covariance), whitened = inverse(unit);
+  const auto [values, axes] = spectrum(Matrix6d(unit.transpose() * *information * unit));
   Matrix6d kept = Matrix6d::Zero();
   Vector6d pull = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    const Vector6d axis = eigen.eigenvectors().col(i), direction = unit * axis;
-    const double known = eigen.eigenvalues()[i] - direction.dot(noise * direction);
-    if (known < eigen.eigenvalues()[i] / 2) continue;
+    const Vector6d axis = axes.col(i), direction = unit * axis;
+    const double known = values[i] - direction.dot(noise * direction);
+    if (known < values[i] / 2) continue;
     kept += known * axis * axis.transpose();
     pull += direction.dot(*gradient) * axis;
   }
@@ -160,7 +160,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
   const Matrix6d to_there = adjoint(expected.previous_from_current);
   Matrix6d covariance = to_there * expected.covariance * to_there.transpose();
   covariance.diagonal().array() += kExact * kExact;
-  const Matrix6d prior = covariance.inverse();
+  const Matrix6d prior = inverse(covariance);
   const Rigid3 here_from_there_expected = expected.previous_from_current.inverse();
   const auto spacings_per_unit = static_cast<float>(focal_ / (kReach * rays.cell()));  // of a plane one unit away
   Rigid3 pose = expected.previous_from_current;
@@ -207,7 +207,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
       keep_what_is_known(covariance, sums.noise() / cells_like_one, &information, &gradient);
       information += prior;
       gradient += prior * tangent_from_rigid3(pose * here_from_there_expected);
-      return -information.ldlt().solve(gradient);
+      return -solve_symmetric(information, gradient);
     };
     const double usual = together_.value_or(1);
     Vector6d step = solve(usual);
@@ -222,7 +222,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
     if (settled) break;
   }
   const Matrix6d to_here = adjoint(pose.inverse());
-  return MotionPrior{pose, false, to_here * information.inverse() * to_here.transpose()};
+  return MotionPrior{pose, false, to_here * inverse(information) * to_here.transpose()};
 }
 
 }  // namespace dkb

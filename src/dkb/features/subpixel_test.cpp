@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <vector>
 
@@ -46,7 +45,8 @@ Scatter scatter(double contrast) {
   }
   const Eigen::Matrix2d covariance = squares / kDraws - sum * sum.transpose() / (kDraws * kDraws);
   std::nth_element(said.begin(), said.begin() + kDraws / 2, said.end());
-  return {std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()), said[kDraws / 2]};
+  const double half = covariance.trace() / 2, largest = half + std::sqrt(half * half - covariance.determinant());
+  return {std::sqrt(largest), said[kDraws / 2]};
 }
 
 TEST(RefineCorner, SaysHowFarNoiseMovesACorner) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/geometry/rigid3.h"
 
 namespace dkb {
@@ -33,7 +34,7 @@ class VelocityFilter {
   // A velocity was measured over `seconds`.
   void update(const Vector6d& measured, const Matrix6d& measured_covariance, double seconds) {
     const Matrix6d predicted = covariance(0, seconds);
-    const Matrix6d gain = predicted * (predicted + measured_covariance).inverse();
+    const Matrix6d gain = predicted * inverse(predicted + measured_covariance);
     velocity_ += gain * (measured - velocity_);
     covariance_ = predicted - gain * predicted;
     covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();

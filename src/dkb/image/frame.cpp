@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb_slam/frame.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <iterator>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
 #include "dkb/image/pixel_views.h"
@@ -40,8 +40,7 @@ void check_prior(const MotionPrior& prior) {
     throw InputError("motion prior: one of its numbers is not finite; leave the prior out of this frame");
   if (std::abs(m.rotation.norm() - 1) > 1e-3)
     throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(prior.covariance, Eigen::EigenvaluesOnly);
-  if (eigen.eigenvalues().minCoeff() < -1e-12 * prior.covariance.cwiseAbs().maxCoeff())
+  if (spectrum(prior.covariance).values[0] < -1e-12 * prior.covariance.cwiseAbs().maxCoeff())
     throw InputError(
         "motion prior: its covariance has a negative variance in some direction; give a covariance matrix");
 }

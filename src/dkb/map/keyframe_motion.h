@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/map/ids.h"
 #include "dkb_slam/frame.h"
 
@@ -16,7 +17,7 @@ struct KeyframeMotion {
   Matrix6d information() const {
     Matrix6d covariance = since.covariance;
     covariance.diagonal().array() += 1e-12 + 1e-11 * covariance.trace();
-    return covariance.inverse();
+    return inverse(covariance);
   }
 };
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "dkb/geometry/decompositions.h"
+
 namespace dkb {
 namespace {
 
@@ -65,7 +67,7 @@ PoseEdge edge_of(int a, int b, const Rigid3& cam_from_plane, const PlanePatch& p
   edge.robust = true;
   // The least motion that brings the plane to where it is seen.
   const Eigen::Vector3d n = patch.normal();
-  const auto tilt = Eigen::Quaterniond::FromTwoVectors(cam_from_plane.rotation * Eigen::Vector3d::UnitZ(), n);
+  const auto tilt = rotation_between(cam_from_plane.rotation * Eigen::Vector3d::UnitZ(), n);
   edge.b_from_a.rotation = (tilt * cam_from_plane.rotation).normalized();
   edge.b_from_a.translation = cam_from_plane.translation + (patch.distance() - n.dot(cam_from_plane.translation)) * n;
   const Eigen::Vector3d centre = edge.b_from_a.inverse() * patch.centre;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/mapping/point_creation.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <optional>

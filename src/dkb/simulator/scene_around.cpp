@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/simulator/noise.h"
 #include "dkb/simulator/scene.h"
 #include "dkb/util/quantile.h"
@@ -27,7 +28,7 @@ Eigen::Quaterniond upright(const std::vector<TimedPose>& poses) {
   const bool z_up = up.z() > 0.3 || forward.z() < -0.7;
   const Eigen::Quaterniond level =
       z_up ? Eigen::Quaterniond::Identity()
-           : Eigen::Quaterniond::FromTwoVectors(up.norm() > 1e-3 ? up : Vector3d(0, -1, 0), Vector3d::UnitZ());
+           : rotation_between(up.norm() > 1e-3 ? up : Vector3d(0, -1, 0), Vector3d::UnitZ());
   const Vector3d ahead = level * forward;
   const double yaw = std::hypot(ahead.x(), ahead.y()) > 0.15 ? std::atan2(ahead.y(), ahead.x()) : 1.5707963;
   return Eigen::Quaterniond(Eigen::AngleAxisd(1.5707963267948966 - yaw, Vector3d::UnitZ())) * level;

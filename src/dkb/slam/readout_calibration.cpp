@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/readout_calibration.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
+
+#include "dkb/geometry/decompositions.h"
 
 namespace dkb {
 namespace {
@@ -49,9 +50,8 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
     ++matches;
   }
   if (matches < kMinMatches) return;
-  const Eigen::LDLT<Matrix6d> factor(pose_pose);
-  if (factor.info() != Eigen::Success || !factor.isPositive()) return;
-  const Vector6d explained = factor.solve(pose_readout);
+  if (!(spectrum(pose_pose).values[0] > 0)) return;
+  const Vector6d explained = solve_symmetric(pose_pose, pose_readout);
   const double gradient = (readout_gradient - explained.dot(pose_gradient)) / kTogether;
   information_ += std::max(0.0, readout_readout - explained.dot(pose_readout)) / kTogether;
   readout_ = std::clamp(readout_ + gradient / information_, 0.0, kMaxReadout);

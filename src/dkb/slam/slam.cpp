@@ -2,12 +2,12 @@
 // The library's front door; what happens to a frame stands in pipeline.cpp.
 #include "dkb_slam/slam.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <exception>
 #include <mutex>
 #include <utility>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/image/skipped_motion.h"
 #include "dkb/map/map_file.h"
 #include "dkb/slam/event_outlet.h"
@@ -142,10 +142,9 @@ void Slam::localize_only(bool on) {
   if (impl_->pipeline) impl_->pipeline->localize_only(on);
 }
 void Slam::suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance) {
-  const Eigen::LLT<Matrix6d> root(covariance);
   if (!world_from_cam.translation.allFinite() || !(std::abs(world_from_cam.rotation.norm() - 1) < 1e-3))
     throw InputError("suggested pose: it is no rigid motion of finite numbers; give a unit quaternion");
-  if (!covariance.allFinite() || root.info() != Eigen::Success)
+  if (!covariance.allFinite() || !(spectrum(covariance).values[0] > 0))
     throw InputError("suggested pose: its covariance is not positive definite; give variances above 0");
   if (impl_->pipeline) impl_->pipeline->suggest_pose({world_from_cam.inverse(), covariance});
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/solver/ba_layout.h"
 #include "dkb/solver/nielsen_damping.h"
 #include "dkb/solver/relative_pose.h"
@@ -240,8 +241,8 @@ class BundleAdjuster {
       columns.col(k) = Eigen::Map<const Eigen::VectorXd>(column.data(), columns.rows());
     }
     if (!columns.allFinite()) return std::nullopt;
-    const Matrix6d inverse = columns.middleRows<6>(6 * free);
-    const Matrix6d claimed = 0.5 * (inverse + inverse.transpose());
+    const Matrix6d own = columns.middleRows<6>(6 * free);
+    const Matrix6d claimed = 0.5 * (own + own.transpose());
 
     const std::vector<Vector6d> pulls = pulls_of_pairs();
     std::map<std::pair<int, int>, Vector6d> parts;
@@ -253,7 +254,7 @@ class BundleAdjuster {
     }
     Matrix6d scatter = layout_.motions->propagated(state_.poses, columns);
     for (const auto& [part, moves] : parts) scatter += moves * moves.transpose();
-    const double n = static_cast<double>(parts.size()), factor = claimed.llt().solve(scatter).trace() / 6;
+    const double n = static_cast<double>(parts.size()), factor = (inverse(claimed) * scatter).trace() / 6;
     if (!std::isfinite(factor)) return std::nullopt;
     return (n * factor + 1) / (n + 1) * claimed;
   }

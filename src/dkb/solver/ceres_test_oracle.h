@@ -8,6 +8,7 @@
 #include <array>
 #include <vector>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/solver/bundle_adjustment.h"
 
 namespace dkb {
@@ -65,7 +66,7 @@ struct CeresMotion {
     for (int k = 0; k < 3; ++k) error[k] += T(inverse.translation[k]);
     ceres::QuaternionProduct(from_edge, turn, error_turn);
     ceres::QuaternionToAngleAxis(error_turn, error + 3);
-    const Matrix6d root = edge.information.llt().matrixU();
+    const Matrix6d root = cholesky_root(edge.information).transpose();
     for (int i = 0; i < 6; ++i) {
       residual[i] = T(0);
       for (int k = i; k < 6; ++k) residual[i] += root(i, k) * error[k];

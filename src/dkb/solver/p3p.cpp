@@ -6,12 +6,12 @@
 // M_ij holds 1 on (i, i) and (j, j) and -cos(ray_i, ray_j) on (i, j). Eliminating the right-hand sides leaves two
 // homogeneous conics D1, D2. Where det(D1 + g D2) = 0 the pencil's conic is a pair of lines; each meets D1 in two
 // directions of l, and any a_ij gives the length.
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/solver/absolute_pose.h"
 
 namespace dkb {
@@ -128,12 +128,10 @@ std::vector<Rigid3> solve_p3p(const Vector3d (&points_in_world)[3], const Vector
     const double norm = conic.norm();
     if (!(norm > 0) || !std::isfinite(norm)) continue;
     conic /= norm;
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(conic);
-    const Vector3d s = eigen.eigenvalues();
+    const auto [s, axes] = spectrum(conic);
     if (!(-s[0] * s[2] > clearest)) continue;
     clearest = -s[0] * s[2];
-    const Vector3d u = std::sqrt(s[2]) * eigen.eigenvectors().col(2),
-                   v = std::sqrt(-s[0]) * eigen.eigenvectors().col(0);
+    const Vector3d u = std::sqrt(s[2]) * axes.col(2), v = std::sqrt(-s[0]) * axes.col(0);
     lines[0] = u + v;
     lines[1] = u - v;
   }

@@ -4,9 +4,9 @@
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <array>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
@@ -102,7 +102,7 @@ double ceres_pose_graph(PoseGraph& graph, double huber_chi2) {
     if (graph.fixed[k]) problem.SetParameterBlockConstant(poses[k].data());
   }
   for (const PoseEdge& e : graph.edges) {
-    const Matrix6d root = e.information.llt().matrixU();
+    const Matrix6d root = cholesky_root(e.information).transpose();
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<CeresEdge, 6, 7, 7>(new CeresEdge{e, root}),
                              e.robust ? new ceres::HuberLoss(std::sqrt(huber_chi2)) : nullptr, poses[e.a].data(),
                              poses[e.b].data());

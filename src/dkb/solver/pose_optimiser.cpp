@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/solver/pose_optimiser.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/solver/kernels.h"
 #include "dkb/solver/relative_pose.h"
 #include "dkb/util/errors.h"
@@ -16,8 +15,8 @@ namespace {
 using solver::CameraPose;
 
 constexpr double kMedianChi2 = 1.386;  // of two degrees of freedom
-// By Student's weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average, claim
-// 1 / 1.084: E[w^2 x] / 2 / E[24 / (4 + x)^2]^2 with w = 6 / (4 + x) and x of two degrees of freedom.
+// By Student's weights a Gaussian's errors in the plane give a variance of 1.0925 where the weights, 1.084 on average,
+// claim 1 / 1.084: E[w^2 x] / 2 / E[24 / (4 + x)^2]^2 with w = 6 / (4 + x) and x of two degrees of freedom.
 constexpr double kClaim = 1 / (1.0925 * 1.084);
 constexpr double kUsualScale = 20;  // observations of the sigmas as given that stand beside those at hand
 
@@ -175,7 +174,7 @@ int descend(PoseProblem& problem, const PoseOptions& options, bool robust, Rigid
     Matrix6d damped = normal.information;
     // The floor keeps directions without information where they are.
     damped.diagonal() += damping * normal.information.diagonal() + Vector6d::Constant(1e-9);
-    const Vector6d step = -damped.ldlt().solve(normal.gradient);
+    const Vector6d step = -solve_symmetric(damped, normal.gradient);
     if (!step.allFinite()) break;
     const Rigid3 candidate = solver::perturbed(pose, step);
     const bool small =
@@ -197,7 +196,7 @@ int descend(PoseProblem& problem, const PoseOptions& options, bool robust, Rigid
 Rigid3 one_step(PoseProblem& problem, const Rigid3& pose) {
   PoseProblem::Normal normal = problem.normal_at(pose, false);
   normal.information.diagonal().array() += 1e-9;
-  const Vector6d step = -normal.information.ldlt().solve(normal.gradient);
+  const Vector6d step = -solve_symmetric(normal.information, normal.gradient);
   return step.allFinite() ? solver::perturbed(pose, step) : pose;
 }
 
@@ -253,13 +252,12 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
   estimate.mean_chi2 = problem.mean_chi2(estimate.inlier);
   const Matrix6d information = problem.normal_at(pose, false).information;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
-  const bool determined = information.allFinite() && eigen.eigenvalues()[0] > 1e-12 * eigen.eigenvalues()[5];
+  const auto [values, axes] = spectrum(information);
+  const bool determined = information.allFinite() && values[0] > 1e-12 * values[5];
   if (estimate.inliers < options.min_inliers || !determined || !pose.translation.allFinite()) return estimate;
   estimate.ok = true;
   estimate.cam_from_world = pose;
-  estimate.covariance =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  estimate.covariance = axes * values.cwiseInverse().asDiagonal() * axes.transpose();
   return estimate;
 }
 

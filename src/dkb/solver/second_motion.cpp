@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/solver/second_motion.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "dkb/geometry/decompositions.h"
 
 namespace dkb {
 namespace {
@@ -40,7 +41,7 @@ struct Normal {
     h += weight * other.h;
     g += weight * other.g;
   }
-  Vector6d solve() const { return -h.ldlt().solve(g); }
+  Vector6d solve() const { return -solve_symmetric(h, g); }
 };
 
 Normal any_motion() {

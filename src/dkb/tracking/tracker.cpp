@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/matching/pose_observation.h"
 #include "dkb/util/radix_sort.h"
 
@@ -131,7 +132,7 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     observations.push_back(o);
   }
   if (!expected || !expected->weighs) return optimise_pose(optics_.camera, initial, observations, options);
-  const PosePrior prior{expected->cam_from_world, expected->covariance.inverse()};
+  const PosePrior prior{expected->cam_from_world, inverse(expected->covariance)};
   return optimise_pose(optics_.camera, initial, observations, options, &prior);
 }
 

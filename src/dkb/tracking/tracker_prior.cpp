@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -65,7 +66,7 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
   Matrix6d sum = covariance;
   sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
   sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
-  return delta.dot(sum.ldlt().solve(delta)) <= kChi2Pose;
+  return delta.dot(solve_symmetric(sum, delta)) <= kChi2Pose;
 }
 
 // The frame has no pose by its images: the predicted one stands in where there is one, and the next frame goes on from
