@@ -101,9 +101,8 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
 }
 
 void LocalMapper::apply_reports(const KeyframePacket& packet) {
-  for (PointId retracted : packet.retracted) {
-    const PointId id = map_.resolve(retracted);
-    if (id == kNoPoint) continue;
+  for (PointId id : packet.retracted) {
+    if (map_.point(id) == nullptr) continue;  // gone, or fused into one that others saw as well
     map_.remove_point(id);
     ++report_.points_retracted;
   }

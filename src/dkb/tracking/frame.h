@@ -53,9 +53,9 @@ struct TrackedFrame {
   // What follows holds when tracking or relocalised; of a predicted frame the reference and the pose.
   std::shared_ptr<const RgbdFeatures> features;
   std::vector<FeatureMotion> motion;  // per feature
-  std::vector<PointId> matched;       // per feature: the map point it matched, also where the pose rejects it
-  std::vector<PointId> points;        // per feature: the map point it shows (inliers of the pose), else kNoPoint
-  std::vector<uint8_t> outlier;       // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<PointId> matched;  // per feature: the map point it matched, also where the pose rejects it; in tracking
+  std::vector<PointId> points;   // per feature: the map point it shows (inliers of the pose), else kNoPoint
+  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
   std::vector<uint8_t> makes_point;  // per feature: 1 = it made a map point, when the frame became a keyframe
   std::vector<int> source;           // per feature: its index among the features that tracking was given

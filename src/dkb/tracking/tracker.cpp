@@ -177,6 +177,7 @@ bool Tracker::established(PointId id, double now) const {
 
 // Features on movers that showed no well-known point end here: mapping never sees them.
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
+  frame.matched.clear();  // it is of all features
   frame.source.clear();
   frame.source.reserve(frame.points.size());
   for (size_t f = 0; f < frame.points.size(); ++f)
@@ -307,8 +308,9 @@ void Tracker::finish(TrackedFrame& frame) {
     else
       ++lasting;
   }
-  for (const auto& [keyframe, votes] : pending_votes)
-    if (reference == kNoKeyframe || votes > lasting) reference = keyframe;
+  const auto most = std::max_element(pending_votes.begin(), pending_votes.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != pending_votes.end() && (reference == kNoKeyframe || most->second > lasting)) reference = most->first;
   frame.reference = reference;
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(reference).inverse();
 }
@@ -376,6 +378,7 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& i
   std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
+  if (frame.predicted) frame.predicted->weighs = false;  // it is of the way that this sighting contradicts
   if (last_->index + 1 == frame.index && track_from_last(frame, input)) return true;
   last_ = std::move(before_loss);
   state_ = before;

@@ -19,7 +19,10 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   int with_depth = 0;
   for (size_t f = 0; f < frame.features->size(); ++f)
     with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
-  if (with_depth < options_.initial_points) return false;
+  if (with_depth < options_.initial_points) {
+    lost_since_.reset();  // what cannot start a map says nothing of whether the old one is in sight
+    return false;
+  }
   // Nothing followed from the map's first frame: the map begins again, without what that frame made.
   const auto step =
       expected == nullptr && last_ && last_->starts_map ? expected_step(frame.timestamp, nullptr) : std::nullopt;
@@ -54,19 +57,24 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
 // The first frame of a map is seen at a velocity that nobody knows yet. Left as it is, a map made in a turn is sheared,
 // and the next frame, whose features are straight, fits it at a wrong angle.
 void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next) {
-  for (auto it = provisional_.begin(); it != provisional_.end();) {
-    ProvisionalPoint& p = it->second;
+  // Those on movers were left out when the map started.
+  if (features->size() != last_->source.size())
+    features = std::make_shared<const RgbdFeatures>(subset(*features, last_->source));
+  std::vector<PointId> gone;
+  for (auto& [id, p] : provisional_) {
+    if (p.keyframe != last_->reference) continue;
     const Keypoint& k = features->keypoints[static_cast<size_t>(p.feature)];
-    if (p.keyframe != last_->reference) {
-      ++it;
-    } else if (k.depth > 0) {
+    if (k.depth > 0)
       p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), k.depth);
-      ++it;
-    } else {
-      last_->points[static_cast<size_t>(p.feature)] = kNoPoint;
-      std::replace(next.points.begin(), next.points.end(), p.id, kNoPoint);
-      it = provisional_.erase(it);
-    }
+    else
+      gone.push_back(id);
+  }
+  for (PointId id : gone) {
+    provisional_.erase(id);
+    std::replace(last_->points.begin(), last_->points.end(), id, kNoPoint);
+    next.inliers -= static_cast<int>(std::count(next.points.begin(), next.points.end(), id));
+    std::replace(next.points.begin(), next.points.end(), id, kNoPoint);
+    std::replace(next.matched.begin(), next.matched.end(), id, kNoPoint);
   }
   last_->features = features;
   next.start_features = std::move(features);

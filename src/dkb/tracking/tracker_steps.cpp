@@ -133,6 +133,7 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
   const auto agrees = [&](const PoseEstimate& pose) {
     return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() && expected.agrees(pose.cam_from_world);
   };
+  refresh_candidates(last_->points, frame.timestamp);  // of no matches there would be none
   // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
   const double reach = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
   for (double radius = kRadiusLocalMap; radius < 2 * reach; radius *= 2) {

@@ -260,6 +260,40 @@ TEST_F(TrackerTest, AMapFromWhoseFirstFrameNothingFollowsBeginsAgain) {
   EXPECT_EQ(track(on_path(2)).state, TrackingState::lost) << "of a map that was followed more is expected";
 }
 
+TEST_F(TrackerTest, AMapsFirstFrameIsMadeAnewWithoutTheCornersOfMovers) {
+  ++index;
+  view = scene.look({}, {});
+  FakeFeatures seen(view.features);
+  seen.motion.assign(view.features->size(), FeatureMotion::still);
+  for (size_t f = 0; f < seen.motion.size(); f += 3) seen.motion[f] = FeatureMotion::on_mover;
+  const TrackedFrame first = track(seen);
+  ASSERT_TRUE(first.starts_map);
+  ASSERT_LT(first.features->size(), view.features->size());
+  KeyframePacket packet = insert(first);
+
+  // At the velocity that the second frame tells, every tenth corner has no depth.
+  auto straight = std::make_shared<RgbdFeatures>(*view.features);
+  for (size_t f = 0; f < straight->size(); f += 10) straight->keypoints[f].depth = 0;
+  const FakeFeatures anew(straight);
+  ++index;
+  view = scene.look(on_path(1), {});
+  const FakeFeatures features(view.features);
+  const TrackedFrame second = tracker.track(
+      {.index = index, .timestamp = index * kFrameTime, .features = features, .start = &anew, .movers = true});
+  ASSERT_TRUE(second.tracked());
+  const size_t points = packet.new_points.size();
+  tracker.remake(second, packet);
+  EXPECT_LT(packet.new_points.size(), points);
+  ASSERT_EQ(packet.features->size(), packet.points.size());
+  for (const ProvisionalPoint& p : packet.new_points) {
+    const auto f = static_cast<size_t>(p.feature);
+    EXPECT_EQ(packet.features->descriptors[f], p.descriptor);
+    EXPECT_GT(packet.features->keypoints[f].depth, 0);
+  }
+  EXPECT_EQ(second.inliers,
+            std::count_if(second.points.begin(), second.points.end(), [](PointId p) { return p != kNoPoint; }));
+}
+
 TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
   view = scene.look({});
   const FakeFeatures features(view.features);
