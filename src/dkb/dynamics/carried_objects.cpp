@@ -20,6 +20,14 @@ void box_regions(Detections& detections) {
     detections.boxes.push_back({"mover", box, 1.0f});
 }
 
+// What `from` marks in a box is marked in `to` as well, where both are there.
+void keep_within(const Box& box, const GreyImage& from, GreyImage& to) {
+  if (from.empty() || to.empty()) return;
+  for (int y = 0; y < to.height(); ++y)
+    for (int x = 0; x < to.width(); ++x)
+      if (from(x, y) != 0 && box.contains(static_cast<float>(x), static_cast<float>(y))) to(x, y) = from(x, y);
+}
+
 }  // namespace
 
 CarriedObjects::CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options)
@@ -109,7 +117,9 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
     const bool seen_again = std::any_of(here.boxes.begin(), here.boxes.end(), [&](const Detection& d) {
       return intersection_over_union(d.box, old.detection.box) > 0.3f;
     });
-    if (!seen_again && old.missed < kMissedResults) next.push_back({old.detection, old.missed + 1});
+    if (seen_again || old.missed == kMissedResults) continue;
+    next.push_back({old.detection, old.missed + 1});
+    keep_within(old.detection.box, mask_, here.mask);
   }
   carried_ = std::move(next);
   mask_ = std::move(here.mask);

@@ -180,6 +180,19 @@ TEST_F(CarriedObjectsTest, WhatIsOverlookedOnceOrTwiceDoesNotVanish) {
   EXPECT_TRUE(carried.boxes().empty());
 }
 
+TEST_F(CarriedObjectsTest, WhoeverIsOverlookedWhereOthersHaveMasksKeepsHis) {
+  see(4);
+  receive(4, {{{"person", person(4), 1}}, mask_of(4)});
+  GreyImage another(320, 240);
+  const Box beside{250, 60, 40, 60};
+  for (int y = 60; y < 120; ++y)
+    for (int x = 250; x < 290; ++x) another(x, y) = 255;
+  receive(4, {{{"person", beside, 1}}, another});
+  ASSERT_EQ(carried.boxes().size(), 2U);
+  EXPECT_EQ(shares(carried.mask(), 4).first, 1);
+  EXPECT_EQ(carried.mask()(270, 90), 255);
+}
+
 TEST_F(CarriedObjectsTest, ABoxThatIsSeenAgainIsNotKeptTwice) {
   see(4);
   receive(3, {{{"person", person(3), 1}}, {}});

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "dkb/geometry/decompositions.h"
 
@@ -160,7 +161,10 @@ void add_planes(const Map& map, const std::vector<KeyframeId>& keyframes, BaProb
     const bool all_fixed = std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& s) {
       return problem.fixed[static_cast<size_t>(s.camera)] != 0;
     });
-    if (all_fixed || sightings.size() < kEnoughKeyframes) continue;
+    // Two regions of a view may be of one plane; sightings are by increasing camera.
+    size_t seen_by = 0;
+    for (int last = -1; const Sighting& s : sightings) seen_by += std::exchange(last, s.camera) != s.camera;
+    if (all_fixed || seen_by < kEnoughKeyframes) continue;
     const auto camera = [&](const Sighting& s) { return problem.cam_from_world[static_cast<size_t>(s.camera)]; };
     const Sighting& first = sightings.front();
     const Rigid3 world_from_plane = camera(first).inverse() * cam_from_plane_of(*first.patch);

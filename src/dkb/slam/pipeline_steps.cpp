@@ -155,6 +155,7 @@ Expectation Pipeline::expect(const Frame& frame) const {
   if (!last) return expected;
   expected.step = tracker_.expected_step(frame.image()->timestamp, frame.prior() ? &*frame.prior() : nullptr);
   expected.cam_from_world = expected.current_from_previous() * last->cam_from_world;
+  if (scenes_.keyframes_looked_at() == 0) return expected;
   const Map& map = tracker_.map().view();
   const auto keyframes = map.live_keyframes();
   const size_t count = std::min(keyframes.size(), static_cast<size_t>(scenes_.keyframes_looked_at()));
