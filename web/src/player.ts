@@ -14,6 +14,7 @@ export async function sessionList(): Promise<Recording[]> {
 
 const headBytes = 32, checkpoint = 1; // as src/dkb/viewer/session_file.h
 const piece = 1 << 20, ahead = 2 << 20; // [bytes]
+const firstWait = 250, longestWait = 5000; // [ms] after fetches that failed
 
 type Head = { flags: number; time: number; frame: number; bytes: number };
 
@@ -26,6 +27,8 @@ export class Player {
   private anew = true; // the next chunk is where we begin, be it a checkpoint or not
   private fetching = false;
   private generation = 0;
+  private failures = 0; // of fetches, one after another
+  private retryAt = 0; // [ms] performance.now()
 
   constructor(private n: number, public info: Recording, readonly panel: Panel) {}
 
@@ -102,16 +105,20 @@ export class Player {
     return null;
   }
   private fill(): void {
+    const head = this.next(); // first: it may jump past a checkpoint, and what is fetched is joined where the buffer ends
     const end = this.at + this.buffer.length;
     const left = this.buffer.length - this.used;
-    const head = this.next();
     const wanted = head ? Math.max(ahead, headBytes + head.bytes) : ahead;
-    if (this.fetching || document.hidden || left >= wanted || end >= this.info.size) return;
+    if (this.fetching || document.hidden || left >= wanted || end >= this.info.size || performance.now() < this.retryAt) return;
     this.fetching = true;
     const generation = this.generation;
     void fetch(`api/session?n=${this.n}&from=${end}&to=${Math.min(this.info.size, end + Math.max(piece, Math.min(wanted - left, 4 * piece)))}`, { headers })
-      .then((answer) => (answer.ok ? answer.arrayBuffer() : new ArrayBuffer(0)))
+      .then((answer) => {
+        if (!answer.ok) throw new Error(`${answer.status}`);
+        return answer.arrayBuffer();
+      })
       .then((bytes) => {
+        this.failures = 0;
         if (generation !== this.generation) return;
         const joined = new Uint8Array(this.buffer.length - this.used + bytes.byteLength);
         joined.set(this.buffer.subarray(this.used));
@@ -120,7 +127,10 @@ export class Player {
         this.at += this.used;
         this.used = 0;
       })
-      .catch(() => this.panel.badge("gone", "no connection"))
+      .catch(() => {
+        this.panel.badge("gone", "no connection");
+        this.retryAt = performance.now() + Math.min(firstWait * 2 ** this.failures++, longestWait);
+      })
       .finally(() => (this.fetching = false));
   }
   private messages(from: number, to: number, last: Map<string, Message>): void {

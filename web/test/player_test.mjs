@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// The player of recorded sessions: player_test.mjs PACKAGES, a folder where esbuild is. Says "skipped: ..." where it is not.
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { createRequire } from "node:module";
+import { join } from "node:path";
+
+const [packages] = process.argv.slice(2);
+const web = new URL("..", import.meta.url).pathname;
+if (!existsSync(join(packages, "node_modules", "esbuild"))) {
+  console.log("skipped: no esbuild in " + packages + "; the page is plain");
+  process.exit(0);
+}
+const { buildSync } = createRequire(join(packages, "x.js"))("esbuild");
+const [bundle] = buildSync({ entryPoints: [join(web, "src/player.ts")], bundle: true, write: false, format: "esm" }).outputFiles;
+
+globalThis.location = { hash: "" };
+globalThis.document = { hidden: false };
+// A clock that each look moves on: a turn of 12 ms tells one chunk.
+let clock = 0;
+Object.defineProperty(performance, "now", { value: () => (clock += 7) });
+const { Player } = await import("data:text/javascript;base64," + Buffer.from(bundle.text).toString("base64"));
+
+// Chunks as src/dkb/viewer/session_file.h writes them, each with one message.
+const message = 3, ofCheckpoint = 2;
+function chunk(flags, time, frame, kind, bytes) {
+  const data = new Uint8Array(32 + 8 + bytes), view = new DataView(data.buffer);
+  view.setUint32(12, flags, true);
+  view.setFloat64(16, time, true);
+  view.setInt32(24, frame, true);
+  view.setUint32(28, 8 + bytes, true);
+  view.setUint32(32, bytes, true);
+  data[36] = kind;
+  return data;
+}
+// 200 frames with a checkpoint of 4 MB, more than is fetched ahead, after `before` of them.
+function recording(before) {
+  const chunks = [chunk(1, 0, 0, ofCheckpoint, 100)];
+  for (let i = 1; i <= 200; i++) {
+    chunks.push(chunk(0, i * 0.1, i, message, 20000));
+    if (i === before) chunks.push(chunk(1, i * 0.1, i, ofCheckpoint, 4 << 20));
+  }
+  return Buffer.concat(chunks);
+}
+function player(file) {
+  const told = [], badges = [];
+  const panel = { take: ({ kind }) => told.push(kind), badge: (name) => badges.push(name) };
+  const info = { name: "x", seconds: 20, frame: 200, frames: 200, size: file.length, ended: true, damaged: false, entries: [[0, 0, 0]] };
+  return { player: new Player(0, info, panel), told, badges };
+}
+const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+
+// Wherever the checkpoint lies in what is fetched, and whenever the answer comes, all is told once and no checkpoint but the first.
+for (const before of [40, 104, 105, 106, 150])
+  for (const wait of [1, 25]) {
+    const file = recording(before);
+    globalThis.fetch = async (url) => {
+      const [, from, to] = /from=(\d+)&to=(\d+)/.exec(url).map(Number);
+      await pause(wait);
+      return { ok: true, arrayBuffer: async () => Uint8Array.from(file.subarray(from, to)).buffer };
+    };
+    const { player: p, told, badges } = player(file);
+    p.seek(0, false);
+    let all = false;
+    for (let turn = 0; turn < 1500 && !all; turn++) {
+      all = p.advance(20, 12);
+      await pause(1);
+    }
+    const where = `a checkpoint after ${before}, answers after ${wait} ms`;
+    assert.deepEqual(badges, [], where);
+    assert.equal(p.frame, 200, where);
+    assert.equal(told.filter((kind) => kind === message).length, 200, where);
+    assert.equal(told.filter((kind) => kind === ofCheckpoint).length, 1, where);
+  }
+
+// Fetches that fail are not tried again with every turn, and the film goes on when they succeed.
+for (const failing of [async () => ({ ok: false, status: 500 }), async () => { throw new TypeError("no network"); }]) {
+  const file = recording(0);
+  let fetches = 0;
+  globalThis.fetch = (url) => (fetches++, failing(url));
+  const { player: p, badges } = player(file);
+  p.seek(0, false);
+  const begun = clock;
+  while (clock - begun < 4000) {
+    p.advance(20, 12);
+    await pause(0);
+  }
+  assert.ok(fetches >= 3 && fetches <= 5, `fetches in 4 s, 250, 500, 1000 and 2000 ms apart: ${fetches}`);
+  assert.ok(badges.includes("gone"), "it is told");
+  globalThis.fetch = async (url) => {
+    const [, from, to] = /from=(\d+)&to=(\d+)/.exec(url).map(Number);
+    return { ok: true, arrayBuffer: async () => Uint8Array.from(file.subarray(from, to)).buffer };
+  };
+  let all = false;
+  for (let turn = 0; turn < 5000 && !all; turn++) {
+    all = p.advance(20, 12);
+    await pause(0);
+  }
+  assert.equal(p.frame, 200, "it goes on");
+}
+console.log("the player is as it should be");
