@@ -78,6 +78,7 @@ export class Charts {
       if (e.kind !== "keyframe") continue;
       const rule = e.text || "keyframe";
       this.ruleOf.set(e.frame, rule);
+      this.stale = true; // its frame may have come before
       if (this.rules.includes(rule)) continue;
       this.rules.push(rule);
       this.paint();
@@ -121,6 +122,8 @@ export class Charts {
       stroke: c, width: 0, paths: () => null, points: { show: true, size, fill: c, ...markPaths(shape, size) },
     });
     const ruleColours = [colour("--keyframe"), colour("--loop"), colour("--motion"), colour("--flow")];
+    // After four rules shapes come again, each with the next colour.
+    const ruleColour = (i: number) => ruleColours[(i + Math.floor(i / 4)) % 4];
     this.plots = [
       make(this.timeBox, " ms", [
         // The sums, the largest first: what is drawn later covers what lies below.
@@ -130,17 +133,18 @@ export class Charts {
       ], (_min, max) => [0, Math.max(1.2 * this.budget, Math.min(max * 1.1, 6 * this.budget))]),
       make(this.pointsBox, "", [
         { stroke: colour("--used"), width: 1, points: { show: false } },
-        ...this.rules.map((_rule, i) => dots(ruleColours[i % 4], shapes[i % 4])),
+        ...this.rules.map((_rule, i) => dots(ruleColour(i), shapes[i % 4])),
+        dots(colour("--text"), "●", 4), // rules that are not known yet
         dots(colour("--on-mover"), "×"),
       ], (_min, max) => [0, Math.max(10, max * 1.15)]),
     ];
     this.ruleBox.replaceChildren(...this.rules.map((rule, i) => {
       const item = document.createElement("span");
       item.textContent = `${shapes[i % 4]} ${rule}`;
-      item.style.color = ruleColours[i % 4];
+      item.style.color = ruleColour(i);
       return item;
     }));
-    this.ruleBox.title = "keyframes, by the rule that made them";
+    this.ruleBox.title = "keyframes, by the rule that made them; a small dot: the rule is not known yet";
     this.stageBox.title = `dashed: ${this.budget.toFixed(0)} ms, the frame's budget`;
     this.stale = true;
     this.draw();
@@ -165,7 +169,8 @@ export class Charts {
     }
     const others = beside.map((s) => (this.off.has(s) ? t.map(() => null) : frames.map((f) => timeOf(f, s) ?? null)));
     this.plots[0].setData([t, ...stack, t.map(() => this.budget), ...others]);
-    const marks = this.rules.map((rule) => points.map((p, i) => (this.keyframe[from + i] && (this.ruleOf.get(frames[i]) ?? this.rules[0]) === rule ? p : null)));
+    const marks = this.rules.map((rule) => points.map((p, i) => (this.keyframe[from + i] && this.ruleOf.get(frames[i]) === rule ? p : null)));
+    marks.push(points.map((p, i) => (this.keyframe[from + i] && !this.ruleOf.has(frames[i]) ? p : null)));
     this.plots[1].setData([t, points, ...marks, this.lost.slice(from)]);
   }
 }
