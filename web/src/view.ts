@@ -14,6 +14,7 @@ export const layers = ["points", "keyframes", "covisibility", "path", "movers", 
 export type Layer = (typeof layers)[number];
 
 const kFrustum = 0.06; // [m] depth of a keyframe's drawn frustum
+const kCross = 0.06; // [m] half the size of a mark
 
 type Palette = { keyframe: string; covisibility: string; path: string; loop: string; truth: string; camera: string; mover: string };
 
@@ -45,6 +46,14 @@ export class View {
   private truth = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private frustum = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
   private movers = new THREE.Group();
+  // What is drawn of movers and marks is made once: what WebGL holds goes only when it is disposed of.
+  private moverBox = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1));
+  private moverMaterial = new THREE.LineBasicMaterial();
+  private moverShapes: { box: THREE.LineSegments; arrow: THREE.ArrowHelper }[] = [];
+  private markCross = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap((axis) => [...axis.map((x) => -kCross * x), ...axis.map((x) => kCross * x)]), 3));
+  private markMaterial = new THREE.LineBasicMaterial({ depthTest: false });
+  private markLine = new THREE.Line(new THREE.BufferGeometry(), this.markMaterial);
   private surface = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }));
   private grid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true, side: THREE.DoubleSide, depthWrite: false }));
   private marker = new THREE.Group();
@@ -85,7 +94,7 @@ export class View {
     this.covisibility = new HostedLines(this.poses, "#888", 0.35);
     this.path = new HostedLines(this.poses, "#888");
     this.loops = new HostedLines(this.poses, "#888");
-    this.frustum.frustumCulled = this.truth.frustumCulled = false;
+    this.frustum.frustumCulled = this.truth.frustumCulled = this.markLine.frustumCulled = false;
     this.frustum.visible = false;
     this.truth.matrixAutoUpdate = this.frustum.matrixAutoUpdate = false;
     this.truth.visible = false;
@@ -243,19 +252,27 @@ export class View {
       this.truth.visible = !this.hidden.has("truth");
     }
     this.moverList = movers;
-    this.movers.clear();
-    for (const m of movers) {
-      const size = m.size.map((s) => Math.max(0.1, s));
-      const box = new THREE.LineSegments(new THREE.EdgesGeometry(new THREE.BoxGeometry(size[0], size[1], size[2])),
-        new THREE.LineBasicMaterial({ color: this.palette.mover }));
+    movers.forEach((m, i) => {
+      const { box, arrow } = (this.moverShapes[i] ??= this.moverShape());
+      box.visible = true;
       box.position.fromArray(m.position);
+      box.scale.fromArray(m.size.map((s) => Math.max(0.1, s)));
       if (this.cameraPose) box.quaternion.setFromRotationMatrix(this.cameraPose);
-      this.movers.add(box);
-      const v = new THREE.Vector3().fromArray(m.velocity);
-      if (v.length() > 0.05)
-        this.movers.add(new THREE.ArrowHelper(v.clone().normalize(), box.position, v.length(), this.palette.mover, 0.15, 0.08));
-    }
+      const v = new THREE.Vector3().fromArray(m.velocity), speed = v.length();
+      arrow.visible = speed > 0.05;
+      if (!arrow.visible) return;
+      arrow.position.copy(box.position);
+      arrow.setDirection(v.divideScalar(speed));
+      arrow.setLength(speed, 0.15, 0.08);
+    });
+    for (const { box, arrow } of this.moverShapes.slice(movers.length)) box.visible = arrow.visible = false;
     this.dirty = true;
+  }
+  private moverShape(): { box: THREE.LineSegments; arrow: THREE.ArrowHelper } {
+    const box = new THREE.LineSegments(this.moverBox, this.moverMaterial), arrow = new THREE.ArrowHelper();
+    arrow.setColor(this.palette.mover);
+    this.movers.add(box, arrow);
+    return { box, arrow };
   }
 
   // --- what the visitor asks for
@@ -301,15 +318,15 @@ export class View {
   }
   private mark(points: THREE.Vector3[]): void {
     this.marker.clear();
-    const material = new THREE.LineBasicMaterial({ color: this.palette.loop, depthTest: false });
     for (const p of points) {
-      const s = 0.06;
-      const cross = [-s, 0, 0, s, 0, 0, 0, -s, 0, 0, s, 0, 0, 0, -s, 0, 0, s];
-      const lines = new THREE.LineSegments(new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(cross, 3)), material);
+      const lines = new THREE.LineSegments(this.markCross, this.markMaterial);
       lines.position.copy(p);
       this.marker.add(lines);
     }
-    if (points.length === 2) this.marker.add(new THREE.Line(new THREE.BufferGeometry().setFromPoints(points), material));
+    if (points.length === 2) {
+      this.markLine.geometry.setFromPoints(points);
+      this.marker.add(this.markLine);
+    }
     this.dirty = true;
   }
   // A point for the measure, at a place of the screen (-1 ... 1).
@@ -366,6 +383,9 @@ export class View {
     this.loops.colour = this.palette.loop;
     this.truth.material.color.set(this.palette.truth);
     this.frustum.material.color.set(this.palette.camera);
+    this.moverMaterial.color.set(this.palette.mover);
+    this.markMaterial.color.set(this.palette.loop);
+    for (const { arrow } of this.moverShapes) arrow.setColor(this.palette.mover);
     this.dirty = true;
   }
   private resize(): void {
@@ -451,6 +471,7 @@ export class View {
     data.points = String(this.cloud.points);
     data.cloudCalls = String(this.cloud.drawCalls);
     data.calls = String(this.renderer.info.render.calls);
+    data.geometries = String(this.renderer.info.memory.geometries);
     data.look = this.camera.position.toArray().map((x) => x.toFixed(3)).join(" ");
     data.drawn = String(Number(data.drawn ?? 0) + 1);
   }
