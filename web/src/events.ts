@@ -44,7 +44,7 @@ export class EventList {
   }
   private row(e: SessionEvent): HTMLElement {
     const row = document.createElement("li"), button = document.createElement("button"), frame = document.createElement("b");
-    frame.textContent = String(e.frame + 1);
+    frame.textContent = String(e.frame);
     button.className = e.kind;
     // Explanations begin with the kind's name.
     const words = e.text.startsWith(e.kind) || e.kind === "note" ? e.text : `${e.kind.replace("_", " ")}${e.text ? ": " + e.text : ""}`;

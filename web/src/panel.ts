@@ -214,7 +214,8 @@ export class Panel {
     if (s.ended) this.badge("ended", "ended");
     else if (s.paused) this.badge("paused", "paused");
     else this.badge(s.state, s.state);
-    this.at("count").textContent = `frame ${s.frame + 1} of ${s.frames}`;
+    // From 0, as in debug.log, report.html and /api/state.
+    this.at("count").textContent = s.frame < 0 ? "no frame yet" : `frame ${s.frame} of ${s.frames}`;
     this.at<HTMLProgressElement>("progress").value = (s.frame + 1) / Math.max(1, s.frames);
     this.tell("tracking", `${s.tracking_ms.toFixed(1)} ms`);
     this.tell("inliers", String(s.inliers));
