@@ -56,20 +56,7 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
 void add_walkers(Scene* scene, WalkArea area, int count, double duration, const SceneRequest& request);
 void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed);
 
-// A scene from a YAML file. Lengths in metres, angles in degrees, times in seconds; the room is centred on the origin,
-// z is up, yaw turns a thing's front from +y towards -x. Only `path` is required:
-//   frames: 300                 # at 30 Hz; --frames wins
-//   people: 2                   # walkers; --people wins
-//   exposure_ms: 14             # 1 ... 30
-//   tremor: 1                   # of the hand that holds the camera; 0 = none
-//   room: {size: [6, 5], height: 2.6, floor: planks | carpet | plaster | wood, furnished: true}
-//   path:                       # one entry: the camera stands still
-//     - {time: 0, position: [0, -1.5, 1.4], look_at: [0, 1, 0.8]}
-//   objects:
-//     - {kind: desk | shelf | cabinet | chair | plant | cartons, position: [0, 1], yaw: 180}   # back edge's middle
-//     - {kind: box | ellipsoid, position: [1, 0, 0.5], size: [0.4, 0.3, 1], yaw: 20, material: carton}   # centre
-//   movers:
-//     - {class: person | chair, waypoints: [{time: 0, position: [-2, 0]}, {time: 4, position: [2, 0]}]}
+// A scene from a YAML file; docs/files.md has the format.
 // Throws InputError with file:line: unknown (misspelt), repeated, missing or ill-typed key, value out of range, not
 // YAML.
 Scene read_scene_file(const std::string& file, const SceneRequest& request);
