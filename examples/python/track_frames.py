@@ -26,8 +26,10 @@ def main(folder: str) -> int:
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("error: usage: track_frames.py FOLDER")
+        print("error: usage: track_frames.py FOLDER", file=sys.stderr)
+        sys.exit(2)
     try:
         sys.exit(main(sys.argv[1]))
     except dkb_slam.InputError as error:
-        sys.exit(f"error: {error}")
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
