@@ -63,8 +63,26 @@ double tick_step(double length) {
   return power;
 }
 
+std::vector<double> ticks(const Range& range, double step) {
+  constexpr int kMost = 20;
+  const double first = std::ceil(range.low / step - 1e-9);
+  std::vector<double> out;
+  for (int i = 0; i < kMost; ++i) {
+    const double value = (first + i) * step;
+    if (!(value <= range.high + 1e-9 * step)) break;  // also what is no number
+    if (out.empty() || value > out.back()) out.push_back(value);
+  }
+  return out;
+}
+
 std::string tick_text(double value, double step) {
-  return fmt::format("{:.{}f}", std::abs(value) < 1e-9 * step ? 0.0 : value, decimals_of(step));
+  constexpr size_t kLongest = 8;  // [characters] that stay beside the axis' name
+  if (std::abs(value) < 1e-9 * step) value = 0;
+  std::string text = fmt::format("{:.{}f}", value, decimals_of(step));
+  if (text.size() <= kLongest) return text;
+  if (value == 0) return "0";
+  const int digits = static_cast<int>(std::floor(std::log10(std::abs(value))) - std::floor(std::log10(step) + 1e-9));
+  return fmt::format("{:.{}e}", value, std::clamp(digits, 0, 2));
 }
 
 std::string Panel::frame() const {
@@ -76,10 +94,10 @@ std::string Panel::frame() const {
 std::string Panel::y_axis(const std::string& y_name) const {
   std::string out;
   const double step = tick_step(y_.length());
-  for (double k = std::ceil(y_.low / step - 1e-9); k * step <= y_.high + 1e-9 * step; ++k) {
-    const double at = py(k * step);
+  for (const double value : ticks(y_, step)) {
+    const double at = py(value);
     out += line(left_, at, left_ + width_, at);
-    out += label(left_ - 6, at + 4, "end", 11, kInk, tick_text(k * step, step));
+    out += label(left_ - 6, at + 4, "end", 11, kInk, tick_text(value, step));
   }
   const double x = left_ - 52, y = top_ + height_ / 2;
   out += label(x, y, "middle", 12, kInk, y_name, fmt::format(" transform=\"rotate(-90 {:.1f} {:.1f})\"", x, y).c_str());
@@ -89,10 +107,10 @@ std::string Panel::y_axis(const std::string& y_name) const {
 std::string Panel::axes(const std::string& x_name, const std::string& y_name) const {
   std::string out;
   const double step = tick_step(x_.length());
-  for (double k = std::ceil(x_.low / step - 1e-9); k * step <= x_.high + 1e-9 * step; ++k) {
-    const double at = px(k * step);
+  for (const double value : ticks(x_, step)) {
+    const double at = px(value);
     out += line(at, top_, at, top_ + height_);
-    out += label(at, top_ + height_ + 16, "middle", 11, kInk, tick_text(k * step, step));
+    out += label(at, top_ + height_ + 16, "middle", 11, kInk, tick_text(value, step));
   }
   out += y_axis(y_name);
   return out + label(left_ + width_ / 2, top_ + height_ + 34, "middle", 12, kInk, x_name);
@@ -139,6 +157,8 @@ std::vector<size_t> stretches(const std::vector<double>& timestamps) {
 void frame_equally(double width, double height, Range* x, Range* y) {
   double metres_per_px = 1.12 * std::max(x->length() / width, y->length() / height);
   if (metres_per_px < 1e-12) metres_per_px = 1.0 / width;
+  const double size = std::max({std::abs(x->low), std::abs(x->high), std::abs(y->low), std::abs(y->high)});
+  metres_per_px = std::max(metres_per_px, 1e-12 * size);
   *x = {x->middle() - 0.5 * metres_per_px * width, x->middle() + 0.5 * metres_per_px * width};
   *y = {y->middle() - 0.5 * metres_per_px * height, y->middle() + 0.5 * metres_per_px * height};
 }

@@ -28,12 +28,15 @@ struct Range {
 };
 Range range_of(const std::vector<double>& values);  // of at least one value
 
-// Widens both ranges about their middles to one scale on a panel of that size, so that shapes are true.
+// Widens both ranges about their middles to one scale on a panel of that size, so that shapes are true. A point is
+// widened to a metre, and nothing below what doubles of its size can tell apart.
 void frame_equally(double width, double height, Range* x, Range* y);
 
 // The largest of 1, 2 and 5 times a power of ten that cuts `length` > 0 into at least three pieces.
 double tick_step(double length);
-// `value` with as many decimals as ticks `step` apart need.
+// Multiples of `step` in the range, rising: at most 20, none where doubles are too coarse to tell them apart.
+std::vector<double> ticks(const Range& range, double step);
+// `value` with as many decimals as ticks `step` apart need, as a power of ten where that is too long for an axis.
 std::string tick_text(double value, double step);
 
 // One diagram: maps values to a rectangle and draws grid, axes and lines.
