@@ -103,7 +103,8 @@ def evaluate(truth: TrajectoryLike, estimate: TrajectoryLike, *, max_diff: float
     "N" and f, m or s: stretch of the relative error in frames, metres or seconds. scale: align by a similarity.
 
     Keys: matched, ape.translation_m.{rmse, mean, median, std, min, max}, ape.rotation_deg, and rpe likewise, defined as
-    in evo. Raises InputError when a file is wrong or fewer than two stamps match.
+    in evo. ape.rotation_determined is false, and ape.rotation_deg None, where a path on a line or in one place leaves
+    the rotation of the alignment free. Raises InputError when a file is wrong or fewer than two stamps match.
     """
     return json.loads(_core._evaluate_json(_trajectory(truth), _trajectory(estimate), max_diff, rpe_delta, scale))
 

@@ -8,8 +8,9 @@
 namespace dkb {
 namespace {
 
-std::string table_row(const char* name, const char* unit, const ErrorStatistics& s, int decimals) {
-  if (s.count == 0) return fmt::format("{:<17}{:>4}   no pair of poses is that far apart\n", name, unit);
+std::string table_row(const char* name, const char* unit, const ErrorStatistics& s, int decimals,
+                      const char* why_none = "no pair of poses is that far apart") {
+  if (s.count == 0) return fmt::format("{:<17}{:>4}   {}\n", name, unit, why_none);
   return fmt::format("{:<17}{:>4} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f} {:>10.{}f}\n", name, unit,
                      s.rmse, decimals, s.mean, decimals, s.median, decimals, s.std, decimals, s.min, decimals, s.max,
                      decimals);
@@ -36,7 +37,8 @@ std::string evaluation_table(const Evaluation& e) {
   out += fmt::format("{:<21} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median", "std", "min",
                      "max");
   out += table_row("APE translation", "m", e.ape.translation, 6);
-  out += table_row("APE rotation", "deg", e.ape.rotation, 4);
+  out += table_row("APE rotation", "deg", e.ape.rotation, 4,
+                   "not determined: a path lies on a line or in one place, which can be turned about itself");
   const std::string rpe = "RPE " + to_string(e.options.rpe_delta);
   out += table_row((rpe + " transl.").c_str(), "m", e.rpe.translation, 6);
   out += table_row((rpe + " rotation").c_str(), "deg", e.rpe.rotation, 4);
@@ -49,6 +51,7 @@ std::string evaluation_json(const Evaluation& e) {
   json["estimated"] = e.estimated_poses;
   json["scale"] = e.truth_from_estimate.scale;
   json["ape"] = errors_json(e.ape);
+  json["ape"]["rotation_determined"] = e.rotation_determined;
   json["rpe"] = errors_json(e.rpe);
   json["rpe"]["delta"] = to_string(e.options.rpe_delta);
   json["rpe"]["pairs"] = e.rpe_pairs.size();

@@ -12,7 +12,8 @@ std::string evaluation_table(const Evaluation& evaluation);
 
 // The evaluation as JSON: matched, estimated, scale, ape.translation_m.{rmse, mean, median, std, min, max},
 // ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs. Numbers of an empty
-// set are null.
+// set are null. ape.rotation_determined is false, and ape.rotation_deg null, where positions do not determine the
+// alignment's rotation.
 std::string evaluation_json(const Evaluation& evaluation);
 
 struct PlotNames {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dkb/evaluation/svg_drawing.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -49,6 +50,38 @@ TEST(EvaluationReport, WhatCouldNotBeMeasuredIsNull) {
   EXPECT_TRUE(json["rpe"]["translation_m"]["rmse"].is_null());
   EXPECT_NE(evaluation_table(e).find("no pair of poses is that far apart"), std::string::npos);
   EXPECT_NE(evaluation_svg(e).find("RPE (1000m) no pair of poses is that far apart"), std::string::npos);
+}
+
+TEST(EvaluationReport, ARotationErrorThatIsNotDeterminedIsToldSo) {
+  Trajectory line;
+  for (int i = 0; i < 31; ++i) line.push_back({0.1 * i, "", Rigid3({1, 0, 0, 0}, {0.1 * i, 0, 0})});
+  const Evaluation e = evaluate(line, line);
+  const auto json = nlohmann::json::parse(evaluation_json(e));
+  EXPECT_EQ(json["ape"]["rotation_determined"], false);
+  EXPECT_TRUE(json["ape"]["rotation_deg"]["rmse"].is_null());
+  EXPECT_TRUE(json["ape"]["translation_m"]["rmse"].is_number());
+  EXPECT_NE(evaluation_table(e).find("APE rotation      deg   not determined"), std::string::npos);
+  EXPECT_NE(evaluation_svg(e).find("rotation not determined"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(evaluation_json(example()))["ape"]["rotation_determined"]);
+}
+
+TEST(EvaluationReport, TicksEndAlsoWhereDoublesAreTooCoarse) {
+  EXPECT_EQ(svg::ticks({-0.1, 0.45}, 0.2), (std::vector<double>{0, 0.2, 0.4}));
+  EXPECT_LE(svg::ticks({1e17, 1e17 + 64}, 1).size(), 20u);
+  EXPECT_TRUE(svg::ticks({0, std::nan("")}, 1).empty());
+  EXPECT_TRUE(svg::ticks({0, 1}, 0).empty());
+  Trajectory far;
+  for (int i = 0; i < 31; ++i) far.push_back({0.1 * i, "", Rigid3({1, 0, 0, 0}, {1e17, 0, i % 2 * 0.0})});
+  EXPECT_LT(evaluation_svg(evaluate(far, far)).size(), 20000u);
+}
+
+TEST(EvaluationReport, TickTextsStayBesideTheirAxis) {
+  EXPECT_EQ(svg::tick_text(0.3, 0.1), "0.3");
+  EXPECT_EQ(svg::tick_text(-12.25, 0.05), "-12.25");
+  EXPECT_EQ(svg::tick_text(2e-10, 1e-10), "2e-10");
+  EXPECT_EQ(svg::tick_text(1.5e-10, 5e-11), "1.5e-10");
+  EXPECT_EQ(svg::tick_text(0, 1e-10), "0");
+  EXPECT_EQ(svg::tick_text(1e17, 2e4), "1.00e+17");
 }
 
 TEST(EvaluationReport, TableNamesApeAndUnits) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -54,6 +55,25 @@ std::vector<std::pair<size_t, size_t>> relative_pairs(const Evaluation& e) {
   std::vector<std::pair<size_t, size_t>> pairs;
   for (size_t i = 1; i < cuts.size(); ++i) pairs.emplace_back(cuts[i - 1], cuts[i]);
   return pairs;
+}
+
+// Standard deviations of points along their two widest directions, [m].
+Eigen::Vector2d spreads(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter / static_cast<double>(points.size()),
+                                                              Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().tail<2>().reverse().cwiseMax(0).cwiseSqrt();
+}
+
+// Whether positions determine the rotation that aligns them: both paths leave a line by more than files round, a share
+// of its length and, for the truth, which is in metres, a length.
+bool determines_rotation(const std::vector<Eigen::Vector3d>& estimate, const std::vector<Eigen::Vector3d>& truth) {
+  constexpr double kLeastShare = 1e-4, kLeast = 1e-4;  // [m]
+  const Eigen::Vector2d e = spreads(estimate), t = spreads(truth);
+  return t[1] > kLeast && t[1] > kLeastShare * t[0] && e[1] > kLeastShare * e[0];
 }
 
 void add_statistics(PoseErrors* errors) {
@@ -144,13 +164,14 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
   }
 
   e.truth_from_estimate = align_umeyama(from, to, options.with_scale);
+  e.rotation_determined = determines_rotation(from, to);
   const Similarity3& s = e.truth_from_estimate;
   for (const auto& [i, j] : matches) {
     const Rigid3 &t = truth[i].world_from_cam, &x = estimate[j].world_from_cam;
     e.truth.push_back(t);
     e.estimate.emplace_back((s.motion.rotation * x.rotation).normalized(), s * x.translation);
     e.ape.translation_m.push_back((e.estimate.back().translation - t.translation).norm());
-    e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
+    if (e.rotation_determined) e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
   }
   add_statistics(&e.ape);
 
@@ -167,6 +188,12 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
 }
 
 Trajectory read_poses(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    const bool sequence = std::filesystem::exists(path / "groundtruth.txt", error);
+    throw InputError(path.string() + ": is a folder; give the trajectory in it, as " +
+                     (path / (sequence ? "groundtruth.txt" : "trajectory.txt")).string());
+  }
   Trajectory trajectory = read_trajectory(path);
   if (trajectory.empty()) throw InputError(path.string() + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
   return trajectory;

@@ -40,16 +40,19 @@ ErrorStatistics error_statistics(const std::vector<double>& errors);
 
 struct PoseErrors {
   std::vector<double> translation_m;
-  std::vector<double> rotation_deg;  // angle of the relative rotation, 0 ... 180
+  std::vector<double> rotation_deg;  // angle of the relative rotation, 0 ... 180; none where it is not determined
   ErrorStatistics translation, rotation;
 };
 
 struct Evaluation {
   EvaluationOptions options;
-  size_t truth_poses = 0, estimated_poses = 0;       // in the files
-  std::vector<double> timestamps;                    // [s] of the matched estimates
-  std::vector<Rigid3> truth, estimate;               // matched, world_from_cam, the estimate aligned to the truth
-  Similarity3 truth_from_estimate;                   // the alignment
+  size_t truth_poses = 0, estimated_poses = 0;  // in the files
+  std::vector<double> timestamps;               // [s] of the matched estimates
+  std::vector<Rigid3> truth, estimate;          // matched, world_from_cam, the estimate aligned to the truth
+  Similarity3 truth_from_estimate;              // the alignment
+  // False where either path lies on a line or in one place: any turn about that aligns as well, and a rotation error
+  // (ape.rotation_deg, which is empty) would be one of the turn that happened to be taken.
+  bool rotation_determined = true;
   PoseErrors ape;                                    // per matched pose
   PoseErrors rpe;                                    // per pair of poses
   std::vector<std::pair<size_t, size_t>> rpe_pairs;  // indices of matched poses

@@ -2,10 +2,12 @@
 #include "dkb/evaluation/trajectory_error.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <numbers>
 
 #include "dkb/util/errors.h"
@@ -38,6 +40,45 @@ Trajectory random_walk(int n, uint64_t seed) {
     t.push_back(pose(100 + 0.1 * i, position, rotation));
   }
   return t;
+}
+
+TEST(Evaluate, APathOnALineOrInOnePlaceTellsNoRotationError) {
+  // Its own copy: any turn about the line aligns it, so no figure may depend on which was taken.
+  const auto line = [](const Eigen::Vector3d& step, double wiggle) {
+    Trajectory t;
+    for (int i = 0; i < 31; ++i) t.push_back(pose(0.1 * i, i * step + Eigen::Vector3d(0, 0, i % 2 == 0 ? wiggle : 0)));
+    return t;
+  };
+  for (const Eigen::Vector3d& step : {Eigen::Vector3d(0.1, 0.05, 0.02), Eigen::Vector3d(0, 0, 0)}) {
+    const Evaluation e = evaluate(line(step, 0), line(step, 0));
+    EXPECT_FALSE(e.rotation_determined);
+    EXPECT_EQ(e.ape.rotation.count, 0u);
+    EXPECT_EQ(e.ape.translation.count, 31u);
+    EXPECT_EQ(e.rpe.rotation.count, 30u) << "relative errors need no alignment";
+    EXPECT_LT(e.ape.translation.max, 1e-9);
+  }
+  // A walk of 3 m that sways by a centimetre, and one that sways less than files round.
+  EXPECT_TRUE(evaluate(line({0.1, 0, 0}, 0.01), line({0.1, 0, 0}, 0.01)).rotation_determined);
+  EXPECT_FALSE(evaluate(line({0.1, 0, 0}, 1e-5), line({0.1, 0, 0}, 1e-5)).rotation_determined);
+  EXPECT_FALSE(evaluate(line({0.1, 0, 0}, 0.01), line({0.1, 0, 0}, 0)).rotation_determined);
+}
+
+TEST(ReadPoses, NamesTheTrajectoryInAFolder) {
+  const fs::path folder = fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_read_poses");
+  fs::create_directories(folder);
+  const auto message = [&] {
+    try {
+      read_poses(folder);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message(),
+            folder.string() + ": is a folder; give the trajectory in it, as " + (folder / "trajectory.txt").string());
+  std::ofstream(folder / "groundtruth.txt") << "\n";
+  EXPECT_NE(message().find((folder / "groundtruth.txt").string()), std::string::npos);
+  fs::remove_all(folder);
 }
 
 TEST(ErrorStatistics, AreThoseOfThePopulation) {

@@ -75,9 +75,10 @@ std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
   const std::string rpe = e.rpe.translation.count == 0
                               ? "no pair of poses is that far apart"
                               : fmt::format("{:.4f} m, {:.3f} deg rmse", e.rpe.translation.rmse, e.rpe.rotation.rmse);
-  out +=
-      heading(names.title, fmt::format("APE {:.4f} m, {:.3f} deg rmse; RPE ({}) {}; {} poses", e.ape.translation.rmse,
-                                       e.ape.rotation.rmse, to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
+  const std::string turned =
+      e.rotation_determined ? fmt::format("{:.3f} deg rmse", e.ape.rotation.rmse) : "rotation not determined";
+  out += heading(names.title, fmt::format("APE {:.4f} m, {}; RPE ({}) {}; {} poses", e.ape.translation.rmse, turned,
+                                          to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
   double legend = 70;
   for (const auto& [colour, name] : {std::pair{kTruth, names.truth}, std::pair{kEstimate, names.estimate}}) {
     out += fmt::format("<line x1=\"{:.1f}\" y1=\"76\" x2=\"{:.1f}\" y2=\"76\" stroke=\"{}\" stroke-width=\"3\"/>\n",
