@@ -11,8 +11,8 @@
 #include "bench/bench_plots.h"
 #include "bench/text_table.h"
 #include "dkb/dataset/trajectory_file.h"
-#include "dkb/util/files.h"
 #include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/files.h"
 
 namespace dkb::bench {
 namespace {
@@ -150,7 +150,8 @@ Section details(const Results& r) {
       return c.values([&](const RunRecord& run) { return std::optional<double>(get(run)); });
     };
     const auto rotation = c.values([](const RunRecord& run) {
-      return run.ape ? std::optional<double>(run.ape->rotation_deg.rmse) : std::nullopt;
+      const bool known = run.ape && run.ape->rotation_deg.count > 0;
+      return known ? std::optional<double>(run.ape->rotation_deg.rmse) : std::nullopt;
     });
     const auto online = c.values(
         [](const RunRecord& run) { return run.online_m ? std::optional<double>(run.online_m->rmse) : std::nullopt; });
@@ -288,9 +289,9 @@ std::string html(const std::string& title, const std::vector<std::string>& head,
       svg::escaped(title) +
       "</title>\n<style>\nbody{font:15px/1.5 Helvetica,Arial,sans-serif;color:#24292f;max-width:1280px;margin:2em "
       "auto;padding:0 1em}\ntable{border-collapse:collapse;margin:1em "
-      "0;display:block;overflow-x:auto}\nth,td{border:1px "
+      "0;display:block;overflow-x:auto;font-size:13px}\nth,td{border:1px "
       "solid #d0d7de;padding:4px "
-      "9px;text-align:left;white-space:nowrap}\nth{background:#f6f8fa}\n.n{text-align:right}\n"
+      "7px;text-align:left;white-space:nowrap}\nth{background:#f6f8fa;white-space:normal;vertical-align:bottom}\n.n{text-align:right}\n"
       "svg{max-width:100%;height:auto}\n</style>\n</head>\n<body>\n<h1>" +
       svg::escaped(title) + "</h1>\n";
   for (const std::string& p : head) out += "<p>" + svg::escaped(p) + "</p>\n";

@@ -114,7 +114,9 @@ std::string time_chart(const TimeChart& chart, double duration, const std::vecto
     const double y = panel.py(level.value);
     out += fmt::format("<line class=\"level\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", kLeft, y,
                        kLeft + kPanel, y);
-    out += svg::label(kLeft + kPanel - 4, y - 5, "end", 11, svg::kInk, level.name, " class=\"halo\"");
+    // Below the line where the frame's edge would go through it.
+    const double text = y - kTop > 18 ? y - 5 : y + 14;
+    out += svg::label(kLeft + kPanel - 4, text, "end", 11, svg::kInk, level.name, " class=\"halo\"");
   }
   return out + "</svg>\n";
 }
@@ -127,8 +129,8 @@ std::string keyframe_chart(const std::vector<KeyframeTicks>& rules, double durat
   const svg::Panel panel(kLeft, kTop, kPanel, height, {0, duration}, {0, 1});
   out += bands_svg(bands, panel, kTop, height);
   const double step = svg::tick_step(duration);
-  for (double k = 0; k * step <= duration + 1e-9; ++k)
-    out += svg::label(panel.px(k * step), kTop + height + 16, "middle", 11, svg::kInk, svg::tick_text(k * step, step));
+  for (const double t : svg::ticks({0, duration}, step))
+    out += svg::label(panel.px(t), kTop + height + 16, "middle", 11, svg::kInk, svg::tick_text(t, step));
   out += svg::label(kLeft + kPanel / 2, kTop + height + 34, "middle", 12, svg::kInk, "time [s]");
   for (size_t i = 0; i < rules.size(); ++i) {
     const double top = kTop + kRow * static_cast<double>(i);
@@ -279,8 +281,12 @@ std::vector<SpacePath> floor_below(const std::vector<SpacePath>& paths, double* 
     grid.points.emplace_back(ax, ay, level);
     grid.points.emplace_back(bx, by, level);
   };
-  for (double x = first.x(); x < last.x() + 0.5 * *step; x += *step) add(x, first.y(), x, last.y());
-  for (double y = first.y(); y < last.y() + 0.5 * *step; y += *step) add(first.x(), y, last.x(), y);
+  // Counted: far from the origin a step may be too small to lead on.
+  const Eigen::Array2d lines = ((last - first) / *step).round().min(20);
+  for (int k = 0; k <= static_cast<int>(lines.x()); ++k)
+    add(first.x() + k * *step, first.y(), first.x() + k * *step, last.y());
+  for (int k = 0; k <= static_cast<int>(lines.y()); ++k)
+    add(first.x(), first.y() + k * *step, last.x(), first.y() + k * *step);
   SpacePath shadow = paths.back();
   shadow.style = "shadow";
   for (Eigen::Vector3d& p : shadow.points) p.z() = level;

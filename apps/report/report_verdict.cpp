@@ -103,10 +103,14 @@ std::string verdict(const Context& c) {
   std::string out = "<header>\n<div class=\"dim\">Report of a run · dkb-slam " + svg::escaped(c.facts.version) +
                     "</div>\n<h1>" + headline(c) + "</h1>\n<div class=\"dim\">" +
                     svg::escaped(c.facts.name + ": " + c.facts.source) + "</div>\n<nav>";
-  for (const auto& [id, name] : {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"time", "Over time"},
-                                 std::pair{"tracking", "Tracking"}, std::pair{"pictures", "Pictures"},
-                                 std::pair{"stages", "Times"}, std::pair{"settings", "Settings"}})
-    if (!c.log.rows().empty() || std::string(id) == "settings") out += fmt::format("<a href=\"#{}\">{}</a> ", id, name);
+  for (const auto& [id, name] :
+       {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"time", "Over time"},
+        std::pair{"tracking", "Tracking"}, std::pair{"pictures", "Pictures"}, std::pair{"stages", "Times"},
+        std::pair{"events", "Events"}, std::pair{"settings", "Settings"}}) {
+    const bool there = std::string(id) == "settings" ||
+                       (std::string(id) == "events" ? !c.log.happenings().empty() : !c.log.rows().empty());
+    if (there) out += fmt::format("<a href=\"#{}\">{}</a> ", id, name);
+  }
   out += "</nav>\n</header>\n<main>\n<div class=\"tiles\">\n";
   std::string more = fmt::format("{:.1f} %", c.facts.offered > 0 ? 100.0 * s.tracked / c.facts.offered : 0.0);
   if (c.facts.skipped > 0) more += "; " + plural(c.facts.skipped, "frame", "frames") + " skipped";
@@ -122,7 +126,8 @@ std::string verdict(const Context& c) {
   if (c.truth.evaluation) {
     const PoseErrors& ape = c.truth.evaluation->ape;
     out += tile(" good", "APE, rmse", fmt::format("<span id=\"ape\">{:.4f}</span> m", ape.translation.rmse),
-                fmt::format("{:.2f}° · median {:.4f} m, largest {:.4f} m · {} poses", ape.rotation.rmse,
+                fmt::format("{}median {:.4f} m, largest {:.4f} m · {} poses",
+                            c.truth.evaluation->rotation_determined ? fmt::format("{:.2f}° · ", ape.rotation.rmse) : "",
                             ape.translation.median, ape.translation.max, ape.translation.count));
   }
   if (!c.log.rows().empty()) out += speed_tile(c);

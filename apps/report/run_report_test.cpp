@@ -84,6 +84,32 @@ TEST(RunReport, SizeHardlyGrowsWithTheFrames) {
   }
 }
 
+TEST(RunReport, NavigationLeadsToTheEvents) {
+  LongRun run(300, 100);
+  EXPECT_EQ(report_html(run.log, run.facts, run.truth).find("<a href=\"#events\">"), std::string::npos)
+      << "there are none";
+  run.log.event({Event::Kind::lost, 99, int64_t{4'266'666'634}, 0, "too few points"});
+  const std::string html = report_html(run.log, run.facts, run.truth);
+  EXPECT_NE(html.find("<a href=\"#events\">Events</a>"), std::string::npos);
+  EXPECT_NE(html.find("<h2 id=\"events\">"), std::string::npos);
+}
+
+TEST(TimeChart, ALevelAtTheTopIsNamedBelowItsLine) {
+  TimeChart chart{"", "[ms]", {{"est", "tracking", {0, 1}, {5, 6}, {0, 1}}}, true, {{33.3, "the level"}}};
+  const std::string svg = time_chart(chart, 1, {});
+  double line = 0, text = 0;
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find("y1=", svg.find("class=\"level\"")), "y1=\"%lf", &line), 1);
+  const size_t label = svg.rfind("<text", svg.find("the level"));
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find(" y=", label), " y=\"%lf", &text), 1);
+  EXPECT_GT(text, line + 10);
+}
+
+TEST(PathViews, EndAlsoFarFromTheOrigin) {
+  SpacePath path{"est", "estimate", {}};
+  for (int i = 0; i < 31; ++i) path.points.emplace_back(1e17, 0, 0);
+  for (const std::string& view : path_views({path}, {1, true})) EXPECT_LT(view.size(), 20000u);
+}
+
 TEST(RunLog, KeepsPicturesSpreadOverTheRun) {
   const LongRun run(1000, 500);
   const auto& even = run.log.even();
