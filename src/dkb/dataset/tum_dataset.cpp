@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <queue>
+#include <tuple>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -100,25 +103,49 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
 
 std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
                                                  const AssociationOptions& options) {
+  // The nearest free pair is one of neighbours in time: whatever lay between the two would be nearer to one of them. So
+  // only neighbours are candidates, and taking a pair out makes at most one new pair of neighbours.
   struct Candidate {
     double difference;
-    size_t i, j;
+    size_t i, j;         // of a, of b
+    size_t left, right;  // their places in `all`
+    bool operator>(const Candidate& other) const {
+      return std::tie(difference, i, j) > std::tie(other.difference, other.i, other.j);
+    }
   };
-  const double limit = options.max_difference + kStampRounding;
-  std::vector<Candidate> candidates;
-  for (size_t i = 0, first = 0; i < a.size(); ++i) {  // both rise, so the window of near stamps only moves forward
-    while (first < b.size() && b[first] < a[i] - limit) ++first;
-    for (size_t j = first; j < b.size() && b[j] <= a[i] + limit; ++j)
-      candidates.push_back({std::abs(a[i] - b[j]), i, j});
+  struct Stamp {
+    bool of_b;
+    size_t index;
+    size_t before, after;  // neighbours that are free; 0 and the last place are ends
+    bool taken = false;
+  };
+  std::vector<Stamp> all{{false, 0, 0, 1}};
+  all.reserve(a.size() + b.size() + 2);
+  for (size_t i = 0, j = 0; i < a.size() || j < b.size();) {
+    const bool of_b = i == a.size() || (j < b.size() && b[j] < a[i]);
+    all.push_back({of_b, of_b ? j++ : i++, all.size() - 1, all.size() + 1});
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& x, const Candidate& y) { return x.difference < y.difference; });
-  std::vector<bool> a_used(a.size()), b_used(b.size());
+  const size_t end = all.size();
+  all.push_back({false, 0, end - 1, end});
+
+  const double limit = options.max_difference + kStampRounding;
+  std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> nearest;
+  const auto offer = [&](size_t left, size_t right) {
+    if (left == 0 || right == end || all[left].of_b == all[right].of_b) return;
+    const size_t i = all[all[left].of_b ? right : left].index, j = all[all[left].of_b ? left : right].index;
+    if (b[j] >= a[i] - limit && b[j] <= a[i] + limit) nearest.push({std::abs(a[i] - b[j]), i, j, left, right});
+  };
+  for (size_t k = 1; k + 1 < end; ++k) offer(k, k + 1);
   std::vector<std::pair<size_t, size_t>> result;
-  for (const Candidate& c : candidates) {
-    if (a_used[c.i] || b_used[c.j]) continue;
-    a_used[c.i] = b_used[c.j] = true;
+  while (!nearest.empty()) {
+    const Candidate c = nearest.top();
+    nearest.pop();
+    if (all[c.left].taken || all[c.right].taken) continue;
+    all[c.left].taken = all[c.right].taken = true;
     result.emplace_back(c.i, c.j);
+    const size_t before = all[c.left].before, after = all[c.right].after;
+    all[before].after = after, all[after].before = before;
+    offer(before, after);
   }
   std::sort(result.begin(), result.end());
   return result;
@@ -134,7 +161,9 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   std::error_code ec;
   if (!fs::exists(folder, ec)) throw InputError(folder.string() + ": no such folder");
   if (!fs::is_directory(folder, ec))
-    throw InputError(folder.string() + ": is not a folder; give the folder that holds associations.txt or rgb.txt");
+    throw InputError(folder.string() +
+                     ": is not a folder; give the folder that holds associations.txt or rgb.txt (docs/sources.md names "
+                     "the recordings and the other layouts that can be read)");
 
   TumDataset dataset;
   dataset.folder = folder;

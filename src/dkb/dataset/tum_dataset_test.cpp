@@ -9,6 +9,7 @@
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
@@ -119,6 +120,49 @@ TEST(Associate, EqualsTheExhaustiveSearch) {
     std::sort(expected.begin(), expected.end());
     EXPECT_EQ(associate(a, b, {}), expected);
   }
+}
+
+// All pairs that are near enough, the nearest first: what associate() means, at the cost of listing them.
+Pairs listed(const std::vector<double>& a, const std::vector<double>& b, double limit) {
+  std::vector<std::tuple<double, size_t, size_t>> all;
+  for (size_t i = 0; i < a.size(); ++i)
+    for (size_t j = 0; j < b.size(); ++j)
+      if (b[j] >= a[i] - limit && b[j] <= a[i] + limit) all.emplace_back(std::abs(a[i] - b[j]), i, j);
+  std::sort(all.begin(), all.end());
+  std::vector<bool> a_used(a.size()), b_used(b.size());
+  Pairs pairs;
+  for (const auto& [difference, i, j] : all) {
+    if (a_used[i] || b_used[j]) continue;
+    a_used[i] = b_used[j] = true;
+    pairs.emplace_back(i, j);
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+TEST(Associate, TakesOfEquallyNearAndOfDensePairsWhatListingThemAllTakes) {
+  Random random(11);
+  for (int trial = 0; trial < 300; ++trial) {
+    // Whole milliseconds, so that many are equally near; from some 40 a frame to gaps of several frames.
+    const double step = trial % 3 == 0 ? 0.001 : 0.03;
+    std::vector<double> a, b;
+    for (std::vector<double>* list : {&a, &b}) {
+      double t = 1700000000;
+      for (int i = 0; i < 20 + trial % 40; ++i)
+        list->push_back(t += 0.001 * std::ceil(1000 * random.uniform(1e-4, 2 * step)));
+    }
+    const double limit = trial % 2 == 0 ? 0.02 : 0.005;
+    EXPECT_EQ(associate(a, b, {limit}), listed(a, b, limit + kStampRounding)) << trial;
+  }
+}
+
+TEST(Associate, DenseListsTakeNoMoreMemoryThanTheirLength) {
+  // 40,000 stamps a microsecond apart: 800 million pairs are near enough.
+  std::vector<double> a, b;
+  for (int i = 0; i < 40000; ++i) a.push_back(1e-6 * i), b.push_back(1e-6 * i + 2.5e-7);
+  const Pairs pairs = associate(a, b, {});
+  ASSERT_EQ(pairs.size(), a.size());
+  for (size_t i = 0; i < pairs.size(); ++i) ASSERT_EQ(pairs[i], std::pair(i, i));
 }
 
 TumDataset ten_pairs() {
