@@ -30,12 +30,19 @@ Compression default_compression(const std::filesystem::path& out) {
   return Compression::none;
 }
 
+// Of an option; compression_named() words it for what is read.
+Compression compression_chosen(const std::string& name) {
+  for (const char* known : {"none", "lz4", "bz2", "zstd"})
+    if (name == known) return compression_named(name);
+  throw InputError("there is no \"" + name + "\"; give none, lz4, bz2 (bag) or zstd (mcap)");
+}
+
 void run_convert(const ConvertArguments& arguments) {
   ConvertOptions options = arguments.options;
   options.warn = [](const std::string& line) { std::fprintf(stderr, "warning: %s\n", line.c_str()); };
   try {
     options.compression =
-        arguments.compression.empty() ? default_compression(arguments.out) : compression_named(arguments.compression);
+        arguments.compression.empty() ? default_compression(arguments.out) : compression_chosen(arguments.compression);
   } catch (const InputError& e) {
     throw InputError(std::string("--compression: ") + e.what());
   }
@@ -47,8 +54,11 @@ void run_convert(const ConvertArguments& arguments) {
 
 void register_convert(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<ConvertArguments>();
-  CLI::App* command = app.add_subcommand("convert", "Turn folders and recordings into each other, without loss");
-  command->add_option("input", arguments->in, "folder in TUM layout, .bag, .mcap, .db3 or the folder of a rosbag2")
+  CLI::App* command =
+      app.add_subcommand("convert", "Turn folders and recordings into each other: images and camera, without loss");
+  command
+      ->add_option("input", arguments->in,
+                   "folder of any layout that `run` takes, .bag, .mcap, .db3 or the folder of a rosbag2")
       ->required();
   command->add_option("--out", arguments->out, "FILE.bag, FILE.mcap, or a new folder")->required();
   SourceOptions& source = arguments->options.source;

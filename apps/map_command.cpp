@@ -24,8 +24,7 @@ namespace {
 
 // One `key: value` per line, so that people and scripts read the same.
 void print_info(const std::string& path) {
-  const std::string bytes = read_file(path);
-  const MapFile file = decode_map(bytes, path);
+  const MapFile file = load_map(path);
   const Map& map = file.map;
   size_t features = 0, observations = 0;
   double first_stamp = 0, last_stamp = 0;
@@ -48,7 +47,7 @@ void print_info(const std::string& path) {
   const CameraModel& c = file.context.camera;
   fmt::print("file: {}\n", path);
   fmt::print("checksums: right\n");
-  fmt::print("bytes: {}\n", bytes.size());
+  fmt::print("bytes: {}\n", std::filesystem::file_size(path));
   fmt::print("keyframes: {}\n", live.size());
   fmt::print("maps: {}\n", map.roots().size());
   fmt::print("culled_keyframes: {}\n", map.keyframe_count() - map.live_keyframe_count());

@@ -141,25 +141,28 @@ void save_map(const std::filesystem::path& path, const Map& map, const MapFileCo
 }
 
 MapFile load_map(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw InputError(path.string() + ": is a folder; give the map in it, as " + (path / "map.dkb").string());
   return decode_map(read_file(path), path.string());
 }
 
 void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
-  const auto numbers = [](const Camera& c) {
-    return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3};
-  };
+  const auto numbers = [](const Camera& c) { return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3}; };
   const auto text = [](const Camera& c) {
     return fmt::format("{}x{} fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
   };
   const Camera &a = of_map.camera, &b = wanted.camera;
   if (a.width != b.width || a.height != b.height || numbers(a) != numbers(b))
-    throw InputError(fmt::format("{}: was made with another camera ({}) than this one ({}); give a map of this camera, "
-                                 "or the camera of the map",
-                                 name, text(a), text(b)));
+    throw InputError(
+        fmt::format("{}: was made with another camera ({}) than this one ({}); give a map of this camera, "
+                    "or the camera of the map",
+                    name, text(a), text(b)));
   if (of_map.levels != wanted.levels || of_map.scale_factor != wanted.scale_factor)
-    throw InputError(fmt::format("{}: was made with {} pyramid levels of {}; set features.levels={} and "
-                                 "features.scale={}",
-                                 name, of_map.levels, of_map.scale_factor, of_map.levels, of_map.scale_factor));
+    throw InputError(
+        fmt::format("{}: was made with {} pyramid levels of {}; set features.levels={} and "
+                    "features.scale={}",
+                    name, of_map.levels, of_map.scale_factor, of_map.levels, of_map.scale_factor));
 }
 
 }  // namespace dkb

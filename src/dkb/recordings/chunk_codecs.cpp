@@ -139,7 +139,7 @@ ChunkState copy_chunk(const RecordingFile& file, uint64_t at, uint64_t size, Chu
 Compression compression_named(std::string_view name) {
   const auto built_in = [](bool there, const char* what, const char* package) {
     if (!there)
-      throw InputError(std::string("this build cannot read what is compressed with ") + what + "; install " + package +
+      throw InputError(std::string("this build has no ") + what + " compression; install " + package +
                        " and build again");
   };
   if (name == "none" || name.empty()) return Compression::none;

@@ -93,8 +93,11 @@ int listen_on(const std::string& host, int port) {
     reason = errno;
     close(fd);
   }
-  throw InputError(fmt::format("cannot serve the page at {}, port {} ({}); give another port, or 0 for any free one",
-                               host, port, std::strerror(reason)));
+  const char* remedy = reason == EADDRNOTAVAIL
+                           ? "that address is none of this machine's; give one that `ip addr` lists, or 0.0.0.0 for all"
+                           : "give another port, or 0 for any free one";
+  throw InputError(
+      fmt::format("cannot serve the page at {}, port {} ({}); {}", host, port, std::strerror(reason), remedy));
 }
 
 }  // namespace
