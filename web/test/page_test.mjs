@@ -177,6 +177,16 @@ assert.ok((await points(page)) >= before, "points grow");
 assert.ok((await page.locator("#events li").count()) >= 2, "events are listed");
 await page.locator("#events button").last().click();
 assert.equal(await page.getAttribute("#free", "aria-pressed"), "true", "an event leads to its place");
+const geometries = async () => {
+  await page.waitForTimeout(300);
+  return Number(await page.getAttribute("#view", "data-geometries"));
+};
+const marked = await geometries();
+for (let i = 0; i < 5; i++) {
+  await page.locator("#events button").nth(i % 2).click();
+  await page.waitForTimeout(100);
+}
+assert.equal(await geometries(), marked, "marks are made once");
 const { calls, cloud } = await page.evaluate(() => ({ calls: Number(document.getElementById("view").dataset.calls), cloud: Number(document.getElementById("view").dataset.cloudCalls) }));
 assert.ok(cloud <= 1 + (await points(page)) / 4096 && calls < cloud + 20, `one draw call a block: ${cloud}, ${calls} in all`);
 

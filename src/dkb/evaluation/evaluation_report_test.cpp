@@ -82,6 +82,7 @@ TEST(EvaluationReport, TickTextsStayBesideTheirAxis) {
   EXPECT_EQ(svg::tick_text(1.5e-10, 5e-11), "1.5e-10");
   EXPECT_EQ(svg::tick_text(0, 1e-10), "0");
   EXPECT_EQ(svg::tick_text(1e17, 2e4), "1.00e+17");
+  EXPECT_EQ(svg::tick_text(4000000.05, 0.05), "4000000.05") << "a power of ten would not tell it from the next";
 }
 
 TEST(EvaluationReport, TableNamesApeAndUnits) {

@@ -76,12 +76,14 @@ std::vector<double> ticks(const Range& range, double step) {
 }
 
 std::string tick_text(double value, double step) {
-  constexpr size_t kLongest = 8;  // [characters] that stay beside the axis' name
+  constexpr size_t kLongest = 8, kLongestExact = 10;  // [characters] that stay beside the axis' name
   if (std::abs(value) < 1e-9 * step) value = 0;
   std::string text = fmt::format("{:.{}f}", value, decimals_of(step));
   if (text.size() <= kLongest) return text;
   if (value == 0) return "0";
   const int digits = static_cast<int>(std::floor(std::log10(std::abs(value))) - std::floor(std::log10(step) + 1e-9));
+  // With more digits a power of ten would no longer tell ticks apart.
+  if (digits > 2 && text.size() <= kLongestExact) return text;
   return fmt::format("{:.{}e}", value, std::clamp(digits, 0, 2));
 }
 
