@@ -291,7 +291,8 @@ std::string html(const std::string& title, const std::vector<std::string>& head,
       "auto;padding:0 1em}\ntable{border-collapse:collapse;margin:1em "
       "0;display:block;overflow-x:auto;font-size:13px}\nth,td{border:1px "
       "solid #d0d7de;padding:4px "
-      "7px;text-align:left;white-space:nowrap}\nth{background:#f6f8fa;white-space:normal;vertical-align:bottom}\n.n{text-align:right}\n"
+      "7px;text-align:left;white-space:nowrap}\nth{background:#f6f8fa;white-space:normal;vertical-align:bottom}\n.n{"
+      "text-align:right}\n"
       "svg{max-width:100%;height:auto}\n</style>\n</head>\n<body>\n<h1>" +
       svg::escaped(title) + "</h1>\n";
   for (const std::string& p : head) out += "<p>" + svg::escaped(p) + "</p>\n";

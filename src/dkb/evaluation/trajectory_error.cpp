@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
@@ -63,9 +63,8 @@ Eigen::Vector2d spreads(const std::vector<Eigen::Vector3d>& points) {
   for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter / static_cast<double>(points.size()),
-                                                              Eigen::EigenvaluesOnly);
-  return solver.eigenvalues().tail<2>().reverse().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector3d variances = spectrum(Eigen::Matrix3d(scatter / static_cast<double>(points.size()))).values;
+  return variances.tail<2>().reverse().cwiseMax(0).cwiseSqrt();
 }
 
 // Whether positions determine the rotation that aligns them: both paths leave a line by more than files round, a share

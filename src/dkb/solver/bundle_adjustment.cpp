@@ -69,7 +69,6 @@ class BundleAdjuster {
     // Beyond the limit an observation may still pull, softened by the kernel; behind the camera it has no residual.
     use(result, options_.prefilter);
     for (size_t round = 0; round < options_.rounds.size(); ++round) {
-      robust_ = round == 0 || round + 1 < options_.rounds.size() || options_.robust_last_round;
       const double start = cost(state_);
       if (round == 0) result.initial_cost = start;
       result.final_cost = descend(start, options_.rounds[round], result.iterations);
@@ -104,7 +103,7 @@ class BundleAdjuster {
     in.points = state.points.data();
     in.begin = layout_.camera_first[camera];
     in.end = layout_.camera_first[camera + 1];
-    in.limits = {robust_, options_.chi2_pixel, options_.chi2_depth};
+    in.limits = {true, options_.chi2_pixel, options_.chi2_depth};
     return in;
   }
 
@@ -350,7 +349,6 @@ class BundleAdjuster {
   const solver::SolverKernels& kernels_ = solver::solver_kernels();
   solver::BaLayout layout_;
   solver::BlockCholesky cholesky_;
-  bool robust_ = true;
   State state_, candidate_;
   std::vector<double> values_;  // observations as arrays
   std::vector<double> point_sums_, pair_sums_, factors_;

@@ -36,7 +36,6 @@ struct BaOptions {
   std::vector<int> rounds = {5, 10};  // Levenberg-Marquardt iterations of each round, >= 1; outliers are told apart
                                       // after each round and left out of the next
   bool prefilter = false;             // leave out observations beyond the limits before the first round (DKB 3.3)
-  bool robust_last_round = true;      // Huber kernel also in the last of several rounds
   double chi2_pixel = 5.991;          // outlier limit and Huber corner of the unweighted error without depth, > 0
   double chi2_depth = 7.815;          // the same with depth, > 0
   double chi2_motion = 16.81;         // the same of robust motions (6 d.o.f., 99 %), > 0

@@ -179,7 +179,6 @@ TEST(BundleAdjustment, RemovingOutliersIsLeastSquaresOfTheRestOnceNoneAreLeft) {
   TestWorld world({.outlier_share = 0.1, .seed = 6});
   BaOptions options = to_convergence();
   options.rounds = {20, 20, 20, 60};
-  options.robust_last_round = false;
   BaProblem ours = world.problem;
   const BaResult result = bundle_adjust(ours, options);
   BaProblem theirs = ours;

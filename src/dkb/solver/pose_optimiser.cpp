@@ -115,17 +115,6 @@ class PoseProblem {
     return n;
   }
 
-  double mean_chi2(const std::vector<uint8_t>& inlier) const {
-    double sum = 0;
-    size_t n = 0;
-    for (size_t i = 0; i < count_; ++i) {
-      if (!inlier[i]) continue;
-      sum += array(kChi2)[i];
-      ++n;
-    }
-    return n > 0 ? sum / static_cast<double>(n) : 0.0;
-  }
-
  private:
   enum Array {
     kX,
@@ -250,7 +239,6 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   problem.weigh(estimate.inlier, pose, kClaim);
 
   estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
-  estimate.mean_chi2 = problem.mean_chi2(estimate.inlier);
   const Matrix6d information = problem.normal_at(pose, false).information;
   const auto [values, axes] = spectrum(information);
   const bool determined = information.allFinite() && values[0] > 1e-12 * values[5];

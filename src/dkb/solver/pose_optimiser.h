@@ -61,7 +61,6 @@ struct PoseEstimate {
   Matrix6d covariance = Matrix6d::Zero();
   std::vector<uint8_t> inlier;  // per observation
   int inliers = 0;
-  double mean_chi2 = 0;  // of the inliers, e^T Sigma^-1 e
   int iterations = 0;    // over all rounds
 };
 
