@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -23,10 +24,12 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_;
 };
 
-// Durations of named stages; one instance per thread, merged at the end.
+// Durations of named stages; one instance per thread, merged at the end. Memory is bounded: of each stage count, sum,
+// extremes, and a histogram whose bins are 1% wide from 1 us to 1000 s. Counts, means and maxima are exact; medians and
+// other quantiles are within 0.5%, from 1 us up.
 class StageTimes {
  public:
-  void add(const std::string& stage, double ms) { samples_[stage].push_back(static_cast<float>(ms)); }
+  void add(const std::string& stage, double ms);
   void merge(const StageTimes& other);
   // Hands over what it holds.
   StageTimes take() { return std::exchange(*this, {}); }
@@ -36,7 +39,16 @@ class StageTimes {
   std::map<std::string, std::vector<int>> histograms() const;
 
  private:
-  std::map<std::string, std::vector<float>> samples_;
+  struct Stage {
+    size_t count = 0;
+    double sum = 0;  // [ms]
+    float min = 0, max = 0;
+    int first_bin = 0;             // of `bins`, which hold the occupied ones and those between
+    std::vector<uint32_t> bins{};  // how many durations
+    void make_room(int first, int end);
+    double at_rank(size_t rank) const;  // [ms] the duration that would stand there if all were sorted
+  };
+  std::map<std::string, Stage> stages_;
 };
 
 }  // namespace dkb

@@ -157,7 +157,36 @@ TEST(StageTimes, SummarisesWithPercentiles) {
   EXPECT_EQ(s.count, 100u);
   EXPECT_DOUBLE_EQ(s.mean_ms, 50.5);
   EXPECT_DOUBLE_EQ(s.max_ms, 100);
-  EXPECT_DOUBLE_EQ(s.p95_ms, 96);
+  EXPECT_NEAR(s.median_ms, 51, 0.005 * 51);
+  EXPECT_NEAR(s.p95_ms, 96, 0.005 * 96);
+}
+
+TEST(StageTimes, QuantilesAreWithinHalfAPercentOfTheSortedOnes) {
+  Random random(7);
+  StageTimes times;
+  std::vector<float> sorted;
+  for (int i = 0; i < 10'000; ++i) {
+    sorted.push_back(static_cast<float>(std::exp(random.uniform(std::log(1.1e-3), std::log(0.9e6)))));
+    times.add("x", sorted.back());
+    times.add("one", 0.1234F);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  const std::map<std::string, StageSummary> summaries = times.summaries();
+  const StageSummary s = summaries.at("x");
+  EXPECT_NEAR(s.median_ms / sorted[5000], 1, 0.005);
+  EXPECT_NEAR(s.p95_ms / sorted[9500], 1, 0.005);
+  EXPECT_EQ(s.max_ms, sorted.back());
+  EXPECT_EQ(summaries.at("one").median_ms, 0.1234F) << "where all are the same";
+}
+
+TEST(StageTimes, WhatIsMergedIsAsIfAddedHere) {
+  StageTimes a, b, both;
+  for (const double ms : {5.0, 0.2, 70.0}) a.add("x", ms), both.add("x", ms);
+  for (const double ms : {0.001, 900.0}) b.add("x", ms), both.add("x", ms);
+  a.merge(b);
+  EXPECT_EQ(a.histograms(), both.histograms());
+  EXPECT_EQ(a.summaries().at("x").median_ms, both.summaries().at("x").median_ms);
+  EXPECT_EQ(a.summaries().at("x").max_ms, 900);
 }
 
 TEST(StageTimes, CountsDurationsByQuarterOctaves) {
