@@ -12,6 +12,7 @@ constexpr int64_t kMaxGap = 500'000'000;      // [ns] between odometry messages 
 constexpr int64_t kMaxGyroGap = 100'000'000;  // [ns] the same of angular velocities
 constexpr int64_t kMaxAhead = 100'000'000;    // [ns] beyond the newest message
 constexpr size_t kMaxMessages = 4000;         // 10 s at 400 Hz
+constexpr int kMostRefused = 10;              // messages in a row
 constexpr double kMinSd = 1e-4;               // [m, rad] no sensor is better between two images
 constexpr double kGyroBias = 0.005;           // [rad/s] standard deviation of what a gyroscope shows at rest
 
@@ -37,6 +38,18 @@ template <class Message>
 auto first_not_before(const std::deque<Message>& messages, int64_t stamp_ns) {
   return std::lower_bound(messages.begin(), messages.end(), stamp_ns,
                           [](const Message& m, int64_t stamp) { return m.stamp_ns < stamp; });
+}
+
+// Whether a message of this stamp is taken: after the newest, or, where ten in a row were not, in the place of those
+// that are not before it: then one stamp was far ahead, or the clock was set back.
+template <class Message>
+bool take_stamp(std::deque<Message>* messages, int* refused, int64_t stamp_ns) {
+  if (!messages->empty() && stamp_ns <= messages->back().stamp_ns) {
+    if (++*refused < kMostRefused) return false;
+    while (!messages->empty() && messages->back().stamp_ns >= stamp_ns) messages->pop_back();
+  }
+  *refused = 0;
+  return true;
 }
 
 template <class Message>
@@ -89,7 +102,7 @@ bool OdometryHistory::add(const OdometryMessage& message) {
   const bool finite = message.pose.translation.allFinite() && message.pose.rotation.coeffs().allFinite() &&
                       std::abs(message.pose.rotation.norm() - 1) < 0.01 && message.twist.allFinite() &&
                       message.twist_covariance.allFinite();
-  if (!finite || (!empty() && message.stamp_ns <= messages_.back().stamp_ns)) return false;
+  if (!finite || !take_stamp(&messages_, &refused_, message.stamp_ns)) return false;
   keep(&messages_, message);
   messages_.back().pose.rotation.normalize();
   return true;
@@ -137,7 +150,7 @@ std::optional<dkb::MotionPrior> OdometryHistory::between(int64_t from_ns, int64_
 bool GyroHistory::add(const ImuMessage& message) {
   const bool usable = message.angular_velocity.allFinite() && message.covariance.allFinite() &&
                       message.covariance(0, 0) >= 0;  // -1: ROS' mark of an imu without a gyroscope
-  if (!usable || (!empty() && message.stamp_ns <= messages_.back().stamp_ns)) return false;
+  if (!usable || !take_stamp(&messages_, &refused_, message.stamp_ns)) return false;
   keep(&messages_, message);
   return true;
 }

@@ -31,9 +31,10 @@ class OdometryHistory {
   // `drift`: [m per m, rad per rad, rad per m] assumed where the messages give no covariance.
   explicit OdometryHistory(double drift) : drift_(drift) {}
 
-  // False when its stamp does not rise or a number is not finite; it is left out then.
+  // False when its stamp does not rise or a number is not finite; it is left out then. After ten stamps in a row that
+  // do not rise the clock is taken to have been set back, or one stamp to have been far ahead: it goes on from there.
   bool add(const OdometryMessage& message);
-  void clear() { messages_.clear(); }
+  void clear() { messages_.clear(), refused_ = 0; }
   bool empty() const { return messages_.empty(); }
   const std::string& child_frame_id() const { return messages_.back().child_frame_id; }
 
@@ -46,13 +47,14 @@ class OdometryHistory {
 
   double drift_;
   std::deque<OdometryMessage> messages_;  // by stamp
+  int refused_ = 0;                       // stamps in a row that did not rise
 };
 
 // Angular velocities; answers with the rotation between two times.
 class GyroHistory {
  public:
   bool add(const ImuMessage& message);  // as above
-  void clear() { messages_.clear(); }
+  void clear() { messages_.clear(), refused_ = 0; }
   bool empty() const { return messages_.empty(); }
   const std::string& frame_id() const { return messages_.back().frame_id; }
 
@@ -61,6 +63,7 @@ class GyroHistory {
 
  private:
   std::deque<ImuMessage> messages_;  // by stamp
+  int refused_ = 0;                  // as above
 };
 
 // A prior of another frame that is fixed to the camera, as the camera's.

@@ -84,6 +84,29 @@ TEST(OdometryHistory, LeavesOutWhatIsLateOrNoNumber) {
   EXPECT_FALSE(history.between(20 * kMillisecond, 20 * kMillisecond + 1'000'000'000));
 }
 
+TEST(OdometryHistory, GoesOnAfterAStampThatWasFarAhead) {
+  OdometryHistory history(0.02);
+  for (int64_t t = 0; t <= 100; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMillisecond)));
+  OdometryMessage ahead = odometry_at(120 * kMillisecond);
+  ahead.stamp_ns += 3'600'000'000'000;
+  EXPECT_TRUE(history.add(ahead));
+  for (int64_t t = 140; t <= 300; t += 20) EXPECT_FALSE(history.add(odometry_at(t * kMillisecond)));
+  for (int64_t t = 320; t <= 420; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMillisecond)));
+  EXPECT_TRUE(history.between(333 * kMillisecond, 366 * kMillisecond));
+}
+
+TEST(GyroHistory, GoesOnAfterAStampThatWasFarAhead) {
+  GyroHistory history;
+  ImuMessage m;
+  m.stamp_ns = 3'600'000'000'000;
+  EXPECT_TRUE(history.add(m));
+  for (int64_t t = 0; t < 100; t += 5) {
+    m.stamp_ns = t * kMillisecond;
+    EXPECT_EQ(history.add(m), t >= 45) << "the tenth is taken";
+  }
+  EXPECT_TRUE(history.between(50 * kMillisecond, 80 * kMillisecond));
+}
+
 TEST(GyroHistory, AddsUpRotations) {
   GyroHistory history;
   ImuMessage m;

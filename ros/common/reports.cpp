@@ -28,6 +28,7 @@ std::string number(double value) {
 void SlamCore::run_reports() {
   auto diagnostics_due = in_seconds(1), map_due = in_seconds(parameters_.map_period);
   int64_t published_ns = 0;
+  std::string said;  // the last failure
   std::unique_lock lock(report_mutex_);
   while (true) {
     const auto due = parameters_.map_period > 0 ? std::min(diagnostics_due, map_due) : diagnostics_due;
@@ -36,12 +37,15 @@ void SlamCore::run_reports() {
     const std::shared_ptr<const dkb::Slam> slam = slam_;
     const int64_t stamp_ns = last_result_stamp_ns_;
     lock.unlock();
-    if (now >= diagnostics_due) {
-      publish_diagnostics(slam.get());
-      diagnostics_due = in_seconds(1);
+    const bool map_is_due = parameters_.map_period > 0 && now >= map_due;
+    try {
+      if (now >= diagnostics_due) publish_diagnostics(slam.get());
+      if (map_is_due && slam && stamp_ns != published_ns) publish_map(*slam, stamp_ns);
+    } catch (const std::exception& error) {  // the middleware's, or memory is full; the next ones may succeed
+      if (std::exchange(said, error.what()) != error.what()) middleware_.log(LogLevel::error, error.what());
     }
-    if (parameters_.map_period > 0 && now >= map_due) {
-      if (slam && stamp_ns != published_ns) publish_map(*slam, stamp_ns);
+    if (now >= diagnostics_due) diagnostics_due = in_seconds(1);
+    if (map_is_due) {
       published_ns = stamp_ns;
       map_due = in_seconds(parameters_.map_period);
     }
@@ -93,7 +97,7 @@ void SlamCore::run_grids() {
           } else if (!std::exchange(said_no_floor, true)) {
             middleware_.log(LogLevel::warning, "no grid: the floor has not been seen");
           }
-        } catch (const dkb::InputError& error) {
+        } catch (const std::exception& error) {
           middleware_.log(LogLevel::warning, error.what());
         }
     }

@@ -181,11 +181,15 @@ void SlamCore::run_tracking() {
       Answer answer{false, stopping ? "the node is stopping" : "no frame has come yet, so there is no map"};
       if (slam_ && !stopping) try {
           answer = task(*slam_);
-        } catch (const dkb::InputError& error) {
+        } catch (const std::exception& error) {
           answer = {false, error.what()};
         }
       if (!answer.success) complain(LogLevel::warning, answer.message);
-      done(answer);
+      try {
+        done(answer);
+      } catch (const std::exception& error) {
+        complain(LogLevel::warning, std::string("a service's answer was not sent: ") + error.what());
+      }
       lock.lock();
       continue;
     }
@@ -195,7 +199,7 @@ void SlamCore::run_tracking() {
     lock.unlock();
     try {
       process(pair);
-    } catch (const dkb::InputError& error) {
+    } catch (const std::exception& error) {  // the middleware's as well; the node goes on
       complain(LogLevel::error, error.what());
       const std::lock_guard report(report_mutex_);
       ++counts_.rejected;
@@ -243,7 +247,7 @@ void SlamCore::open_page() {
     viewer_ = dkb::open_viewer(options);
     slam_->explain_keyframes(true);
     middleware_.log(LogLevel::info, "viewer: " + viewer_->url());
-  } catch (const dkb::InputError& error) {
+  } catch (const std::exception& error) {
     middleware_.log(LogLevel::error, std::string("viewer_port: ") + error.what());
   }
 }
@@ -273,9 +277,15 @@ bool SlamCore::start(const ImagePair& pair) {
   camera_frame_ = frame;
   dkb::Options options = parameters_.options;
   options.base_from_cam = base_from_cam_;
-  auto slam = std::make_shared<dkb::Slam>(*camera, options, dkb::make_detectors(parameters_.detector, *camera));
-  slam->localize_only(parameters_.localize_only);
-  if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
+  // What failed once fails again, after seconds that a network may take.
+  if (!failed_start_.empty()) throw dkb::InputError(failed_start_);
+  std::shared_ptr<dkb::Slam> slam;
+  try {
+    slam = make_slam(*camera, options);
+  } catch (const std::exception& error) {
+    failed_start_ = std::string(error.what()) + "; then start the node anew";
+    throw dkb::InputError(failed_start_);
+  }
   middleware_.log(LogLevel::info, "started: camera " + std::to_string(camera->width) + " x " +
                                       std::to_string(camera->height) + " in " + frame);
   if (pair.depth.frame_id != pair.colour.frame_id)
@@ -289,11 +299,21 @@ bool SlamCore::start(const ImagePair& pair) {
   return true;
 }
 
+std::shared_ptr<dkb::Slam> SlamCore::make_slam(const dkb::Camera& camera, const dkb::Options& options) {
+  // A map that cannot be read is told before a network is loaded.
+  if (!parameters_.load_map.empty()) dkb::Slam(camera, options, dkb::Detectors::none()).load_map(parameters_.load_map);
+  auto slam = std::make_shared<dkb::Slam>(camera, options, dkb::make_detectors(parameters_.detector, camera));
+  slam->localize_only(parameters_.localize_only);
+  if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
+  return slam;
+}
+
 std::optional<dkb::Camera> SlamCore::find_camera() {
   std::optional<dkb::Camera> camera;
   if (!parameters_.camera.empty()) {
-    camera = std::filesystem::exists(parameters_.camera) ? dkb::Camera::load(parameters_.camera)
-                                                         : dkb::Camera::named(parameters_.camera);
+    std::error_code unknown;  // of a path that cannot be looked at
+    camera = std::filesystem::exists(parameters_.camera, unknown) ? dkb::Camera::load(parameters_.camera)
+                                                                  : dkb::Camera::named(parameters_.camera);
   } else {
     const std::lock_guard lock(input_mutex_);
     if (!camera_info_) return std::nullopt;

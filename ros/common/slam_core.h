@@ -77,6 +77,7 @@ class SlamCore final : public RosCore {
   // On the tracking thread.
   void process(const ImagePair& pair);
   bool start(const ImagePair& pair);
+  std::shared_ptr<dkb::Slam> make_slam(const dkb::Camera& camera, const dkb::Options& options);
   std::optional<dkb::Camera> find_camera();
   const std::string& camera_frame(const ImagePair& pair) const;
   dkb::FrameInput input_of(const ImagePair& pair);
@@ -120,6 +121,7 @@ class SlamCore final : public RosCore {
   std::deque<std::pair<int64_t, Rigid3>> unplaced_;  // map_from_base at times that the robot's odometry has not reached
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
   std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
+  std::string failed_start_;                         // why there is no system and will be none
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;
 

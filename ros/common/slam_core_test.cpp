@@ -2,15 +2,18 @@
 // The node without a middleware, on a short simulated sequence.
 #include "ros_core.h"
 
+#include <dkb_slam/slam.h>
 #include <dkb_slam/source.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
 #include <future>
 #include <mutex>
+#include <stdexcept>
 
 namespace dkb_ros {
 namespace {
@@ -39,7 +42,10 @@ class Recorder final : public Middleware {
     return known == known_transforms.end() ? std::nullopt : std::optional(known->second);
   }
   void publish(const std::vector<TransformOutput>& t) override { keep(&transforms, t); }
-  void publish(const OdometryOutput& o) override { keep(&odometry, o); }
+  void publish(const OdometryOutput& o) override {
+    if (broken) throw std::runtime_error("the context is shut down");
+    keep(&odometry, o);
+  }
   void publish(const PoseMessage& p) override { keep(&poses, p); }
   void publish(const PathOutput& p) override { keep(&paths, p); }
   void publish(const CloudOutput& c) override { keep(&clouds, c); }
@@ -67,6 +73,7 @@ class Recorder final : public Middleware {
     return "";
   }
 
+  std::atomic<bool> broken = false;  // publishing odometry throws
   std::mutex mutex;
   std::condition_variable changed;
   std::map<std::string, Rigid3> known_transforms;  // "target source"
@@ -197,6 +204,33 @@ TEST_F(SlamCoreTest, WaitsForTheCameraAndItsMountAndSaysSo) {
   }
   feed_all(*core, 2, 3);
   ASSERT_TRUE(out.wait([&] { return out.last_value("waiting") == "2"; }));
+}
+
+TEST_F(SlamCoreTest, AStartThatFailedIsNotRepeatedForEachPair) {
+  const std::string file = testing::TempDir() + "dkb_ros_core_test_late.dkb";
+  std::filesystem::remove(file);
+  const auto core = start({{"load_map", file}});
+  core->camera_info(info_of(source_camera()));
+  feed(*core, 0);
+  ASSERT_TRUE(out.wait([&] { return !out.logged.empty(); }));
+  EXPECT_NE(out.logged[0].find(file), std::string::npos);
+  EXPECT_NE(out.logged[0].find("start the node anew"), std::string::npos);
+  dkb::Slam(source_camera()).save_map(file);  // which it does not look at again
+  feed(*core, 1);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("rejected") == "2"; }));
+  EXPECT_EQ(out.last_value("state"), "waiting");
+  std::filesystem::remove(file);
+}
+
+TEST_F(SlamCoreTest, WhatTheMiddlewareThrowsEndsNoThread) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  out.broken = true;
+  feed(*core, 0);
+  ASSERT_TRUE(out.wait([&] { return !out.logged.empty(); }));
+  out.broken = false;
+  feed_all(*core, 1, 2);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("rejected") == "1"; }));
 }
 
 TEST_F(SlamCoreTest, GoesOnAfterBadImages) {
