@@ -136,7 +136,7 @@ std::string lost_section(const Context& c) {
         std::find_if(pictures.begin(), pictures.end(), [&](const auto& p) { return p.row == s.begin; });
     const bool bare = picture == pictures.end();
     const char* what = s.state == TrackingState::lost        ? "lost"
-                       : s.state == TrackingState::predicted ? "bridged by the motion prior"
+                       : s.state == TrackingState::predicted ? "bridged by a motion prior or depth"
                                                              : "before the first map";
     out += fmt::format("<div class=\"stretch{}\">", bare ? " bare" : "");
     if (!bare) out += figure(overlay_svg(*picture, "First frame of the stretch"));

@@ -122,7 +122,7 @@ std::string verdict(const Context& c) {
               s.lost == 0 ? "no frame" : why_lost(c, TrackingState::lost));
   if (s.predicted > 0)
     out += tile("", "Predicted", fmt::format("<span id=\"predicted\">{}</span>", s.predicted),
-                "by the motion prior alone: " + why_lost(c, TrackingState::predicted));
+                "by a motion prior or depth alone: " + why_lost(c, TrackingState::predicted));
   if (c.truth.evaluation) {
     const PoseErrors& ape = c.truth.evaluation->ape;
     out += tile(" good", "APE, rmse", fmt::format("<span id=\"ape\">{:.4f}</span> m", ape.translation.rmse),

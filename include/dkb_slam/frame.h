@@ -46,7 +46,7 @@ class DKB_SLAM_API Frame {
  public:
   Frame() = default;  ///< empty
   /// Throws InputError when an image is missing, has another size than the camera, a stride below its width, or a
-  /// format that does not fit, and when a number of the prior is not finite.
+  /// format that does not fit, and when the prior is none: see set_prior().
   Frame(const Camera& camera, const FrameInput& input);
   /// The library's own readers enter here.
   explicit Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns);
@@ -55,7 +55,8 @@ class DKB_SLAM_API Frame {
   int64_t stamp_ns() const { return stamp_ns_; }              ///< of the colour image
   int64_t depth_stamp_ns() const { return depth_stamp_ns_; }  ///< of the depth image
   const std::optional<MotionPrior>& prior() const { return prior_; }
-  /// Throws InputError when one of its numbers is not finite, and leaves the prior as it was.
+  /// Throws InputError, and leaves the prior as it was, when one of its numbers is not finite, the length of its
+  /// quaternion is more than 1e-3 off 1, or its covariance has a negative variance in some direction.
   void set_prior(const std::optional<MotionPrior>& prior);
   ImageView colour() const;  ///< rgb8; empty for grey cameras. Valid as long as a copy of the frame lives
   ImageView grey() const;    ///< grey8, likewise
@@ -131,7 +132,7 @@ struct StageTime {
 
 /// Everything of one frame.
 struct FrameResult {
-  int frame = 0;                                      ///< counts the frames that were accepted, from 0
+  int frame = 0;                                      ///< counts accepted frames from 0; paused: the last one's
   int64_t stamp_ns = 0;                               ///< the input's
   TrackingState state = TrackingState::initialising;  ///< what the rest may be used for
   /// Lost, though the map has a place that looks like this one: it may be another. More views decide.

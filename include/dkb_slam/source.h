@@ -71,7 +71,8 @@ enum class PriorKind {
 struct SourceOptions {
   std::string camera;  ///< a camera file or a name (fr1, fr2, fr3, bonn); empty = what the recording says, for a folder
                        ///< camera.yaml, else by the folder's name
-  std::optional<Camera> fallback_camera;                 ///< where none of these tells it
+  std::optional<Camera> fallback_camera;  ///< where none of these tells it
+  /// Whoever opens a source checks: skip_pairs >= 0, start >= 0, end >= start, max_frames >= 1; throws InvalidOption.
   int64_t skip_pairs = 0;                                ///< left out at the beginning before all else
   double start = 0;                                      ///< [s] after the first pair's colour stamp, inclusive
   double end = std::numeric_limits<double>::infinity();  ///< [s] likewise, inclusive
@@ -87,11 +88,11 @@ struct SourceOptions {
 /// device. Throws InputError saying what is wrong and what to do; a kind that was not built in is named as such.
 DKB_SLAM_API std::unique_ptr<Source> open_source(const std::string& where, const SourceOptions& options = {});
 
-/// The folder `open_source` names, and nothing else: in the layout of the TUM RGB-D benchmark (associations.txt where it
-/// is there, else rgb.txt and depth.txt) or in another that docs/sources.md lists, told apart by what lies in it; colour
-/// as PNG or JPEG, depth as 16-bit PNG or 32-bit float. Throws InputError with file and line when the lists are wrong,
-/// when none of the first five pairs can be read, or when one that can has another size than the camera. A pair that
-/// cannot be read later on is skipped.
+/// The folder `open_source` names, and nothing else: in the layout of the TUM RGB-D benchmark (associations.txt where
+/// it is there, else rgb.txt and depth.txt) or in another that docs/sources.md lists, told apart by what lies in it;
+/// colour as PNG or JPEG, depth as 16-bit PNG or 32-bit float. Throws InputError with file and line when the lists are
+/// wrong, when none of the first five pairs can be read, or when one that can has another size than the camera. A pair
+/// that cannot be read later on is skipped.
 DKB_SLAM_API std::unique_ptr<Source> open_folder(const std::filesystem::path& folder,
                                                  const SourceOptions& options = {});
 

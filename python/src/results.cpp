@@ -121,7 +121,7 @@ frame a to frame b. Camera axes: x right, y down, z forward. World: the first tr
       .def_property_readonly(
           "state", [](const PyResult& p) { return name_of(p.r.state); },
           "\"initialising\", \"tracking\", \"lost\", \"relocalised\", \"paused\" or "
-          "\"predicted\" (by a motion prior alone).")
+          "\"predicted\" (by a motion prior or by depth alone).")
       .def_property_readonly(
           "tracked", [](const PyResult& p) { return p.r.tracked(); }, "bool: there is a pose.")
       .def_property_readonly("world_from_cam", pose(&FrameResult::world_from_cam), "float64 [4, 4] or None: the pose.")

@@ -57,7 +57,7 @@ std::string hindrance_of(const dkb::FrameResult& result) {
   if (result.ambiguous) return "not localised: what is in view may be another place that looks alike";
   switch (result.state) {
     case dkb::TrackingState::predicted:
-      return "carried by the motion prior";
+      return "carried by a motion prior or depth alone";
     case dkb::TrackingState::initialising:
     case dkb::TrackingState::lost:
       return "not localised";

@@ -33,7 +33,7 @@ TEST(Hindrance, SaysWhyTheImagesDoNotTellWhereTheCameraIs) {
   result.state = dkb::TrackingState::relocalised;
   EXPECT_EQ(hindrance_of(result), "");
   result.state = dkb::TrackingState::predicted;
-  EXPECT_EQ(hindrance_of(result), "carried by the motion prior");
+  EXPECT_EQ(hindrance_of(result), "carried by a motion prior or depth alone");
   result.state = dkb::TrackingState::lost;
   EXPECT_EQ(hindrance_of(result), "not localised");
   result.ambiguous = true;
