@@ -5,7 +5,7 @@
 
 namespace dkb {
 
-// Adds `dkb-slam map` with info and export; the callback leaves the process's exit code in `exit_code`.
+// Adds `dkb-slam map` with info, export and merge; the callback leaves the process's exit code in `exit_code`.
 void register_map(CLI::App& app, int& exit_code);
 
 }  // namespace dkb

@@ -31,8 +31,9 @@ class CarriedObjects {
   CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options);
 
   // Works in what was detected in frame `from`, carried to the newest of `past`, where all objects are until follow();
-  // of a frame that is not in `past`, where it was. The masks of the keyframes since `from`, which may have let movers
-  // into the map: the detector's own, or else silhouettes of its boxes, without what was seen to stand still.
+  // of a frame that is not in `past`, where it was. The masks of the keyframes in `past`, which may have let movers
+  // into the map, those before `from` as well: the detector's own, or else silhouettes of its boxes, without what was
+  // seen to stand still.
   std::vector<LateMask> receive(FrameIndex from, const Detections& detections, const PastFrames& past);
   // One frame on, from the newest of `past` to the image of `pyramid`.
   void follow(const PastFrames& past, const ImagePyramid& pyramid);

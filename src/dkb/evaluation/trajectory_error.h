@@ -66,8 +66,8 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
 // APE after least-squares alignment of the positions, and RPE over consecutive, not overlapping stretches of
 // `rpe_delta`:
 //   frames   poses 0, n, 2n, ...
-//   metres   cut where the path of the estimate since the last cut reaches delta (the first cut is the first such
-//   place) seconds  cut at the first pose and wherever delta has passed since the last cut
+//   metres   cut where the path of the estimate since the last cut reaches delta; the first cut is the first such place
+//   seconds  cut at the first pose and wherever delta has passed since the last cut
 // Deterministic. Throws InputError when fewer than 2 poses match; `name`, the estimate's, opens its message.
 Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options = {},
                     const std::string& name = {});

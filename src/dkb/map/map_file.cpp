@@ -6,25 +6,24 @@
 //   file     "DKBMAP\r\n", format u32, sections u32, CRC-32C u32 of these 16 bytes, then the sections in this order:
 //   section  tag (4 letters), length u64 of the content, CRC-32C u32 of tag, length and content, content
 //
-//   HEAD  camera: width, height u32; fx fy cx cy k1 k2 p1 p2 k3 depth_factor fps depth_min depth_max f64
+//   HEAD  camera: width, height u32; fx fy cx cy k1 k2 p1 p2 k3 depth_factor fps depth_min depth_max readout f64
 //         pyramid: scale_factor f64, levels u32
 //   KEYF  count varint, then per keyframe: culled u8, frame i32, timestamp f64, parent i32,
 //         cam_from_world 7 x f64 (quaternion x y z w, translation);
-//         culled: cam_from_parent 7 x f64; live: features varint, covisible varint, per covisible: keyframe varint,
-//         shared varint
+//         culled: cam_from_parent 7 x f64;
+//         live: features varint, covisible varint, per covisible: keyframe varint, shared varint
 //   DESC  the descriptors of all features of the live keyframes in turn: 4 x u64 each
-//   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats; pixel x, y as
-//   distance, in
-//         floats, from where the camera's UndistortionTable puts the image pixel: words (sign in the low bit), packed;
-//         depth, angle, response packed floats; octave packed, as difference to the feature before; colour g, r - g, b
-//         - g packed; point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and packed; birth
-//         features u16 of those that see one (minus the own index where the age is 0), low and high bytes packed
-//   POIN  live: count varint; per point id varint minus the one before, position 3 x f64; packed: normal x, y, z,
-//   reference
-//         distance and scale floats; colour as above; length u64 and packed: per point found zigzag, visible zigzag,
-//         born_at - birth zigzag, number of the first observation with the same descriptor counted from 1, 0 = none:
-//         then the descriptor follows: 4 x u64 fused: count varint; per point id varint minus the one before, survivor
-//         - id zigzag
+//   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats;
+//         pixel x, y as distance, in floats, from where the camera's UndistortionTable puts the image pixel:
+//         words (sign in the low bit), packed; depth, angle, response packed floats;
+//         octave packed, as difference to the feature before; colour g, r - g, b - g packed;
+//         point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and packed;
+//         birth features u16 of those that see one (minus the own index where the age is 0), low and high bytes packed
+//   POIN  live: count varint; per point id varint minus the one before, position 3 x f64;
+//         packed: normal x, y, z, reference distance and scale floats; colour as above;
+//         length u64 and packed: per point found zigzag, visible zigzag, born_at - birth zigzag, number of the first
+//         observation with the same descriptor counted from 1, 0 = none: then the descriptor follows: 4 x u64
+//         fused: count varint; per point id varint minus the one before, survivor - id zigzag
 //
 // Observations are not stored: they are the keyframes' points turned round. Of the points that are no more, those are
 // stored that were fused into one that lives, which is all that Map::resolve() can tell of them.

@@ -39,7 +39,6 @@ struct UsableFeatures {
   std::vector<int> corner;  // per feature: its index among all corners of the scene
   std::vector<FeatureMotion> motion;
 };
-// `focal`: the camera's focal length [px].
 UsableFeatures usable_features(const Scene& scene);
 
 // What became of every corner in the end. `tracked.source` are indices of `usable`.
