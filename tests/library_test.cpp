@@ -241,9 +241,30 @@ TEST_F(Library, AnEmptyCallbackEndsItAndWhatACallbackThrowsLeavesProcess) {
   slam.on_event([](const Event&) { throw InputError("enough of events"); });
   EXPECT_EQ(error_of([&] { slam.process(world.frame(0, {})); }), "enough of events");
   slam.on_event({});
+  EXPECT_EQ(slam.statistics().frames, 1) << "the frame counts";
   EXPECT_TRUE(slam.process(world.frame(1, {})).tracked()) << "the system goes on";
   slam.process(world.frame(2, {.dark = true}));
   EXPECT_EQ(told(slam.take_events()), "2:lost ");
+}
+
+TEST_F(Library, WhatACallbackThrowsCostsNoOtherEvent) {
+  Slam polled = slam_with(), called = slam_with();
+  std::vector<Event> seen;
+  called.on_event([&](const Event& e) {
+    seen.push_back(e);
+    throw InputError("number " + std::to_string(seen.size()));
+  });
+  for (const Frame& frame : eventful(world)) {  // some have two events
+    polled.process(frame);
+    const size_t before = seen.size();
+    const std::string error = error_of([&] { called.process(frame); });
+    if (seen.size() > before) {
+      EXPECT_EQ(error, "number " + std::to_string(before + 1));
+    }
+  }
+  const std::vector<Event> expected = polled.take_events();
+  EXPECT_EQ(told(seen), told(expected));
+  EXPECT_EQ(seen.size(), expected.size());
 }
 
 TEST_F(Library, EventsThatNobodyTakesAreForgottenInTheEnd) {
@@ -270,6 +291,7 @@ TEST_F(Library, WhilePausedNothingIsLookedAt) {
   for (int i = 6; i < 9; ++i) {
     const FrameResult r = slam.process(world.frame(i, {.dark = true}));
     EXPECT_EQ(r.state, TrackingState::paused);
+    EXPECT_EQ(r.frame, 5) << "the last one that counts";
     EXPECT_EQ(r.stamp_ns, world.frame(i, {}).stamp_ns());
     EXPECT_FALSE(r.tracked() || r.world_from_cam || r.keyframe);
   }

@@ -50,7 +50,7 @@ struct TrajectoryFrame {
 /// What has happened since the world began.
 struct Statistics {
   int frames = 0, tracked = 0, lost = 0;       ///< accepted; with a pose; without one although there is a map
-  int predicted = 0;                           ///< of the tracked ones, by a motion prior alone
+  int predicted = 0;                           ///< of the tracked ones, by a motion prior or by depth alone
   int relocalisations = 0;                     ///< how often a lost camera was found
   int keyframes = 0, keyframes_inserted = 0;   ///< in the map now; ever made
   int maps = 0;                                ///< that are not joined
@@ -76,8 +76,8 @@ struct Statistics {
   std::map<std::string, std::vector<int>> stage_histograms;
 };
 
-/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map(), dense_map_task() and
-/// the switches.
+/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map(), dense_map_task(),
+/// suggest_pose(), on_event() and the switches.
 /// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
 /// Several systems may live in one process and know nothing of each other.
 ///
@@ -103,7 +103,8 @@ class DKB_SLAM_API Slam {
   void finish();
   /// Forgets the world, its frames and its clock. The next frame starts a new one.
   void reset();
-  /// While paused, frames are answered with state `paused` and change nothing.
+  /// While paused, frames are answered with state `paused` and change nothing. Their FrameResult::frame is that of the
+  /// last frame that was accepted, 0 before the first.
   void pause(bool on);
   /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
   void localize_only(bool on);
@@ -145,7 +146,8 @@ class DKB_SLAM_API Slam {
   /// Runs a task at once or later, on a thread of its choice, in the order in which tasks are given to it.
   using Executor = std::function<void(std::function<void()> task)>;
   /// Calls `callback` for each event: on the feeding thread before process() returns, or where `executor` runs it.
-  /// What the callback throws leaves process(). An empty callback ends it.
+  /// An exception of the callback leaves process() or finish() when all events of the frame have been delivered, the
+  /// first one if there are several. The frame counts then, but its result is lost. An empty callback ends it.
   void on_event(std::function<void(const Event&)> callback, Executor executor = {});
 
   const Camera& camera() const;    ///< as given

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <exception>
 #include <functional>
 #include <iterator>
 #include <mutex>
@@ -22,12 +23,17 @@ class EventOutlet {
       while (waiting_.size() > kMaxEvents) waiting_.pop_front();
       return;
     }
-    for (const Event& e : events) {
-      if (executor_)
-        executor_([callback = callback_, e] { callback(e); });
-      else
-        callback_(e);
-    }
+    // What a callback throws must not cost the events that come after it.
+    std::exception_ptr thrown;
+    for (const Event& e : events) try {
+        if (executor_)
+          executor_([callback = callback_, e] { callback(e); });
+        else
+          callback_(e);
+      } catch (...) {
+        if (!thrown) thrown = std::current_exception();
+      }
+    if (thrown) std::rethrow_exception(thrown);
   }
   std::vector<Event> take() {
     const std::lock_guard lock(mutex_);

@@ -66,6 +66,7 @@ class Slam::Impl {
   void start(Map map) {
     failure = nullptr;
     skipped = {};
+    last_frame = 0;
     pipeline.reset();
     auto fresh = std::make_shared<RunRecord>();
     {
@@ -92,6 +93,7 @@ class Slam::Impl {
   PipelineContext context;
   bool paused = false, localize_only = false, explain_keyframes = false;
   SkippedMotion skipped;
+  int last_frame = 0;  // that was accepted
   EventOutlet events;
   std::exception_ptr failure;
   mutable std::mutex record_mutex;
@@ -113,6 +115,7 @@ FrameResult Slam::process(const Frame& given) {
   if (impl_->paused) {
     impl_->skipped.skip(given);
     FrameResult result;
+    result.frame = impl_->last_frame;
     result.stamp_ns = given.stamp_ns();
     result.state = TrackingState::paused;
     return result;
@@ -122,6 +125,7 @@ FrameResult Slam::process(const Frame& given) {
   impl_->pipeline->check(frame);
   FrameResult result = impl_->guarded([&] { return impl_->pipeline->process(frame); });
   impl_->skipped = {};
+  impl_->last_frame = result.frame;
   impl_->events.deliver(impl_->pipeline->take_events());
   return result;
 }
