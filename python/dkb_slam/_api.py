@@ -99,8 +99,9 @@ def evaluate(truth: TrajectoryLike, estimate: TrajectoryLike, *, max_diff: float
              scale: bool = False) -> dict[str, Any]:
     """Scores a trajectory against the truth: the dict of `dkb-slam eval --json`.
 
-    truth, estimate: files in TUM format, (stamps_ns, poses) or a Slam. max_diff: [s] between matched stamps. rpe_delta:
-    "N" and f, m or s: stretch of the relative error in frames, metres or seconds. scale: align by a similarity.
+    truth, estimate: files in TUM format, (stamps_ns, poses) with rising stamps, or a Slam. max_diff: [s] between
+    matched stamps. rpe_delta: "N" and f, m or s: stretch of the relative error in frames, metres or seconds. scale:
+    align by a similarity.
 
     Keys: matched, ape.translation_m.{rmse, mean, median, std, min, max}, ape.rotation_deg, and rpe likewise, defined as
     in evo. ape.rotation_determined is false, and ape.rotation_deg None, where a path on a line or in one place leaves

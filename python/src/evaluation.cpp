@@ -26,9 +26,13 @@ NamedTrajectory trajectory_of(const py::object& object, const char* name) {
   if (!stamps || !poses || stamps.ndim() != 1 || poses.ndim() != 3 || poses.shape(0) != stamps.shape(0))
     throw InputError(std::string(name) + ": give stamps_ns as int64 [N] and poses as float64 [N, 4, 4]");
   NamedTrajectory trajectory;
-  for (py::ssize_t i = 0; i < stamps.shape(0); ++i)
+  for (py::ssize_t i = 0; i < stamps.shape(0); ++i) {
+    if (i > 0 && stamps.at(i) <= stamps.at(i - 1))
+      throw InputError(std::string(name) + ": stamps_ns must rise, but element " + std::to_string(i) + " (" +
+                       std::to_string(stamps.at(i)) + ") is not after the one before; sort the poses by stamp");
     trajectory.poses.push_back(
         {seconds_from_ns(stamps.at(i)), "", pose_of(py::object(poses[py::int_(i)]), name + (" " + std::to_string(i)))});
+  }
   return trajectory;
 }
 

@@ -123,13 +123,18 @@ class PySlam final : public Closable {
   // Work of the feeding thread, without the GIL.
   template <class Work>
   void feed(const Work& work) {
+    std::exception_ptr interrupted;
+    std::vector<std::string> warnings;
     run([&](Slam& slam) {
       const std::unique_lock lock(feeding_, std::try_to_lock);
       if (!lock.owns_lock()) throw InputError("slam: another thread is in a call of it; one thread at a time feeds it");
       work(slam);
+      // Before another thread may feed.
+      interrupted = std::exchange(interruption_->what, nullptr);
+      if (!interrupted) warnings = std::exchange(warnings_, {});
     });
-    if (const std::exception_ptr what = std::exchange(interruption_->what, nullptr)) std::rethrow_exception(what);
-    for (const std::string& text : std::exchange(warnings_, {})) warn(text);
+    if (interrupted) std::rethrow_exception(interrupted);
+    for (const std::string& text : warnings) warn(text);
   }
   // Work that any thread may do meanwhile, without the GIL.
   template <class Work>

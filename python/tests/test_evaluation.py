@@ -38,6 +38,8 @@ def test_what_cannot_be_scored_is_one_line(slam, sequence):
         dkb_slam.evaluate(sequence / "groundtruth.txt", slam, rpe_delta="1x")
     with pytest.raises(dkb_slam.InputError, match="estimate 0: it is no rigid motion"):
         dkb_slam.evaluate(sequence / "groundtruth.txt", (stamps, np.zeros_like(poses)))
+    with pytest.raises(dkb_slam.InputError, match="estimate: stamps_ns must rise, but element 1 "):
+        dkb_slam.evaluate(sequence / "groundtruth.txt", (stamps[::-1], poses[::-1]))
 
 
 def test_a_plot_is_a_picture_for_notebooks(slam, sequence, tmp_path):
