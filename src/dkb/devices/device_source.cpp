@@ -42,7 +42,10 @@ Camera device_camera(const std::string& name, const Camera& told, const SourceOp
 }
 
 DeviceSource::DeviceSource(std::unique_ptr<ImageDevice> device, const Camera& camera, const SourceOptions& options)
-    : device_(std::move(device)), camera_(camera), options_(options) {}
+    : device_(std::move(device)),
+      camera_(camera),
+      options_(options),
+      filter_({options.skip_pairs, options.start, options.end, options.max_frames}) {}
 
 void DeviceSource::stop() {
   {
@@ -92,16 +95,8 @@ void DeviceSource::add(DeviceImage image, bool is_depth) {
 
 std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {
   const size_t index = seen_++;
-  if (static_cast<int64_t>(index) < options_.skip_pairs) return std::nullopt;
-  if (!first_stamp_) first_stamp_ = pair.colour.stamp_ns;
-  const double t = static_cast<double>(pair.colour.stamp_ns - *first_stamp_) / 1e9;
-  if (t < options_.start) return std::nullopt;
+  if (!filter_.wants(seconds_from_ns(pair.colour.stamp_ns))) return std::nullopt;
   SourceFrame frame;
-  if (t > options_.end || (options_.max_frames && taken_ >= *options_.max_frames)) {
-    ended_ = true;
-    return frame;
-  }
-  ++taken_;
   frame.index = index;
   frame.stamp = stamp_text(pair.colour.stamp_ns);
   try {
@@ -115,24 +110,34 @@ std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {
   return frame;
 }
 
+void DeviceSource::require_any() {
+  if (filter_.seen() > 0 && !std::exchange(told_, true)) filter_.require_any(device_->description());
+}
+
 SourceFrame DeviceSource::next() {
   SourceFrame none;
   for (;;) {
     {
       const std::lock_guard lock(mutex_);
-      if (stopped_ || ended_) return none;
+      if (stopped_) return none;
     }
     if (unplugged_) {
       if (!wait_until_back()) return none;
       unplugged_ = false;
     }
-    while (const std::optional<ImagePair> pair = pairs_.take()) {
-      std::optional<SourceFrame> frame = frame_of(*pair);
-      if (frame) return *frame;
+    while (!filter_.done()) {
+      const std::optional<ImagePair> pair = pairs_.take();
+      if (!pair) break;
+      if (std::optional<SourceFrame> frame = frame_of(*pair)) return *frame;
+    }
+    if (filter_.done()) {  // no wait for one more pair, which a camera may never give
+      require_any();
+      return none;
     }
     if (device_ended_) {
       pairs_.restart();  // what is left over has no partner
       unpaired_ = pairs_.unpaired();
+      require_any();
       return none;
     }
     DeviceImages images;

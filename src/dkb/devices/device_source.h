@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "dkb/dataset/tum_dataset.h"
 #include "dkb/devices/image_pairs.h"
 #include "dkb_slam/source.h"
 
@@ -40,7 +41,8 @@ class ImageDevice {
   virtual std::vector<std::string> take_warnings() { return {}; }  // Source's
 };
 
-// The device's images as pairs. Gaps while it is unplugged are told once each.
+// The device's images as pairs. Throws InvalidOption; next() throws InputError when a recording ends and the options
+// have left out all of its pairs. Gaps while it is unplugged are told once each.
 class DeviceSource final : public Source {
  public:
   DeviceSource(std::unique_ptr<ImageDevice> device, const Camera& camera, const SourceOptions& options);
@@ -58,15 +60,15 @@ class DeviceSource final : public Source {
   // Nothing when the options leave the pair out.
   std::optional<SourceFrame> frame_of(const ImagePair& pair);
 
+  void require_any();  // throws once
+
   const std::unique_ptr<ImageDevice> device_;
   const Camera camera_;
   const SourceOptions options_;
   ImagePairs pairs_;
-  size_t seen_ = 0;    // pairs
-  int64_t taken_ = 0;  // pairs from options_.start on
-  std::optional<int64_t> first_stamp_;
-  bool unplugged_ = false, device_ended_ = false;
-  bool ended_ = false;  // by the options
+  PairFilter filter_;  // what the options choose
+  size_t seen_ = 0;    // pairs, and images that could not be read
+  bool unplugged_ = false, device_ended_ = false, told_ = false;
   // The clocks of some devices start anew when they are plugged in again: then the time that has passed meanwhile goes
   // by this computer's clock.
   int64_t shift_ns_ = 0, last_stamp_ = 0;

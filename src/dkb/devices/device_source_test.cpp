@@ -8,6 +8,8 @@
 
 #include "dkb/dataset/paced_source.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
+#include "dkb_slam/errors.h"
 
 namespace dkb {
 namespace {
@@ -178,6 +180,29 @@ TEST(DeviceSource, OptionsChooseTheFrames) {
   options.skip_pairs = 2, options.start = 0.1, options.max_frames = 3;
   DeviceSource source(std::make_unique<ScriptedDevice>(steps), small_camera(), options);
   EXPECT_EQ(stamps_of(source), (Stamps{300, 400, 500}));
+}
+
+TEST(DeviceSource, TheLastFrameThatIsWantedEndsItWithoutAWaitForAnother) {
+  Steps steps;
+  for (int i = 0; i < 3; ++i) add_pair(&steps, 100 * i, 100 * i);
+  steps.push_back({DeviceState::unplugged});  // nobody gets to hear of it
+  SourceOptions options;
+  options.max_frames = 3;
+  DeviceSource source(std::make_unique<ScriptedDevice>(steps), small_camera(), options);
+  EXPECT_EQ(stamps_of(source), (Stamps{0, 100, 200}));
+}
+
+TEST(DeviceSource, OptionsAreCheckedAndOnesThatLeaveNothingAreNamed) {
+  Steps steps;
+  for (int i = 0; i < 3; ++i) add_pair(&steps, 100 * i, 100 * i);
+  SourceOptions options;
+  options.start = 2, options.end = 1;
+  EXPECT_THROW(DeviceSource(std::make_unique<ScriptedDevice>(steps), small_camera(), options), InvalidOption);
+  options.end = 5;
+  DeviceSource source(std::make_unique<ScriptedDevice>(steps), small_camera(), options);
+  EXPECT_NE(test::input_error_of([&] { source.next(); }).find("no pair lies between --start and --end"),
+            std::string::npos);
+  EXPECT_EQ(source.next().state, SourceState::ended);
 }
 
 TEST(DeviceSource, StopEndsTheWaitForADeviceThatIsGone) {

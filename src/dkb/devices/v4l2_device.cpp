@@ -80,17 +80,12 @@ class Stream {
 
   void open() {
     close();
-    fd_ = Descriptor(path_);
-    if (fd_.get() < 0) fail(std::strerror(errno), "is the camera plugged in, and are you in the group video?");
-    v4l2_capability capability{};
-    if (control(fd_.get(), VIDIOC_QUERYCAP, &capability) < 0 ||
-        (capability.device_caps & V4L2_CAP_VIDEO_CAPTURE) == 0 || (capability.device_caps & V4L2_CAP_STREAMING) == 0)
-      fail("is no video device that streams", "`v4l2-ctl --list-devices` names those that do");
-    choose_format();
-    share_buffers();
-    auto type = static_cast<int>(V4L2_BUF_TYPE_VIDEO_CAPTURE);
-    if (control(fd_.get(), VIDIOC_STREAMON, &type) < 0)
-      fail(std::string("does not start (") + std::strerror(errno) + ")", "is another program using it?");
+    try {
+      start();
+    } catch (...) {
+      close();  // the constructor has no destructor that would
+      throw;
+    }
   }
 
   void close() {
@@ -126,6 +121,20 @@ class Stream {
  private:
   [[noreturn]] void fail(const std::string& what, const std::string& remedy) const {
     throw InputError(path_ + ": " + what + "; " + remedy);
+  }
+
+  void start() {
+    fd_ = Descriptor(path_);
+    if (fd_.get() < 0) fail(std::strerror(errno), "is the camera plugged in, and are you in the group video?");
+    v4l2_capability capability{};
+    if (control(fd_.get(), VIDIOC_QUERYCAP, &capability) < 0 ||
+        (capability.device_caps & V4L2_CAP_VIDEO_CAPTURE) == 0 || (capability.device_caps & V4L2_CAP_STREAMING) == 0)
+      fail("is no video device that streams", "`v4l2-ctl --list-devices` names those that do");
+    choose_format();
+    share_buffers();
+    auto type = static_cast<int>(V4L2_BUF_TYPE_VIDEO_CAPTURE);
+    if (control(fd_.get(), VIDIOC_STREAMON, &type) < 0)
+      fail(std::string("does not start (") + std::strerror(errno) + ")", "is another program using it?");
   }
 
   static v4l2_buffer empty_buffer() {
