@@ -62,10 +62,12 @@ int record(const RecordArguments& args) {
       if (++kept % 30 == 0 && terminal) fmt::print(stderr, "\r\033[K{} frames", kept);
     }
   };
+  bool full = false;
   try {
     keep_all();
-  } catch (const OutputError&) {  // the disk is full: what is there cannot be completed
-    throw;
+  } catch (const OutputError&) {
+    failure = std::current_exception();
+    full = true;
   } catch (...) {
     failure = std::current_exception();
   }
@@ -78,7 +80,14 @@ int record(const RecordArguments& args) {
     fmt::print(stderr, "error: {} gave no frame; nothing was written\n", args.source);
     return Interrupt::happened() ? 130 : 1;
   }
-  writer->close();
+  try {
+    if (!full) writer->close();
+  } catch (const OutputError&) {
+    if (!failure) failure = std::current_exception();
+    full = true;
+  }
+  if (full) writer->salvage();
+  if (full) warnings.warn("full", args.out + " could not be written to the end; what is whole was kept");
   if (!args.quiet) fmt::print("{}: {}\n", args.out, report.text(source->counts()));
   if (failure) std::rethrow_exception(failure);
   return Interrupt::happened() ? 130 : 0;

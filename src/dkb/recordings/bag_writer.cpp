@@ -60,6 +60,7 @@ BagWriter::BagWriter(const std::filesystem::path& path, Compression compression)
     : file_(path), compression_(compression) {
   file_.append(bag::kMagic);
   file_.append(bag_header(0));
+  end_ = file_.size();
 }
 
 std::string BagWriter::bag_header(uint64_t index_at) const {
@@ -128,6 +129,7 @@ void BagWriter::flush_chunk() {
                             data.bytes()));
   }
   chunks_.push_back(info_);
+  end_ = file_.size();
   info_ = {};
   entries_.clear();
   chunk_.clear();
@@ -135,6 +137,31 @@ void BagWriter::flush_chunk() {
 
 void BagWriter::close() {
   flush_chunk();
+  write_index();
+  file_.commit();
+}
+
+void BagWriter::salvage() {
+  file_.cut(end_);
+  try {
+    flush_chunk();
+  } catch (const OutputError&) {
+    chunk_.clear();
+  }
+  while (!chunks_.empty()) {
+    file_.cut(end_);
+    try {
+      write_index();
+      return file_.commit();
+    } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
+      end_ = chunks_.back().at;
+      chunks_.pop_back();
+    }
+  }
+  throw OutputError("no message of the recording could be kept; make room on the disk");
+}
+
+void BagWriter::write_index() {
   const uint64_t index_at = file_.size();
   for (const std::string& connection : connections_) file_.append(connection);
   for (const ChunkInfo& chunk : chunks_) {
@@ -150,7 +177,6 @@ void BagWriter::close() {
                             data.bytes()));
   }
   file_.overwrite(bag::kMagic.size(), bag_header(index_at));
-  file_.commit();
 }
 
 }  // namespace dkb

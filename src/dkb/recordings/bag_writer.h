@@ -17,6 +17,7 @@ class BagWriter final : public RecordingWriter {
   void write(size_t topic, int64_t recorded_ns, std::string_view bytes) override;
   void add_text(const std::string&, const std::string&) override {}  // bags have no place for it
   void close() override;
+  void salvage() override;
 
  private:
   struct Entry {
@@ -30,6 +31,7 @@ class BagWriter final : public RecordingWriter {
   };
   std::string bag_header(uint64_t index_at) const;
   void flush_chunk();
+  void write_index();
 
   OutputFile file_;
   const Compression compression_;
@@ -39,6 +41,7 @@ class BagWriter final : public RecordingWriter {
   ChunkInfo info_;
   std::map<uint32_t, std::vector<Entry>> entries_;  // of the chunk, by connection
   std::vector<ChunkInfo> chunks_;
+  uint64_t end_ = 0;  // of the last whole chunk
 };
 
 }  // namespace dkb

@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "dkb/map/byte_stream.h"
 #include "dkb/recordings/mcap_format.h"
@@ -71,6 +70,7 @@ size_t McapWriter::add_topic(const std::string& name, const std::string& type, b
   ByteWriter out;
   u16(out, static_cast<uint16_t>(channels_.size())), u16(out, schema->second);
   text(out, name), text(out, "ros1"), text(out, pairs.bytes());
+  topics_at_ = file_.size();
   file_.append(channels_.emplace_back(record(mcap::kChannel, out)));
   counts_.push_back(0);
   return channels_.size() - 1;
@@ -93,14 +93,12 @@ void McapWriter::write(size_t topic, int64_t recorded_ns, std::string_view bytes
   if (!chunk_.empty() && chunk_.size() + bytes.size() > kChunkSize) flush_chunk();
   const uint16_t channel = static_cast<uint16_t>(topic);
   const uint64_t time = static_cast<uint64_t>(recorded_ns);
-  if (chunks_.empty() && entries_.empty()) first_ns_ = last_ns_ = recorded_ns;
   if (entries_.empty()) index_.first_ns = index_.last_ns = recorded_ns;
-  first_ns_ = std::min(first_ns_, recorded_ns), last_ns_ = std::max(last_ns_, recorded_ns);
   index_.first_ns = std::min(index_.first_ns, recorded_ns), index_.last_ns = std::max(index_.last_ns, recorded_ns);
   entries_[channel].push_back({time, chunk_.size()});
   ByteWriter start;
   u16(start, channel);
-  start.u32(static_cast<uint32_t>(counts_[topic]++));
+  start.u32(counts_[topic]++);
   start.u64(time), start.u64(time);
   chunk_ += record_start(mcap::kMessage, mcap::kMessageStart + bytes.size());
   chunk_ += start.bytes();
@@ -129,10 +127,12 @@ void McapWriter::flush_chunk() {
     u16(out, channel);
     text(out, pairs.bytes());
     index_.index_at[channel] = file_.size();
+    index_.counts[channel] = entries.size();
     file_.append(record(mcap::kMessageIndex, out));
   }
   index_.index_length = file_.size() - index_.at - index_.length;
   chunks_.push_back(index_);
+  end_ = file_.size();
   index_ = {};
   entries_.clear();
   chunk_.clear();
@@ -140,21 +140,55 @@ void McapWriter::flush_chunk() {
 
 std::string McapWriter::statistics() const {
   ByteWriter out;
-  out.u64(std::accumulate(counts_.begin(), counts_.end(), uint64_t{0}));
+  std::map<uint16_t, uint64_t> counts;
+  for (size_t i = 0; i < channels_.size(); ++i) counts[static_cast<uint16_t>(i)] = 0;
+  uint64_t all = 0;
+  int64_t first_ns = chunks_.empty() ? 0 : chunks_[0].first_ns, last_ns = chunks_.empty() ? 0 : chunks_[0].last_ns;
+  for (const ChunkIndex& chunk : chunks_) {
+    for (const auto& [channel, count] : chunk.counts) counts[channel] += count, all += count;
+    first_ns = std::min(first_ns, chunk.first_ns), last_ns = std::max(last_ns, chunk.last_ns);
+  }
+  out.u64(all);
   u16(out, static_cast<uint16_t>(schemas_.size()));
   out.u32(static_cast<uint32_t>(channels_.size()));
   out.u32(0);  // attachments
   out.u32(static_cast<uint32_t>(metadata_index_.size()));
   out.u32(static_cast<uint32_t>(chunks_.size()));
-  out.u64(static_cast<uint64_t>(first_ns_)), out.u64(static_cast<uint64_t>(last_ns_));
+  out.u64(static_cast<uint64_t>(first_ns)), out.u64(static_cast<uint64_t>(last_ns));
   ByteWriter pairs;
-  for (size_t i = 0; i < counts_.size(); ++i) u16(pairs, static_cast<uint16_t>(i)), pairs.u64(counts_[i]);
+  for (const auto& [channel, count] : counts) u16(pairs, channel), pairs.u64(count);
   text(out, pairs.bytes());
   return record(mcap::kStatistics, out);
 }
 
 void McapWriter::close() {
   flush_chunk();
+  write_index();
+  file_.commit();
+}
+
+void McapWriter::salvage() {
+  const OutputError nothing("no message of the recording could be kept; make room on the disk");
+  if (end_ < topics_at_) throw nothing;
+  file_.cut(end_);
+  try {
+    flush_chunk();
+  } catch (const OutputError&) {
+    chunk_.clear();
+  }
+  for (; !chunks_.empty() && end_ > topics_at_; chunks_.pop_back()) {
+    file_.cut(end_);
+    try {
+      write_index();
+      return file_.commit();
+    } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
+      end_ = chunks_.back().at;
+    }
+  }
+  throw nothing;
+}
+
+void McapWriter::write_index() {
   ByteWriter no_crc;
   no_crc.u32(0);
   file_.append(record(mcap::kDataEnd, no_crc));
@@ -199,7 +233,6 @@ void McapWriter::close() {
   crc.u32(crc_of(summary));
   file_.append(summary + crc.bytes());
   file_.append(mcap::kMagic);
-  file_.commit();
 }
 
 }  // namespace dkb

@@ -47,6 +47,11 @@ void OutputFile::overwrite(uint64_t at, std::string_view bytes) {
   write_at(at, bytes);
 }
 
+void OutputFile::cut(uint64_t size) {
+  if (::ftruncate(fd_, static_cast<off_t>(size)) != 0) fail("truncate");
+  size_ = size;
+}
+
 void OutputFile::commit() {
   if (::fsync(fd_) != 0 && errno != EINVAL && errno != EROFS) fail("fsync");
   if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail("rename");

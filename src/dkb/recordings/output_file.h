@@ -18,6 +18,7 @@ class OutputFile {
 
   void append(std::string_view bytes);
   void overwrite(uint64_t at, std::string_view bytes);
+  void cut(uint64_t size);  // leaves the first bytes
   uint64_t size() const { return size_; }
   void commit();
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 #include <system_error>
+#include <vector>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/image/image.h"
@@ -53,54 +54,110 @@ class FolderPairWriter final : public PairWriter {
     if (fs::exists(path_, error) && !(fs::is_directory(path_, error) && fs::is_empty(path_, error)))
       throw OutputError(path_.string() + ": is there already and not empty; choose another folder with --out");
     const fs::path above = path_.has_parent_path() ? path_.parent_path() : ".";
-    temporary_ = above / ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()));
-    make_output_folder(temporary_ / "rgb");
-    make_output_folder(temporary_ / "depth");
-    write_image_file(temporary_ / "camera.yaml", camera_text);
-  }
-  ~FolderPairWriter() override {
-    std::error_code error;
-    if (!temporary_.empty()) fs::remove_all(temporary_, error);
+    temporary_.path = above / ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()));
+    make_output_folder(temporary_.path / "rgb");
+    make_output_folder(temporary_.path / "depth");
+    write_image_file(temporary_.path / "camera.yaml", camera_text);
   }
 
   void add(const PairToWrite& pair) override {
-    const std::string stamp = stamp_text(pair.stamp_ns), depth_stamp = stamp_text(pair.depth_stamp_ns);
-    const bool jpeg = is_jpeg(pair.colour_file);
-    const std::string colour_name = "rgb/" + stamp + (jpeg ? ".jpg" : ".png");
-    if (!pair.colour_file.empty())
-      write_image_file(temporary_ / colour_name, pair.colour_file);
-    else if (pair.picture->colour.empty())
-      write_image_file(temporary_ / colour_name, encode_png(pair.picture->grey, png_level_));
-    else
-      write_image_file(temporary_ / colour_name, encode_png(pair.picture->colour, png_level_));
-
+    Row row;
+    row.stamp = stamp_text(pair.stamp_ns), row.depth_stamp = stamp_text(pair.depth_stamp_ns);
+    row.colour = "rgb/" + row.stamp + (is_jpeg(pair.colour_file) ? ".jpg" : ".png");
     const std::optional<Image<uint16_t>> units = exact_units(*pair.depth, camera_);
-    const std::string depth_name = "depth/" + depth_stamp + (units ? ".png" : ".tiff");
-    write_image_file(temporary_ / depth_name, units ? encode_png(*units, png_level_) : encode_tiff(*pair.depth));
-
-    colour_list_ += stamp + " " + colour_name + "\n";
-    if (depth_stamp != last_depth_stamp_) depth_list_ += depth_stamp + " " + depth_name + "\n";
-    last_depth_stamp_ = depth_stamp;
-    associations_ += stamp + " " + colour_name + " " + depth_stamp + " " + depth_name + "\n";
+    row.depth = "depth/" + row.depth_stamp + (units ? ".png" : ".tiff");
+    rows_.push_back(row);
+    try {
+      write_images(row, pair, units);
+    } catch (...) {
+      drop_last();  // half a pair is none
+      throw;
+    }
   }
 
   void close() override {
-    write_image_file(temporary_ / "rgb.txt", colour_list_);
-    write_image_file(temporary_ / "depth.txt", depth_list_);
-    write_image_file(temporary_ / "associations.txt", associations_);
-    std::error_code error;
-    fs::rename(temporary_, path_, error);  // also over an empty folder
-    if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
-    temporary_.clear();
+    write_lists();
+    put_in_place();
+  }
+
+  void salvage() override {
+    while (!rows_.empty()) {
+      try {
+        write_lists();
+      } catch (const OutputError&) {  // the room that the last pair takes is needed for the lists
+        drop_last();
+        continue;
+      }
+      return put_in_place();
+    }
+    throw OutputError(path_.string() + ": no pair could be kept; make room on the disk");
   }
 
  private:
+  struct Row {
+    std::string stamp, colour, depth_stamp, depth;  // as in the lists
+  };
+  struct Temporary {
+    fs::path path;  // empty: it is in its place
+    Temporary() = default;
+    Temporary(const Temporary&) = delete;
+    Temporary& operator=(const Temporary&) = delete;
+    ~Temporary() {
+      std::error_code error;
+      if (!path.empty()) fs::remove_all(path, error);
+    }
+  };
+
+  void write_images(const Row& row, const PairToWrite& pair, const std::optional<Image<uint16_t>>& units) const {
+    const fs::path colour = temporary_.path / row.colour;
+    if (!pair.colour_file.empty())
+      write_image_file(colour, pair.colour_file);
+    else if (pair.picture->colour.empty())
+      write_image_file(colour, encode_png(pair.picture->grey, png_level_));
+    else
+      write_image_file(colour, encode_png(pair.picture->colour, png_level_));
+    // An image that the pair before shares is there, and would be broken by a write that fails.
+    if (rows_.size() > 1 && rows_[rows_.size() - 2].depth == row.depth) return;
+    write_image_file(temporary_.path / row.depth, units ? encode_png(*units, png_level_) : encode_tiff(*pair.depth));
+  }
+
+  void drop_last() {
+    std::error_code error;
+    const Row row = std::move(rows_.back());
+    rows_.pop_back();
+    fs::remove(temporary_.path / row.colour, error);
+    // Pairs in a row may share a depth image.
+    if (rows_.empty() || rows_.back().depth != row.depth) fs::remove(temporary_.path / row.depth, error);
+  }
+
+  void write_lists() const {
+    std::string colour = "# timestamp filename\n", depth = colour;
+    std::string associations = "# rgb_timestamp rgb_file depth_timestamp depth_file\n";
+    const std::string* last_depth_stamp = nullptr;
+    for (const Row& row : rows_) {
+      colour += row.stamp + " " + row.colour + "\n";
+      if (last_depth_stamp == nullptr || row.depth_stamp != *last_depth_stamp)
+        depth += row.depth_stamp + " " + row.depth + "\n";
+      last_depth_stamp = &row.depth_stamp;
+      associations += row.stamp + " " + row.colour + " " + row.depth_stamp + " " + row.depth + "\n";
+    }
+    write_image_file(temporary_.path / "rgb.txt", colour);
+    write_image_file(temporary_.path / "depth.txt", depth);
+    write_image_file(temporary_.path / "associations.txt", associations);
+  }
+
+  void put_in_place() {
+    std::error_code error;
+    fs::rename(temporary_.path, path_, error);  // also over an empty folder
+    if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
+    temporary_.path.clear();
+  }
+
   const fs::path path_;
-  fs::path temporary_;
+  Temporary temporary_;
   const Camera camera_;
   const int png_level_;
-  std::string colour_list_ = "# timestamp filename\n", depth_list_ = colour_list_, last_depth_stamp_;
-  std::string associations_ = "# rgb_timestamp rgb_file depth_timestamp depth_file\n";
+  std::vector<Row> rows_;
 };
 
 class RecordingPairWriter final : public PairWriter {
@@ -127,6 +184,7 @@ class RecordingPairWriter final : public PairWriter {
   }
 
   void close() override { writer_->close(); }
+  void salvage() override { writer_->salvage(); }
 
  private:
   size_t topic(const std::string& name, const std::string& type, bool latched = false) {

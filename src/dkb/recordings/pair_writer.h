@@ -32,6 +32,9 @@ class PairWriter {
   virtual ~PairWriter() = default;
   virtual void add(const PairToWrite& pair) = 0;
   virtual void close() = 0;
+  // In the place of close(), after add() or close() has thrown since the disk is full: keeps what is whole, but for as
+  // much of the end as lists or index take. Throws when nothing is.
+  virtual void salvage() = 0;
 };
 
 // FILE.bag and FILE.mcap: the topics /camera/rgb/image_raw (or image_raw/compressed), /camera/depth/image_raw and

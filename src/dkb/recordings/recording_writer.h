@@ -26,6 +26,9 @@ class RecordingWriter {
   virtual void add_text(const std::string& name, const std::string& text) = 0;
   // The file is there, whole, when this returns.
   virtual void close() = 0;
+  // In the place of close(), after write() or close() has thrown: the file holds the whole chunks for which, and for
+  // whose index, there is room. Throws when there are none.
+  virtual void salvage() = 0;
 };
 
 // Whether its ending is .bag or .mcap.

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/recordings/pair_writer.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "dkb/dataset/folder_source.h"
+#include "dkb/recordings/recorded_source.h"
+#include "dkb/util/errors.h"
+#include "dkb/util/random.h"
+#include "dkb/util/test_folder.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// While it lives, no file may grow beyond this: writing fails half-way, as on a full disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_{};
+};
+
+constexpr int kWidth = 320, kHeight = 240;
+
+Camera camera() {
+  Camera c;
+  c.width = kWidth, c.height = kHeight, c.cx = 159.5, c.cy = 119.5, c.depth_factor = 1000;
+  return c;
+}
+
+void add(PairWriter& writer, int n) {
+  Random random(static_cast<uint64_t>(n));
+  Picture picture;
+  picture.colour = ColourImage(kWidth, kHeight);
+  for (size_t i = 0; i < picture.colour.size(); ++i)
+    picture.colour.data()[i] = {static_cast<uint8_t>(random.below(256)), 0, static_cast<uint8_t>(n)};
+  const DepthImage depth(kWidth, kHeight, 1.0F + 0.25F * static_cast<float>(n));
+  const int64_t stamp = int64_t{1'000'000'000} + n * int64_t{33'000'000};
+  writer.add({stamp, stamp, {}, &picture, &depth});
+}
+
+int frames_in(Source& source) {
+  int frames = 0;
+  for (SourceFrame f = source.next(); f.state != SourceState::ended; f = source.next()) {
+    EXPECT_EQ(f.state, SourceState::frame) << f.note;
+    EXPECT_EQ(f.frame.image()->depth(5, 5), 1.0F + 0.25F * static_cast<float>(frames)) << "in order, none missing";
+    ++frames;
+  }
+  return frames;
+}
+
+size_t entries_of(const fs::path& folder) {
+  return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(PairWriter, OfARecordingThatFillsTheDiskTheWholeChunksAreKept) {
+  for (const char* name : {"a.bag", "a.mcap"}) {
+    SCOPED_TRACE(name);
+    const TempFolder temp;
+    {
+      const auto writer = write_pairs(temp / name, camera(), camera().to_yaml());
+      int n = 0;
+      // Some 384 kB a pair. The chunk at the limit cannot be finished.
+      const FileSizeLimit limit(2'000'000);
+      EXPECT_THROW(for (; n < 100; ++n) add(*writer, n), OutputError);
+      EXPECT_LT(n, 10);
+      writer->salvage();
+    }
+    RecordedSource source(temp / name, SourceOptions{});
+    const int frames = frames_in(source);
+    EXPECT_GE(frames, 3);
+    EXPECT_LE(frames, 5);
+    EXPECT_EQ(entries_of(temp.path()), 1u) << "no temporary file";
+  }
+}
+
+TEST(PairWriter, TheLastChunkGivesItsRoomToTheIndex) {
+  for (const char* name : {"a.bag", "a.mcap"}) {
+    SCOPED_TRACE(name);
+    const TempFolder temp;
+    const auto write = [&](const char* file, std::optional<rlim_t> limit) {
+      const auto writer = write_pairs(temp / file, camera(), camera().to_yaml());
+      for (int n = 0; n < 6; ++n) add(*writer, n);
+      if (!limit) return writer->close();
+      const FileSizeLimit full(*limit);
+      EXPECT_THROW(writer->close(), OutputError);
+      writer->salvage();
+    };
+    const std::string whole = std::string("whole-") + name;
+    write(whole.c_str(), {});
+    write(name, fs::file_size(temp / whole) - 10);  // the index lacks ten bytes
+    RecordedSource source(temp / name, SourceOptions{});
+    const int frames = frames_in(source);
+    EXPECT_GE(frames, 3);
+    EXPECT_LT(frames, 6);
+  }
+}
+
+TEST(PairWriter, OfAFolderThatFillsTheDiskTheWholePairsAreKept) {
+  const TempFolder temp;
+  {
+    const auto writer = write_pairs(temp / "out", camera(), camera().to_yaml());
+    for (int n = 0; n < 5; ++n) add(*writer, n);
+    const FileSizeLimit limit(300);  // images do not fit, nor do lists of more than two or three pairs
+    EXPECT_THROW(add(*writer, 5), OutputError);
+    writer->salvage();
+  }
+  FolderSource source(temp / "out", SourceOptions{});
+  const int frames = frames_in(source);
+  EXPECT_GE(frames, 1);
+  EXPECT_LT(frames, 5);
+  EXPECT_EQ(entries_of(temp / "out/rgb"), static_cast<size_t>(frames));
+  EXPECT_EQ(entries_of(temp / "out/depth"), static_cast<size_t>(frames));
+  EXPECT_EQ(entries_of(temp.path()), 1u) << "no temporary folder";
+}
+
+TEST(PairWriter, NothingIsLeftBehindWhereNothingFits) {
+  const TempFolder temp;
+  {
+    const FileSizeLimit limit(10);
+    EXPECT_THROW(write_pairs(temp / "out", camera(), camera().to_yaml()), OutputError) << "the camera file";
+    EXPECT_THROW(write_pairs(temp / "out.bag", camera(), camera().to_yaml()), OutputError);
+  }
+  EXPECT_EQ(entries_of(temp.path()), 0u);
+}
+
+}  // namespace
+}  // namespace dkb::test
