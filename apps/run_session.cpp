@@ -242,6 +242,7 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
   progress_->frame(next.index + 1, &result);
   if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
+  warn_of_viewer();
 }
 
 void RunSession::write(double seconds) {
@@ -273,6 +274,11 @@ void RunSession::write(double seconds) {
   if (args_.cv_orb && interrupted_.empty()) write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
 }
 
+void RunSession::warn_of_viewer() {
+  if (!viewer_) return;
+  for (const std::string& line : viewer_->take_warnings()) warnings_.warn(line, line);
+}
+
 int RunSession::tell_the_end() {
   const Statistics s = slam_->statistics();
   if (!args_.quiet)
@@ -285,6 +291,7 @@ int RunSession::tell_the_end() {
     fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
   const bool cut_short = Interrupt::happened();
   if (viewer_) viewer_->serve_on(*slam_, args_.quiet);
+  warn_of_viewer();
   if (cut_short) return 130;
   if (s.tracked > 0) return 0;
   if (args_.localize)

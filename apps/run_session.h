@@ -60,6 +60,7 @@ class RunSession {
   void write(double seconds);
   int tell_the_end();
   void warn_of_source();
+  void warn_of_viewer();
   void warn_of_dropped(size_t next_index);
 
   RunArguments args_;

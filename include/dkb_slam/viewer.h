@@ -68,6 +68,9 @@ class DKB_SLAM_API Viewer {
   virtual bool paused() const = 0;                                  ///< a visitor has paused it
   virtual bool take_save_order() = 0;                               ///< somebody wants the map saved; once each time
   virtual void wait_order(std::chrono::milliseconds patience) = 0;  ///< until there is such an order
+
+  /// What people should know since the last call, a line each: that the recording has ended before the session.
+  virtual std::vector<std::string> take_warnings() = 0;
 };
 
 /// Throws InputError when the module is not installed, the port is taken or the file cannot be written.

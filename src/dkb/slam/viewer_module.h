@@ -12,6 +12,6 @@ void* viewer_symbol(const char* name, const std::string& what);
 
 // Throws nothing: when it returns null, `error` says why. The symbol's number changes with what crosses this border.
 using OpenViewer = Viewer* (*)(const ViewerOptions& options, std::string* error);
-inline constexpr const char* kOpenViewerSymbol = "dkb_open_viewer_2";
+inline constexpr const char* kOpenViewerSymbol = "dkb_open_viewer_3";
 
 }  // namespace dkb

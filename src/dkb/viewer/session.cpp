@@ -85,6 +85,11 @@ void Session::ended(MapSnapshot map) {
   model_.set_paused(false);
   model_.end(std::move(map));
   wake();
+  if (recorder_) recorder_->wait_taken();  // so that the last of what take_warnings() tells is known
+}
+
+std::vector<std::string> Session::take_warnings() {
+  return recorder_ ? recorder_->take_warnings() : std::vector<std::string>();
 }
 
 bool Session::wants_dense_map() const {
@@ -199,7 +204,7 @@ void Session::tick(size_t streams) {
 
 }  // namespace dkb
 
-extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_2(const dkb::ViewerOptions& options,
+extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_3(const dkb::ViewerOptions& options,
                                                                                  std::string* error) {
   try {
     return new dkb::Session(options);

@@ -29,6 +29,7 @@ class Session final : public Viewer, private HttpService {
   bool paused() const override;
   bool take_save_order() override;
   void wait_order(std::chrono::milliseconds patience) override;
+  std::vector<std::string> take_warnings() override;
 
  private:
   class Stream;

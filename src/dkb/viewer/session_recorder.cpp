@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/viewer/session_recorder.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/thread_priority.h"
@@ -13,14 +16,17 @@
 namespace dkb {
 namespace {
 
-constexpr size_t kCheckpointEvery = 1 << 20;           // [bytes] at least
-constexpr uintmax_t kLeftFree = uintmax_t{256} << 20;  // [bytes] of the disk, which others need too
+constexpr size_t kCheckpointEvery = 1 << 20;  // [bytes] at least
 
 }  // namespace
 
-SessionRecorder::SessionRecorder(SessionModel& model, const std::filesystem::path& file, bool realtime)
-    : model_(model), path_(file), realtime_(realtime), file_(std::fopen(file.c_str(), "wbe"), &std::fclose) {
+SessionRecorder::SessionRecorder(SessionModel& model, const std::filesystem::path& file, bool realtime,
+                                 uintmax_t left_free)
+    : model_(model), path_(file), realtime_(realtime), left_free_(left_free), file_(nullptr, &std::fclose) {
+  require_room(0);  // before a file that may be there is emptied
+  file_.reset(std::fopen(file.c_str(), "wbe"));
   if (file_ == nullptr) throw OutputError(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);  // else what could not be written would be tried again at the end
   client_.images = client_.depth = true;
   thread_ = std::thread([this] { run(); });
 }
@@ -63,7 +69,10 @@ void SessionRecorder::run() {
     } catch (const std::exception& e) {
       // The disk is full, or memory: the recording ends, the run goes on.
       more = false;
-      model_.say(std::string("the recording has ended: ") + e.what());
+      const std::string line = std::string("the recording has ended: ") + e.what();
+      model_.say(line);
+      const std::lock_guard lock(mutex_);
+      warnings_.push_back(line);
     }
     {
       const std::lock_guard lock(mutex_);
@@ -102,16 +111,34 @@ bool SessionRecorder::write_news(bool last) {
     write(chunk_head({ended ? kSessionEnd : 0, seconds, frame, static_cast<uint32_t>(news.size())}) + news.bytes());
   if (whole.size() > 0) {
     write(chunk_head({kCheckpoint, seconds, frame, static_cast<uint32_t>(whole.size())}) + whole.bytes());
-    std::error_code unknown;
-    const auto space = std::filesystem::space(path_, unknown);
-    if (!unknown && space.available < kLeftFree) throw OutputError("less than 256 MB are left on the disk");
   }
   return !ended && !last;
 }
 
 void SessionRecorder::write(const std::string& chunk) {
-  if (std::fwrite(chunk.data(), 1, chunk.size(), file_.get()) != chunk.size() || std::fflush(file_.get()) != 0)
-    throw OutputError(path_.string() + ": " + std::strerror(errno));
+  require_room(chunk.size());
+  if (std::fwrite(chunk.data(), 1, chunk.size(), file_.get()) != chunk.size()) {
+    const std::string reason = std::strerror(errno);
+    // Without its piece of a chunk the file is one that was cut off, which may be watched.
+    const bool cut = ::ftruncate(::fileno(file_.get()), static_cast<off_t>(whole_)) == 0;
+    throw OutputError(path_.string() + ": cannot be written (" + reason +
+                      (cut ? "); what was recorded before is kept" : "); its end is damaged"));
+  }
+  whole_ += chunk.size();
+}
+
+void SessionRecorder::require_room(size_t bytes) const {
+  std::error_code unknown;
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  const auto space = std::filesystem::space(folder, unknown);
+  if (unknown || space.capacity == 0 || space.available >= left_free_ + bytes) return;
+  throw OutputError(path_.string() + ": less than " + std::to_string(left_free_ >> 20) +
+                    " MB would be left on the disk; make room there");
+}
+
+std::vector<std::string> SessionRecorder::take_warnings() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(warnings_, {});
 }
 
 }  // namespace dkb

@@ -2,8 +2,11 @@
 #include "dkb/viewer/session_recorder.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "dkb/util/errors.h"
@@ -170,6 +173,42 @@ TEST(SessionRecorder, LeavesAFileWithoutAnEndWhenTheSessionHasNone) {
   const SessionFile file(temp.path);
   EXPECT_FALSE(file.ended());
   EXPECT_EQ(file.frame(), 4);
+}
+
+TEST(SessionRecorder, EndsWithTheLastWholeChunkWhenTheDiskIsFull) {
+  const TempFile temp;
+  SessionModel model(options());
+  auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit limit = before;
+  limit.rlim_cur = 100'000;  // no file grows beyond it: a write fails half-way, as on a full disk
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::vector<std::string> warnings;
+  {
+    SessionRecorder recorder(model, temp.path, false);
+    for (int i = 0; i < 60; ++i) feed(model, recorder, i);
+    recorder.wait_taken();
+    warnings = recorder.take_warnings();
+    EXPECT_TRUE(recorder.take_warnings().empty());
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("the recording has ended: " + temp.path.string()), std::string::npos);
+  const SessionFile file(temp.path);
+  EXPECT_FALSE(file.damaged());
+  EXPECT_EQ(file.size(), fs::file_size(temp.path));
+  EXPECT_GT(file.frame(), 0);
+  EXPECT_LT(file.frame(), 59);
+}
+
+TEST(SessionRecorder, LeavesRoomOnTheDiskAndTheFileThatIsThere) {
+  const TempFile temp;
+  std::ofstream(temp.path) << "before";
+  SessionModel model(options());
+  EXPECT_THROW(SessionRecorder(model, temp.path, true, uintmax_t{1} << 62), OutputError);
+  EXPECT_EQ(fs::file_size(temp.path), 6u);
 }
 
 TEST(SessionRecorder, SaysThatItsFileCannotBeWritten) {
