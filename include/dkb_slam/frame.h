@@ -120,7 +120,7 @@ struct FeatureReport {
 
 /// Durations of one stage, by the steady clock.
 struct StageSummary {
-  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;  ///< [ms]
+  double mean_ms = 0, median_ms = 0, p95_ms = 0, max_ms = 0;  ///< [ms] median and p95 within 0.5%
   size_t count = 0;                                           ///< how often it ran
 };
 

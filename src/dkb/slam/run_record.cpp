@@ -118,7 +118,7 @@ Statistics RunRecord::statistics() const {
     s.map_points = map_.view().point_count();
     times = times_;
   }
-  // Sorting the times of a long run takes long; tracking goes on meanwhile.
+  // Tracking goes on while quantiles are read.
   s.stages = times.summaries();
   s.stage_histograms = times.histograms();
   return s;
