@@ -9,6 +9,7 @@
 #include "dkb/recordings/convert.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/util/errors.h"
+#include "interrupt.h"
 
 namespace dkb {
 namespace {
@@ -46,6 +47,8 @@ void run_convert(const ConvertArguments& arguments) {
   } catch (const InputError& e) {
     throw InputError(std::string("--compression: ") + e.what());
   }
+  const Interrupt interrupt([] {});
+  options.go_on = Interrupt::check;
   const Converted converted = convert(arguments.in, arguments.out, options);
   std::printf("%s: %zu %s\n", arguments.out.c_str(), converted.count, converted.unit.c_str());
 }

@@ -12,6 +12,7 @@
 #include "dkb/util/files.h"
 #include "dkb_slam/source.h"
 #include "export/results_recording.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace {
@@ -34,14 +35,14 @@ void run_export(const ExportArguments& arguments) {
       throw InputError(arguments.results + ": is no folder; give the folder that `dkb-slam run --out` wrote");
     const auto pictures = arguments.images.empty() ? nullptr : open_source(arguments.images, arguments.source);
     const size_t poses = write_results_recording(results, pictures.get(), out);
-    fmt::print("{}: {} poses\n", arguments.out, poses);
+    tell(stdout, "{}: {} poses\n", arguments.out, poses);
     return;
   }
   const Trajectory trajectory = read_trajectory(fs::is_directory(results) ? results / "trajectory.txt" : results);
   write_file_atomically(out, arguments.format == "tum"     ? trajectory_to_text(trajectory)
                              : arguments.format == "kitti" ? trajectory_to_kitti(trajectory)
                                                            : trajectory_to_euroc(trajectory));
-  fmt::print("{}: {} poses\n", arguments.out, trajectory.size());
+  tell(stdout, "{}: {} poses\n", arguments.out, trajectory.size());
 }
 
 }  // namespace

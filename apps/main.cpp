@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <string>
 #include <vector>
@@ -15,6 +19,7 @@
 #include "dkb_slam/version.h"
 #include "eval/eval_command.h"
 #include "export_command.h"
+#include "interrupt.h"
 #include "map_command.h"
 #include "record_command.h"
 #include "run_command.h"
@@ -24,11 +29,28 @@
 
 namespace {
 
-constexpr int kFailed = 1, kBadInput = 2;
+constexpr int kFailed = 1, kBadInput = 2, kInterrupted = 130;
 
 void print_error(std::string message) {
   std::replace(message.begin(), message.end(), '\n', ' ');
   std::fprintf(stderr, "error: %s\n", message.c_str());
+}
+
+// A reader that goes away (`| head`) is a failed write, not the end of the program; and no file that is opened gets the
+// number of an output that was closed, and with it what is printed.
+void guard_outputs() {
+  std::signal(SIGPIPE, SIG_IGN);
+  for (const int fd : {0, 1, 2})
+    if (fcntl(fd, F_GETFD) < 0) static_cast<void>(open("/dev/null", O_RDONLY));  // the lowest that is free: `fd`
+}
+
+// The exit code, when what was printed did not arrive.
+int checked_output(int exit_code) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  const std::string why = errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : "";
+  print_error("standard output: cannot be written" + why + "; files that were asked for are not touched by that");
+  return exit_code == 0 ? kFailed : exit_code;
 }
 
 // What is wrong with the command line, in one line, with the nearest name when one is misspelt.
@@ -69,17 +91,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   return text + help;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-#if defined(M_ARENA_MAX)
-  // Images are made in one thread and given back in another, some every frame. A heap for every thread would keep room
-  // for them in each, and room that is given back to the system at once costs a page fault for every 4 kB when it is
-  // asked for again: together 8 MB and a twentieth of all processor time.
-  mallopt(M_ARENA_MAX, 1);
-  mallopt(M_MMAP_THRESHOLD, 4 << 20);
-  mallopt(M_TRIM_THRESHOLD, 6 << 20);
-#endif
+int run_command_line(int argc, char** argv) {
   CLI::App app("Real-time RGB-D SLAM that withstands people in the picture (DKB-SLAM)", "dkb-slam");
   app.set_version_flag("--version", "dkb-slam " DKB_SLAM_VERSION);
   app.require_subcommand(1);
@@ -103,6 +115,9 @@ int main(int argc, char** argv) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
     print_error(usage_error(app, e));
     return kBadInput;
+  } catch (const dkb::InterruptedError& e) {
+    print_error(e.what());
+    return kInterrupted;
   } catch (const dkb::InputError& e) {
     print_error(e.what());
     return kBadInput;
@@ -111,4 +126,19 @@ int main(int argc, char** argv) {
     return kFailed;
   }
   return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+#if defined(M_ARENA_MAX)
+  // Images are made in one thread and given back in another, some every frame. A heap for every thread would keep room
+  // for them in each, and room that is given back to the system at once costs a page fault for every 4 kB when it is
+  // asked for again: together 8 MB and a twentieth of all processor time.
+  mallopt(M_ARENA_MAX, 1);
+  mallopt(M_MMAP_THRESHOLD, 4 << 20);
+  mallopt(M_TRIM_THRESHOLD, 6 << 20);
+#endif
+  guard_outputs();
+  return checked_output(run_command_line(argc, argv));
 }

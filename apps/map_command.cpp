@@ -18,6 +18,9 @@
 #include "dkb_slam/source.h"
 #include "export/keyframe_pictures.h"
 #include "export/map_model.h"
+#include "interrupt.h"
+#include "new_folder.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace {
@@ -45,22 +48,22 @@ void print_info(const std::string& path) {
   const auto fused =
       std::count_if(removed.begin(), removed.end(), [](const RemovedPoint& r) { return r.replaced_by != kNoPoint; });
   const CameraModel& c = file.context.camera;
-  fmt::print("file: {}\n", path);
-  fmt::print("checksums: right\n");
-  fmt::print("bytes: {}\n", std::filesystem::file_size(path));
-  fmt::print("keyframes: {}\n", live.size());
-  fmt::print("maps: {}\n", map.roots().size());
-  fmt::print("culled_keyframes: {}\n", map.keyframe_count() - map.live_keyframe_count());
-  fmt::print("features: {}\n", features);
-  fmt::print("points: {}\n", map.point_count());
-  fmt::print("observations: {}\n", observations);
-  fmt::print("removed_points: {}\n", removed.size());
-  fmt::print("fused_points: {}\n", fused);
-  fmt::print("first_stamp_s: {:.6f}\n", first_stamp);
-  fmt::print("last_stamp_s: {:.6f}\n", last_stamp);
-  fmt::print("extent_m: {:.2f} {:.2f} {:.2f}\n", size.x(), size.y(), size.z());
-  fmt::print("camera: {}x{} fx {} fy {} cx {} cy {}\n", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
-  fmt::print("pyramid: {} levels of {}\n", file.context.levels, file.context.scale_factor);
+  tell(stdout, "file: {}\n", path);
+  tell(stdout, "checksums: right\n");
+  tell(stdout, "bytes: {}\n", std::filesystem::file_size(path));
+  tell(stdout, "keyframes: {}\n", live.size());
+  tell(stdout, "maps: {}\n", map.roots().size());
+  tell(stdout, "culled_keyframes: {}\n", map.keyframe_count() - map.live_keyframe_count());
+  tell(stdout, "features: {}\n", features);
+  tell(stdout, "points: {}\n", map.point_count());
+  tell(stdout, "observations: {}\n", observations);
+  tell(stdout, "removed_points: {}\n", removed.size());
+  tell(stdout, "fused_points: {}\n", fused);
+  tell(stdout, "first_stamp_s: {:.6f}\n", first_stamp);
+  tell(stdout, "last_stamp_s: {:.6f}\n", last_stamp);
+  tell(stdout, "extent_m: {:.2f} {:.2f} {:.2f}\n", size.x(), size.y(), size.z());
+  tell(stdout, "camera: {}x{} fx {} fy {} cx {} cy {}\n", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
+  tell(stdout, "pyramid: {} levels of {}\n", file.context.levels, file.context.scale_factor);
 }
 
 struct MapExportArguments {
@@ -73,6 +76,8 @@ void export_model(const MapExportArguments& arguments) {
   const MapFile file = load_map(arguments.file);
   const bool colmap = arguments.format == "colmap";
   const std::filesystem::path out = arguments.out;
+  const Interrupt interrupt([] {});
+  NewFolder folder(out);
   std::string pictures = "no images: --images SOURCE adds them, with masks of what moves";
   if (!arguments.images.empty()) {
     SourceOptions reading;
@@ -92,8 +97,9 @@ void export_model(const MapExportArguments& arguments) {
     write_colmap(file, out);
   else
     write_nerfstudio(file, !arguments.images.empty(), out);
-  fmt::print("{}: {} keyframes, {} points; {}\n", arguments.out, keyframes_of_first_map(file.map).size(),
-             file.map.point_count(), pictures);
+  folder.keep();
+  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes_of_first_map(file.map).size(),
+       file.map.point_count(), pictures);
 }
 
 void export_map(const MapExportArguments& arguments) {
@@ -103,7 +109,7 @@ void export_map(const MapExportArguments& arguments) {
                             : arguments.format == "pcd" ? point_cloud_pcd(file.map)
                                                         : point_cloud_json(file.map);
   write_file_atomically(arguments.out, cloud);
-  fmt::print("{}: {} points\n", arguments.out, file.map.point_count());
+  tell(stdout, "{}: {} points\n", arguments.out, file.map.point_count());
 }
 
 struct MergeArguments {
@@ -128,8 +134,8 @@ void merge(const MergeArguments& arguments) {
     throw InputError(arguments.second + ": shows no place for certain that " + arguments.first +
                      " shows; record the way from one to the other");
   save_map(arguments.out, merged->map, a);
-  fmt::print("{}: {} keyframes, {} points; {} joints, {} loops closed\n", arguments.out,
-             merged->map.live_keyframe_count(), merged->map.point_count(), merged->merges, merged->loops);
+  tell(stdout, "{}: {} keyframes, {} points; {} joints, {} loops closed\n", arguments.out,
+       merged->map.live_keyframe_count(), merged->map.point_count(), merged->merges, merged->loops);
 }
 
 }  // namespace

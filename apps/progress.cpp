@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <string>
 
+#include "terminal.h"
+
 namespace dkb {
 
 Progress::Progress(std::optional<size_t> total, bool quiet)
@@ -26,15 +28,15 @@ void Progress::frame(size_t done, const FrameResult* result) {
     line += fmt::format("  ETA {:.0f} s", static_cast<double>(*total_ - std::min(*total_, done)) / rate);
   if (result != nullptr) line += fmt::format("  {} {} inliers", name_of(result->state), result->inliers);
   if (terminal_)
-    fmt::print(stderr, "\r\033[K{}", line);
+    tell(stderr, "\r\033[K{}", line);
   else
-    fmt::print(stderr, "{}\n", line);
+    tell(stderr, "{}\n", line);
   std::fflush(stderr);
   open_line_ = terminal_;
 }
 
 void Progress::finish() {
-  if (open_line_) fmt::print(stderr, "\n");
+  if (open_line_) tell(stderr, "\n");
   open_line_ = false;
 }
 

@@ -15,6 +15,7 @@
 #include "dkb/util/log.h"
 #include "interrupt.h"
 #include "live_report.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace {
@@ -37,12 +38,12 @@ PairWriterOptions quick_options(const std::string& out) {
 }
 
 int record(const RecordArguments& args) {
-  WarningLog warnings([](const std::string& line) { fmt::print(stderr, "warning: {}\n", line); });
+  WarningLog warnings([](const std::string& line) { tell(stderr, "warning: {}\n", line); });
   SourceOptions reading = args.reading;
   reading.depth_limits = false;  // those are for whoever reads the recording
   const std::unique_ptr<Source> source = open_source(args.source, reading);
   const auto writer = write_pairs(args.out, source->camera(), source->camera().to_yaml(), quick_options(args.out));
-  if (!args.quiet) fmt::print("{}, into {}; Ctrl-C ends it\n", source->description(), args.out);
+  if (!args.quiet) tell(stdout, "{}, into {}; Ctrl-C ends it\n", source->description(), args.out);
   const Interrupt interrupt([&] { source->stop(); });
   const bool terminal = isatty(STDERR_FILENO) != 0 && !args.quiet;
   LiveReport report;
@@ -59,7 +60,7 @@ int record(const RecordArguments& args) {
       const RgbdImage& image = *next.frame.image();
       const Picture picture{image.grey, image.colour};
       writer->add({next.frame.stamp_ns(), next.frame.depth_stamp_ns(), {}, &picture, &image.depth});
-      if (++kept % 30 == 0 && terminal) fmt::print(stderr, "\r\033[K{} frames", kept);
+      if (++kept % 30 == 0 && terminal) tell(stderr, "\r\033[K{} frames", kept);
     }
   };
   bool full = false;
@@ -71,13 +72,13 @@ int record(const RecordArguments& args) {
   } catch (...) {
     failure = std::current_exception();
   }
-  if (terminal) fmt::print(stderr, "\n");
+  if (terminal) tell(stderr, "\n");
   for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
   source->stop();
   warnings.finish();
   if (kept == 0) {
     if (failure) std::rethrow_exception(failure);
-    fmt::print(stderr, "error: {} gave no frame; nothing was written\n", args.source);
+    tell(stderr, "error: {} gave no frame; nothing was written\n", args.source);
     return Interrupt::happened() ? 130 : 1;
   }
   try {
@@ -88,7 +89,7 @@ int record(const RecordArguments& args) {
   }
   if (full) writer->salvage();
   if (full) warnings.warn("full", args.out + " could not be written to the end; what is whole was kept");
-  if (!args.quiet) fmt::print("{}: {}\n", args.out, report.text(source->counts()));
+  if (!args.quiet) tell(stdout, "{}: {}\n", args.out, report.text(source->counts()));
   if (failure) std::rethrow_exception(failure);
   return Interrupt::happened() ? 130 : 0;
 }
@@ -96,13 +97,13 @@ int record(const RecordArguments& args) {
 void list_sources() {
   for (const SourceKind& kind : source_kinds()) {
     const std::string missing = kind.why_not();
-    fmt::print("{:<44}{}{}\n", kind.form, kind.live ? "live" : "recorded",
-               missing.empty() ? "" : "; not available: " + missing);
+    tell(stdout, "{:<44}{}{}\n", kind.form, kind.live ? "live" : "recorded",
+         missing.empty() ? "" : "; not available: " + missing);
     if (!missing.empty()) continue;
     try {
-      for (const std::string& device : kind.devices()) fmt::print("    {}\n", device);
+      for (const std::string& device : kind.devices()) tell(stdout, "    {}\n", device);
     } catch (const InputError& e) {
-      fmt::print("    {}\n", e.what());
+      tell(stdout, "    {}\n", e.what());
     }
   }
 }

@@ -26,6 +26,7 @@
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
 #include "interrupt.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -143,7 +144,7 @@ std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr
 
 RunSession::RunSession(const RunArguments& args)
     : args_(args),
-      warnings_([](const std::string& line) { fmt::print(stderr, "{}\n", line); }),
+      warnings_([](const std::string& line) { tell(stderr, "{}\n", line); }),
       options_(checked(args)),
       recording_(open_source(args, args.threads != 1 || args.realtime)),
       opened_(*recording_),
@@ -159,7 +160,7 @@ RunSession::RunSession(const RunArguments& args)
   slam_->explain_keyframes(args.debug_log || args.viewer.on || args.viewer.record);
   out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
   make_output_folder(out_);
-  if (!args.quiet) fmt::print("{}, results in {}\n", recording_->description(), out_.string());
+  if (!args.quiet) tell(stdout, "{}, results in {}\n", recording_->description(), out_.string());
 
   facts_.writes_map = !args.localize;
   if (args.dump_features) facts_.features_csv = "timestamp,x,y,state\n";
@@ -286,21 +287,21 @@ int RunSession::tell_the_end() {
                s.tracked, facts_.offered, s.keyframes, s.map_points,
                s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
   if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !args_.quiet && !line.empty())
-    fmt::print("{}\n", line);
+    tell(stdout, "{}\n", line);
   if (const SourceCounts lost = recording_->counts(); !live_ && !args_.quiet && lost.unpaired + lost.late > 0)
-    fmt::print("{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
+    tell(stdout, "{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
   const bool cut_short = Interrupt::happened();
   if (viewer_) viewer_->serve_on(*slam_, args_.quiet);
   warn_of_viewer();
   if (cut_short) return 130;
   if (s.tracked > 0) return 0;
   if (args_.localize)
-    fmt::print(stderr, "error: the camera was never found in {}\n", args_.load_map);
+    tell(stderr, "error: the camera was never found in {}\n", args_.load_map);
   else
-    fmt::print(stderr,
-               "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
-               "units of the camera's depth_factor ({} per metre)?\n",
-               options_.tracking.initial_points, opened_.camera().depth_factor);
+    tell(stderr,
+         "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
+         "units of the camera's depth_factor ({} per metre)?\n",
+         options_.tracking.initial_points, opened_.camera().depth_factor);
   return 1;
 }
 

@@ -9,6 +9,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
 #include "interrupt.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -64,7 +65,7 @@ RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const st
   o.truth = true_positions(source_name);
   viewer_ = open_viewer(o);
   if (!serves_) return;
-  fmt::print(stderr, "viewer: {}\n", viewer_->url());
+  tell(stderr, "viewer: {}\n", viewer_->url());
   std::fflush(stderr);
 }
 
@@ -95,7 +96,7 @@ void RunViewer::serve_on(const Slam& slam, bool quiet) {
   if (slam.options().dense_map && !Interrupt::happened()) viewer_->show_dense_map(slam.dense_map_task());
   viewer_->ended(slam.map());
   if (!serves_ || exit_ || Interrupt::happened()) return;
-  if (!quiet) fmt::print("the page is served until Ctrl-C\n");
+  if (!quiet) tell(stdout, "the page is served until Ctrl-C\n");
   while (!Interrupt::happened()) {
     save_if_asked(slam);
     viewer_->wait_order(kPatience);

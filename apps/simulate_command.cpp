@@ -9,6 +9,8 @@
 
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/simulator/simulator.h"
+#include "interrupt.h"
+#include "new_folder.h"
 
 namespace dkb {
 namespace {
@@ -23,9 +25,13 @@ void run_simulate(const SimulateArguments& arguments) {
   const Simulator simulator(arguments.options);
   for (const std::string& note : simulator.notes()) std::fprintf(stderr, "warning: %s\n", note.c_str());
   const bool live = isatty(STDERR_FILENO) != 0;
+  const Interrupt interrupt([] {});
+  NewFolder folder(arguments.out);
   write_sequence(simulator, arguments.out, [&](int written) {
+    Interrupt::check();
     if (live) std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
   });
+  folder.keep();
   if (live) std::fputs("\n", stderr);
   std::printf(
       "%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),

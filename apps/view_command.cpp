@@ -16,6 +16,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/viewer/replay.h"
 #include "interrupt.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace {
@@ -57,9 +58,9 @@ int view(const ViewArguments& args) {
     over = true;
     interrupted.notify_all();
   });
-  fmt::print(stderr, "viewer: {}\n", replay->url());
+  tell(stderr, "viewer: {}\n", replay->url());
   std::fflush(stderr);
-  if (!args.quiet) fmt::print("the page is served until Ctrl-C\n");
+  if (!args.quiet) tell(stdout, "the page is served until Ctrl-C\n");
   std::fflush(stdout);
   std::unique_lock lock(mutex);
   interrupted.wait(lock, [&] { return over; });

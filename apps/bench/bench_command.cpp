@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <thread>
@@ -15,6 +14,8 @@
 #include "bench/bench_runner.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "interrupt.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -30,11 +31,6 @@ struct BenchArguments {
   ReportOptions report;
   bool no_times = false;
 };
-
-std::atomic<bool> stopped{false};
-void on_signal(int) {
-  stopped = true;
-}
 
 // Whether `name` is among `chosen`, which must all exist; an empty choice is everything.
 template <class Item>
@@ -52,7 +48,7 @@ std::vector<bool> chosen(const std::vector<std::string>& names, const std::vecto
 }
 
 void say_report(const fs::path& folder) {
-  fmt::print("{}: results.md, report.html, results.json, plots/\n", folder.string());
+  tell(stdout, "{}: results.md, report.html, results.json, plots/\n", folder.string());
 }
 
 // `--merge DIR`: DIR may be a results folder, or hold several of them.
@@ -81,7 +77,7 @@ int merge(const BenchArguments& args) {
   const std::vector<Job> jobs = jobs_of(whole.suite());
   for (const Job& job : jobs) there += whole.record(job).has_value();
   write_report(into, make_report(whole, args.report));
-  fmt::print("{} of {} runs\n", there, jobs.size());
+  tell(stdout, "{} of {} runs\n", there, jobs.size());
   say_report(into);
   return 0;
 }
@@ -102,20 +98,19 @@ int measure(const BenchArguments& args) {
   options.check();
   options.suite_folder = fs::absolute(fs::path(args.suite)).parent_path();
   const ResultsFolder folder = ResultsFolder::open(out, text, suite);
-  stopped = false;
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  std::atomic<bool> stopped{false};
+  const Interrupt interrupt([&] { stopped = true; });
   const RunnerReport report = run_jobs(folder, jobs, options, stopped);
   for (const LeftOut& left : report.left_out)
-    fmt::print(stderr, "left out: {}: {}; to get it: {}\n", left.what, left.why, left.get);
-  fmt::print("{} runs done, {} of them failed; {} were there already\n", report.done, report.failed, report.reused);
+    tell(stderr, "left out: {}: {}; to get it: {}\n", left.what, left.why, left.get);
+  tell(stdout, "{} runs done, {} of them failed; {} were there already\n", report.done, report.failed, report.reused);
   if (report.interrupted) {
-    fmt::print(stderr, "interrupted: start the same command again to go on\n");
+    tell(stderr, "interrupted: start the same command again to go on\n");
     return 130;
   }
   if (shard.count > 1) {
-    fmt::print("shard {}/{} is complete; when all are: dkb-slam bench --merge {}\n", shard.index, shard.count,
-               out.string());
+    tell(stdout, "shard {}/{} is complete; when all are: dkb-slam bench --merge {}\n", shard.index, shard.count,
+         out.string());
     return 0;
   }
   write_report(out, make_report(folder, args.report));

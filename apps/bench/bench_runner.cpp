@@ -24,6 +24,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/version.h"
+#include "terminal.h"
 
 namespace dkb::bench {
 namespace fs = std::filesystem;
@@ -79,12 +80,12 @@ class Progress {
   Progress(size_t total, bool quiet) : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
   void say(const std::string& line) const {
     if (quiet_) return;
-    fmt::print(stderr, "{}{}\n", terminal_ ? "\r\033[K" : "", line);
+    tell(stderr, "{}{}\n", terminal_ ? "\r\033[K" : "", line);
     std::fflush(stderr);
   }
   void status(const std::string& line) const {
     if (quiet_ || !terminal_) return;
-    fmt::print(stderr, "\r\033[K{}", line);
+    tell(stderr, "\r\033[K{}", line);
     std::fflush(stderr);
   }
   void running(size_t done, size_t running) const {
@@ -100,7 +101,7 @@ class Progress {
                     terminal_ || done == total_ ? "" : ", ETA " + eta(done)));
   }
   void end() const {
-    if (!quiet_ && terminal_) fmt::print(stderr, "\r\033[K");
+    if (!quiet_ && terminal_) tell(stderr, "\r\033[K");
   }
 
  private:

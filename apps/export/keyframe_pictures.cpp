@@ -11,6 +11,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
 #include "export/map_model.h"
+#include "interrupt.h"
 
 namespace dkb {
 namespace {
@@ -40,6 +41,7 @@ int write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, Mas
   make_output_folder(folder / "masks");
   int written = 0;
   for (SourceFrame next = source.next(); next.state != SourceState::ended; next = source.next()) {
+    Interrupt::check();
     if (next.state != SourceState::frame) continue;
     const FrameResult result = slam.process(next.frame);
     const auto picture = wanted.find(ns_from_seconds(seconds_from_ns(next.frame.stamp_ns())) / 1000);

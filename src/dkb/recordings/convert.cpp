@@ -57,6 +57,7 @@ Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertO
   const auto writer = write_pairs(out, camera, text, {.compression = options.compression});
   Converted converted{0, "pairs"};
   for (const DatasetPair& pair : dataset.pairs) {
+    options.go_on();
     try {
       const std::string colour = read_file(pair.colour_path);
       Picture picture = decode_picture(colour, pair.colour_path.string());
@@ -150,6 +151,7 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
 
   Converted converted{0, "messages"};
   while (const auto message = stream.next()) {
+    options.go_on();
     if (std::exchange(camera_due, false)) writer->write(camera_topic, message->recorded_ns, encode_string(camera));
     add_topics();
     const Written& written = topics[message->topic];
@@ -251,6 +253,7 @@ Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs:
   const auto writer = write_pairs(out, contents.camera, text);
   PairsToFolder pairs(stream, contents, *writer, options);
   while (const auto message = stream.next()) {
+    options.go_on();
     const std::string& topic = stream.topics()[message->topic].name;
     if (topic == contents.colour.name) pairs.add(StampPairing::colour, *message);
     if (topic == contents.depth.name) pairs.add(StampPairing::depth, *message);

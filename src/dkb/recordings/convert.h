@@ -16,6 +16,7 @@ struct ConvertOptions {
   Compression compression = Compression::none;  // of a recording's chunks
   bool raw = false;  // folder to recording: colour as pixels, where else the files are kept as they are
   std::function<void(const std::string&)> warn = [](const std::string&) {};
+  std::function<void()> go_on = [] {};  // called before each pair or message; what it throws ends the conversion
 };
 
 // Writes a folder in any of the known layouts, or a recording, anew, as a folder, FILE.bag or FILE.mcap, so that the
