@@ -118,6 +118,9 @@ int run_command_line(int argc, char** argv) {
   } catch (const dkb::InterruptedError& e) {
     print_error(e.what());
     return kInterrupted;
+  } catch (const dkb::OutputError& e) {
+    print_error(e.what());
+    return kFailed;
   } catch (const dkb::InputError& e) {
     print_error(e.what());
     return kBadInput;

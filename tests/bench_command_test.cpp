@@ -214,7 +214,7 @@ TEST_F(Bench, AFullDiskEndsItWithEarlierResultsKept) {
   ASSERT_EQ(bench({file.string(), "--out", out(), "--variant", "ORB"}).exit_code, 0);
   const std::string kept = read_text(temp_.path() / "out" / "results.json");
   const Finished full = bench({file.string(), "--out", out()}, 4000);
-  EXPECT_EQ(full.exit_code, 2);
+  EXPECT_EQ(full.exit_code, 1);
   EXPECT_EQ(full.error_lines(), 1u) << full.err;
   EXPECT_NE(full.err.find("cannot be written"), std::string::npos) << full.err;
   EXPECT_EQ(records(temp_ / "out"), 2u);

@@ -184,7 +184,7 @@ TEST(RunBadInput, AFullDiskLeavesNothingHalfWritten) {
   const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none",
                                     "--max-frames", "20", "--quiet"},
                                    1000);
-  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(run.exit_code, 1) << run.err;
   EXPECT_EQ(run.error_lines(), 1U) << run.err;
   EXPECT_NE(run.err.find("trajectory.txt"), std::string::npos) << run.err;
   for (const auto& left : fs::directory_iterator(temp / "out")) ADD_FAILURE() << "left behind: " << left.path();
@@ -197,7 +197,7 @@ TEST(RunBadInput, AnEarlierResultSurvivesAFullDisk) {
   const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none",
                                     "--max-frames", "20", "--quiet"},
                                    1000);
-  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(run.exit_code, 1) << run.err;
   EXPECT_EQ(read_text(temp.path() / "out" / "trajectory.txt"), "earlier");
 }
 

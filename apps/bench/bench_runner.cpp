@@ -372,8 +372,8 @@ class Runner {
   // Keeps what a run left. Throws OutputError when the disk is full, of which a run's failure may be the first sign.
   RunRecord finish(const Running& run, const Ended& how, const std::string& failure) const {
     const RunRecord r = record_of(run, how, failure);
-    if (how.exit_code == 2 && (r.failure.find("cannot be written") != std::string::npos ||
-                               r.failure.find("cannot make this output folder") != std::string::npos))
+    // Statistics are the last of a run's results: a run that went wrong without them could not write.
+    if (how.exit_code == 1 && !fs::exists(run.out / "stats.json"))
       throw OutputError(r.failure + "; finished runs are kept, start again to go on");
     std::error_code ignored;
     const fs::path trajectory = run.out / "trajectory.txt";

@@ -52,7 +52,7 @@ class FolderPairWriter final : public PairWriter {
       : path_(path.has_filename() ? path : path.parent_path()), camera_(camera), png_level_(png_level) {
     std::error_code error;
     if (fs::exists(path_, error) && !(fs::is_directory(path_, error) && fs::is_empty(path_, error)))
-      throw OutputError(path_.string() + ": is there already and not empty; choose another folder with --out");
+      throw InputError(path_.string() + ": is there already and not empty; choose another folder with --out");
     const fs::path above = path_.has_parent_path() ? path_.parent_path() : ".";
     temporary_.path = above / ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()));
     make_output_folder(temporary_.path / "rgb");

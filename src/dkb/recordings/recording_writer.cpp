@@ -20,7 +20,7 @@ std::unique_ptr<RecordingWriter> write_recording(const std::filesystem::path& pa
     if (compression == Compression::bz2) throw InvalidOption("compression", "bz2", "none, lz4 or zstd in an mcap file");
     return std::make_unique<McapWriter>(path, compression);
   }
-  throw OutputError(path.string() + ": a recording is written as FILE.bag or FILE.mcap");
+  throw InputError(path.string() + ": a recording is written as FILE.bag or FILE.mcap");
 }
 
 }  // namespace dkb

@@ -54,10 +54,10 @@ TEST(SequenceWriter, SequenceReadsBackAsATumDataset) {
   for (const DatasetPair& p : data.pairs) EXPECT_TRUE(fs::exists(folder / "masks" / (p.stamp + ".png")));
 }
 
-TEST(SequenceWriter, FolderThatCannotBeMadeIsAnOutputError) {
+TEST(SequenceWriter, FolderThatCannotBeMadeIsABadInput) {
   const test::TempFolder folder;
   std::ofstream(folder / "taken") << "";
-  EXPECT_THROW(write_sequence(Simulator(small("rush", 1)), folder / "taken"), OutputError);
+  EXPECT_THROW(write_sequence(Simulator(small("rush", 1)), folder / "taken"), InputError);
 }
 
 }  // namespace

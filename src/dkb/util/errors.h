@@ -7,7 +7,7 @@
 
 namespace dkb {
 
-// An output that cannot be written: unwritable folder, full disk.
+// An output that cannot be written, when all input was right: a full disk. The program's exit code is 1 then, not 2.
 class OutputError : public InputError {
  public:
   using InputError::InputError;

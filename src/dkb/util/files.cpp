@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <system_error>
 
 #include "dkb/util/errors.h"
 
@@ -81,11 +82,14 @@ void write_file_atomically(const fs::path& path, std::string_view content) {
 void make_output_folder(const fs::path& path) {
   std::error_code ec;
   fs::create_directories(path, ec);
-  if (ec || !fs::is_directory(path, ec))
-    throw OutputError(path.string() + ": cannot make this output folder (" +
-                      (ec ? ec.message() : "a file is in the way") + "); choose another with --out");
+  if (ec || !fs::is_directory(path, ec)) {
+    const std::string message = path.string() + ": cannot make this output folder (" +
+                                (ec ? ec.message() : "a file is in the way") + "); choose another with --out";
+    if (ec == std::errc::no_space_on_device) throw OutputError(message);
+    throw InputError(message);
+  }
   if (::access(path.c_str(), W_OK | X_OK) != 0)
-    throw OutputError(path.string() + ": this output folder cannot be written; choose another with --out");
+    throw InputError(path.string() + ": this output folder cannot be written; choose another with --out");
 }
 
 }  // namespace dkb

@@ -14,7 +14,8 @@ std::string read_file(const std::filesystem::path& path);
 // A reader sees the old file or the new one, never a part. Throws OutputError naming the file and the reason.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
-// Makes `path` (and its parents) and proves that files can be written there. Throws OutputError.
+// Makes `path` (and its parents) and proves that files can be written there. Throws InputError for a folder that
+// cannot be used, OutputError for a full disk.
 void make_output_folder(const std::filesystem::path& path);
 
 }  // namespace dkb

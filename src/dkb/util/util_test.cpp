@@ -144,7 +144,7 @@ TEST(Files, AnUnwritablePlaceIsNamed) {
   } catch (const OutputError& e) {
     EXPECT_NE(std::string(e.what()).find("/proc/nowhere/a.txt"), std::string::npos);
   }
-  EXPECT_THROW(make_output_folder("/proc/nowhere"), OutputError);
+  EXPECT_THROW(make_output_folder("/proc/nowhere"), InputError);
   EXPECT_THROW(read_file("/nowhere/at/all"), InputError);
 }
 
