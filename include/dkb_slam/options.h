@@ -38,7 +38,7 @@ class DKB_SLAM_API Options {
   uint64_t seed = 1;  ///< of every source of randomness
 
   struct Features {
-    int count = 900;             ///< [features] wanted per image, at least 1
+    int count = 900;             ///< [features] wanted per image, 1 ... 100000
     int levels = 7;              ///< of the image pyramid, 1 ... 16
     double scale = 1.2;          ///< size of a level over the next smaller one, above 1, at most 4
     int fast_threshold = 20;     ///< [grey levels] contrast of a corner, fast_threshold_min ... 254
@@ -107,7 +107,7 @@ class DKB_SLAM_API Options {
   } dense;
 
   struct Pipeline {
-    double mapper_latency = 0.1;  ///< [s] after which tracking sees a keyframe's mapping, in whole frames, above 0
+    double mapper_latency = 0.1;  ///< [s] until tracking sees a keyframe's mapping, in frames, above 0, at most 10
     int mapper_queue = 4;         ///< [keyframes] that may wait for mapping in a real-time run, at least 1
   } pipeline;
 

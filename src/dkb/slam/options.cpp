@@ -28,7 +28,7 @@ template <class Public, class Internal, class Visit>
 void each_setting(Public& p, Internal& o, const Visit& visit) {
   visit("seed", p.seed, o.seed, "of every source of randomness");
 
-  visit("features.count", p.features.count, o.features.count, "[features] wanted per image", at_least(1));
+  visit("features.count", p.features.count, o.features.count, "[features] wanted per image", Range{1, 100000});
   visit("features.levels", p.features.levels, o.features.levels, "levels of the image pyramid", Range{1, 16});
   visit("features.scale", p.features.scale, o.features.scale, "size of a level over the next smaller one",
         Range{1, 4, true});
@@ -107,7 +107,7 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
         "threads that make the dense map; the result does not depend on them", Range{1, 64});
 
   visit("pipeline.mapper_latency", p.pipeline.mapper_latency, o.pipeline.mapper_latency,
-        "[s] until tracking sees a keyframe's mapping, in whole frames", above(0));
+        "[s] until tracking sees a keyframe's mapping, in whole frames", Range{0, 10, true});
   visit("pipeline.mapper_queue", p.pipeline.mapper_queue, o.pipeline.mapper_queue,
         "[keyframes] waiting for mapping at most, in a real-time run", at_least(1));
 }

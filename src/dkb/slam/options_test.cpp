@@ -123,7 +123,7 @@ TEST(Options, ExperimentsAreWrittenOnlyWhenSet) {
 }
 
 TEST(Options, ErrorsNameTheWholeKey) {
-  EXPECT_EQ(refusal("features.count=-5"), "--set: features.count: -5 is out of range; it must be at least 1");
+  EXPECT_EQ(refusal("features.count=-5"), "--set: features.count: -5 is out of range; it must be 1 ... 100000");
   EXPECT_EQ(refusal("experiment.mapping.ba.edge_weight=20"),
             "--set: experiment.mapping.ba.edge_weight: 20 is out of range; it must be above 0, at most 10");
   EXPECT_EQ(refusal("dynamics.filter=paprr"),
@@ -135,12 +135,14 @@ TEST(Options, ErrorsNameTheWholeKey) {
     EXPECT_EQ(message.rfind(key + ": ", 0), 0u) << message;
   };
   rejects("features.count", [](auto& o) { o.features.count = 0; });
+  rejects("features.count", [](auto& o) { o.features.count = 100001; });
   rejects("features.fast_threshold", [](auto& o) { o.features.fast_threshold = 5; });
   rejects("noise.pixel_sigma", [](auto& o) { o.noise.pixel_sigma = std::nan(""); });
   rejects("tracking.min_inliers", [](auto& o) { o.tracking.min_inliers = 0; });
   rejects("dense.truncation", [](auto& o) { o.dense.truncation = 3; });
   rejects("dense.obstacle_high", [](auto& o) { o.dense.obstacle_high = 0.05; });
   rejects("pipeline.mapper_latency", [](auto& o) { o.pipeline.mapper_latency = 0; });
+  rejects("pipeline.mapper_latency", [](auto& o) { o.pipeline.mapper_latency = 10.1; });
   rejects("dynamics.filter", [](auto& o) { o.dynamics.filter = static_cast<FilterKind>(99); });
   rejects("experiment.keyframes.threshold_max", [](auto& o) { o.set("experiment.keyframes.threshold_max", "1"); });
 }

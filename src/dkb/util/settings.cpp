@@ -43,6 +43,12 @@ std::string number_to_text(T value) {
   return std::string(buffer, end);
 }
 
+// A limit in digits: 100000, not 1e+05.
+std::string limit_to_text(double value) {
+  return std::abs(value) < 1e15 && value == std::floor(value) ? number_to_text(static_cast<int64_t>(value))
+                                                              : number_to_text(value);
+}
+
 std::string place(const std::string& file, const YAML::Mark& mark) {
   return mark.is_null() ? file : file + ":" + std::to_string(mark.line + 1);
 }
@@ -129,10 +135,10 @@ std::string SettingEntry::meaning() const {
 
 std::string Range::text() const {
   if (std::isfinite(max))
-    return above_min ? "above " + number_to_text(min) + ", at most " + number_to_text(max)
-                     : number_to_text(min) + " ... " + number_to_text(max);
+    return above_min ? "above " + limit_to_text(min) + ", at most " + limit_to_text(max)
+                     : limit_to_text(min) + " ... " + limit_to_text(max);
   if (!std::isfinite(min)) return "";
-  return (above_min ? "above " : "at least ") + number_to_text(min);
+  return (above_min ? "above " : "at least ") + limit_to_text(min);
 }
 
 template <class Number>
