@@ -30,12 +30,21 @@ std::vector<std::string> detector_kinds(const std::string& detector, bool has_mo
       ("+" + detector).find("+" + std::string(kExec));  // the last kind, since a command may hold a +
   std::istringstream parts(detector.substr(0, command));
   for (std::string kind; std::getline(parts, kind, '+');) {
+    if (kind == "auto")
+      throw InputError("--detector " + detector +
+                       ": auto cannot be joined to others; name what it stands for, yolo or motion");
     if (std::find(known.begin() + 1, known.end(), kind) == known.end())
       throw InputError("--detector: there is no detector \"" + kind + "\"" + did_you_mean(kind, known) +
                        "; detectors: auto, none, yolo (network), motion, file, exec:COMMAND, or several joined by +");
-    if (kind != "none") kinds.push_back(kind == "network" ? "yolo" : kind);
+    if (kind == "network") kind = "yolo";
+    if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end())
+      throw InputError("--detector " + detector + ": names " + kind + " twice; name it once");
+    kinds.push_back(kind);
   }
   if (command != std::string::npos) kinds.push_back(detector.substr(command));
+  if (kinds.size() > 1 && std::find(kinds.begin(), kinds.end(), "none") != kinds.end())
+    throw InputError("--detector " + detector + ": none cannot be joined to others; leave it out");
+  std::erase(kinds, "none");
   return kinds;
 }
 
