@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "number_check.h"
 #include "run_session.h"
 
 namespace dkb {
@@ -13,23 +14,30 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   SourceOptions& reading = args->reading;
   command->add_option("--camera", reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
   command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
-  command->add_option("--config", args->config, "YAML file of settings, as written to config.yaml");
-  command->add_option("--set", args->set,
-                      "key=value, any setting of config.yaml, or experiment.NAME=value; may be repeated");
+  command->add_option("--config", args->config,
+                      "YAML file of settings, as written to config.yaml");
+  command
+      ->add_option("--set", args->set,
+                   "key=value, any setting of config.yaml, or experiment.NAME=value; may be repeated")
+      ->allow_extra_args(false);
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
-  command->add_option("--seed", args->seed, "Seed of every source of randomness")->each([args](const std::string&) {
-    args->has_seed = true;
-  });
+  command->add_option("--seed", args->seed, "Seed of every source of randomness")
+      ->check(not_negative())
+      ->each([args](const std::string&) { args->has_seed = true; });
   DetectorChoice& detection = args->detection;
-  command->add_option("--detector", detection.kinds,
-                      "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
+  command
+      ->add_option("--detector", detection.kinds,
+                   "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--inference", detection.inference,
                       "What computes it: auto (ONNX Runtime where it is found, else OpenCV), onnxruntime, opencv");
-  command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)");
-  command->add_option("--detect-latency", detection.latency,
-                      "[frames] until a detection is used (default: by the model's size)");
+  command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)")
+      ->check(CLI::Range(1, 10000));
+  command
+      ->add_option("--detect-latency", detection.latency,
+                   "[frames] until a detection is used (default: by the model's size)")
+      ->check(CLI::Range(1, 10000));
   command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
@@ -38,7 +46,9 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_option("--start", reading.start, "[s] after the first pair");
   command->add_option("--end", reading.end, "[s] after the first pair");
   command->add_option("--max-frames", reading.max_frames, "Pairs at most, counted from --start");
-  command->add_option("--threads", args->threads, "1 = everything on one thread (the same bytes)");
+  command
+      ->add_option("--threads", args->threads, "1 = everything on one thread, else one for each part (the same bytes)")
+      ->check(CLI::Range(0, 1024));
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
   command->add_option("--colour-topic", reading.colour_topic, "Of a recording with several topics of colour images");
   command->add_option("--depth-topic", reading.depth_topic, "Likewise of depth images");

@@ -11,6 +11,7 @@
 #include "dkb/simulator/simulator.h"
 #include "interrupt.h"
 #include "new_folder.h"
+#include "number_check.h"
 
 namespace dkb {
 namespace {
@@ -63,8 +64,11 @@ void register_simulate(CLI::App& app, int& exit_code) {
   command->add_flag("--flicker", o.flicker, "exposure jumps, and lamps flicker at 100 Hz");
   command->add_option("--stand-still", o.stand_still,
                       "seconds that people stand from the start, half of them in view, before they walk off");
-  command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)");
-  command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")->capture_default_str();
+  command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)")
+      ->check(CLI::Range(0, 30));
+  command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")
+      ->check(not_negative())
+      ->capture_default_str();
   command->add_option("--blackout", arguments->blackout, "START,SECONDS: colour and depth are black from there on")
       ->delimiter(',')
       ->expected(2);

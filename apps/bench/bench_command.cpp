@@ -143,8 +143,8 @@ void register_bench(CLI::App& app, int& exit_code) {
   CLI::Option* merging = command->add_option(
       "--merge", args->merge, "Report on this results folder, or on several in this folder (with --out)");
   command->add_option("--data", args->runner.data, "Folder of the sequences, instead of the suite's root");
-  command->add_option("--sequence", args->sequences, "Only this sequence; may be repeated");
-  command->add_option("--variant", args->variants, "Only this variant; may be repeated");
+  command->add_option("--sequence", args->sequences, "Only this sequence; may be repeated")->allow_extra_args(false);
+  command->add_option("--variant", args->variants, "Only this variant; may be repeated")->allow_extra_args(false);
   command->add_option("--seeds", args->seeds, "Runs per sequence and variant, instead of the suite's");
   command->add_option("--max-frames", args->max_frames, "Pairs per run at most, instead of the suite's");
   command->add_option("--program", args->runner.program, "Another build of dkb-slam to run");
