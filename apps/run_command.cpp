@@ -12,10 +12,14 @@ namespace {
 // The options that `run` and `live` have in common.
 void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   SourceOptions& reading = args->reading;
+  const auto given = [args](bool RunArguments::*flag) {
+    return [args, flag](const std::string&) { (*args).*flag = true; };
+  };
   command->add_option("--camera", reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
-  command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb");
+  command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb")
+      ->each(given(&RunArguments::has_preset));
   command->add_option("--config", args->config,
-                      "YAML file of settings, as written to config.yaml");
+                      "YAML file of settings, as written to config.yaml; its preset and that of --preset must agree");
   command
       ->add_option("--set", args->set,
                    "key=value, any setting of config.yaml, or experiment.NAME=value; may be repeated")
@@ -23,11 +27,12 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
   command->add_option("--seed", args->seed, "Seed of every source of randomness")
       ->check(not_negative())
-      ->each([args](const std::string&) { args->has_seed = true; });
+      ->each(given(&RunArguments::has_seed));
   DetectorChoice& detection = args->detection;
   command
       ->add_option("--detector", detection.kinds,
-                   "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
+                   "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +")
+      ->each(given(&RunArguments::has_detector));
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--inference", detection.inference,

@@ -58,6 +58,20 @@ void append_frame(std::string& log, const std::string& stamp, const FrameResult&
   log += '\n';
 }
 
+// Where the setting that a message begins with was given, to stand before the message; empty for a default.
+std::string place_of(const RunArguments& args, const std::string& message) {
+  const std::string key = message.substr(0, message.find(':'));
+  for (const std::string& assignment : args.set)
+    if (assignment.starts_with(key + "=")) return "--set: ";
+  if (args.config.empty()) return "";
+  Settings known;
+  double unused = 0;
+  known.bind(key, &unused, "");
+  for (const SettingLine& line : known.parse_yaml(read_file(args.config), args.config))
+    if (line.key == key) return line.where + ": ";
+  return "";
+}
+
 Options options_of(const RunArguments& args) {
   Options options(args.preset);
   if (!args.config.empty()) options.load(args.config);
@@ -69,7 +83,11 @@ Options options_of(const RunArguments& args) {
   options.threaded = args.threads != 1;
   options.realtime = args.realtime || is_live(args.source);
   options.dense_map = args.dense;
-  options.check();
+  try {
+    options.check();
+  } catch (const InvalidOption& e) {
+    throw InputError(place_of(args, e.what()) + e.what());
+  }
   return options;
 }
 
@@ -131,7 +149,7 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
 
 Options checked(const RunArguments& args) {
   Options options = options_of(args);
-  if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  check_arguments(args, options);
   return options;
 }
 

@@ -32,7 +32,7 @@ struct RunArguments {
   SourceOptions reading;
   std::string prior = "auto";
   uint64_t seed = 1;
-  bool has_seed = false;
+  bool has_seed = false, has_preset = false, has_detector = false;  // given, not by default
   int threads = 0;
   DetectorChoice detection;
   std::string filter, disable;
@@ -43,6 +43,9 @@ struct RunArguments {
   bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
        quiet = false;
 };
+
+// Refuses options that contradict each other. Throws InputError.
+void check_arguments(const RunArguments& args, const Options& options);
 
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {

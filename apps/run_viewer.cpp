@@ -46,8 +46,10 @@ void add_viewer_options(CLI::App& command, ViewerArguments& args) {
       ->check(CLI::Range(0, 65535))
       ->each([&args](const std::string&) { args.on = true; });
   command.add_flag("--viewer-exit", args.exit, "End with the run instead of serving the page until Ctrl-C");
-  command.add_option("--viewer-host", args.host,
-                     "Address to serve at; another than 127.0.0.1 lets other machines in, with the printed token");
+  command
+      .add_option("--viewer-host", args.host,
+                  "Address to serve at; another than 127.0.0.1 lets other machines in, with the printed token")
+      ->each([&args](const std::string&) { args.has_host = true; });
 }
 
 RunViewer::RunViewer(const ViewerArguments& args, const Source& source, const std::string& source_name,

@@ -15,7 +15,7 @@ namespace dkb {
 
 // The options of the live page and of recording the session, on any command that tracks.
 struct ViewerArguments {
-  bool on = false, exit = false, record = false;
+  bool on = false, exit = false, record = false, has_host = false;
   int port = 8090;
   std::string host = "127.0.0.1";
 };
