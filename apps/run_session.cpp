@@ -17,6 +17,7 @@
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
+#include "dkb/detection/boxes_file.h"
 #include "dkb/map/map_file.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
@@ -147,6 +148,10 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   return r;
 }
 
+bool has_boxes(const BoxesByTime& boxes, int64_t stamp_ns) {
+  return find_same_stamp(boxes, seconds_from_ns(stamp_ns), [](const TimedBoxes& t) { return t.timestamp; }) != nullptr;
+}
+
 Options checked(const RunArguments& args) {
   Options options = options_of(args);
   check_arguments(args, options);
@@ -155,7 +160,34 @@ Options checked(const RunArguments& args) {
 
 std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr<Source> source) {
   if (args.prior_file.empty()) return source;
-  return with_prior(std::move(source), read_odometry(args.prior_file));
+  OdometryTrack track = read_odometry(args.prior_file);
+  if (const auto* recording = dynamic_cast<const ReaderSource*>(source.get())) {
+    const std::vector<int64_t> stamps = recording->stamps_ns();
+    if (!stamps.empty() &&
+        (seconds_from_ns(stamps.back()) < track.first() || seconds_from_ns(stamps.front()) > track.last()))
+      throw InputError(fmt::format(
+          "{}: its times, {:.3f} ... {:.3f} s, are not those of the images, {:.3f} ... {:.3f} s", args.prior_file,
+          track.first(), track.last(), seconds_from_ns(stamps.front()), seconds_from_ns(stamps.back())));
+  }
+  return with_prior(std::move(source), std::move(track));
+}
+
+// The boxes of a file, to see whether they belong to these images. Throws InputError when it is known that they do not.
+BoxesByTime boxes_of(const RunArguments& args, const Source& source, const ReaderSource* reader) {
+  BoxesByTime boxes = read_boxes(args.detection.boxes, source.camera().width, source.camera().height);
+  const std::vector<int64_t> stamps = reader != nullptr ? reader->stamps_ns() : std::vector<int64_t>();
+  const SourceOptions whole;
+  const bool all_images = args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
+                          args.reading.end == whole.end && !args.reading.max_frames;
+  // Those of a part may show nobody.
+  if (!all_images || stamps.empty() || boxes.empty()) return boxes;
+  const bool any = std::any_of(stamps.begin(), stamps.end(), [&](int64_t stamp) { return has_boxes(boxes, stamp); });
+  if (!any)
+    throw InputError(
+        fmt::format("{}: none of its boxes has the stamp of a colour image ({:.6f} is the first); write "
+                    "stamps as in rgb.txt",
+                    args.detection.boxes.string(), boxes.front().timestamp));
+  return boxes;
 }
 
 }  // namespace
@@ -172,6 +204,7 @@ RunSession::RunSession(const RunArguments& args)
   const Stopwatch loading;
   Detectors detectors = make_detectors(detector_choice(args, options_, reader_), recording_->camera());
   loading_s_ = loading.ms() / 1000;
+  if (!args.detection.boxes.empty()) boxes_ = boxes_of(args, *recording_, reader_);
   slam_.emplace(recording_->camera(), options_, std::move(detectors));
   if (!args.load_map.empty()) slam_->load_map(args.load_map);
   slam_->localize_only(args.localize);
@@ -213,6 +246,7 @@ int RunSession::run() {
   progress_->finish();
   source_->stop();
   write(wall.ms() / 1000);
+  warn_of_unused();
   warnings_.finish();
   if (failure_) std::rethrow_exception(failure_);
   return tell_the_end();
@@ -240,6 +274,8 @@ void RunSession::track() {
       progress_->frame(next.index + 1, nullptr);
     } else {
       facts_.stamps.push_back(next.stamp);
+      had_prior_ = had_prior_ || next.frame.prior();
+      if (boxes_ && has_boxes(*boxes_, next.frame.stamp_ns())) boxes_.reset();
       show(next, slam_->process(next.frame));
     }
   }
@@ -329,6 +365,17 @@ void RunSession::warn_of_dropped(size_t next_index) {
   const auto* paced = dynamic_cast<const PacedSource*>(source_);
   for (; paced != nullptr && dropped_ < paced->dropped(); ++dropped_)
     warnings_.warn("frame dropped, " + why, fmt::format("frame {}: one before it was dropped, {}", next_index, why));
+}
+
+// Files of another recording would do nothing in silence.
+void RunSession::warn_of_unused() {
+  if (boxes_ && !boxes_->empty() && !facts_.stamps.empty())
+    warnings_.warn("--boxes", args_.detection.boxes.string() +
+                                  ": no box had the stamp of a frame; are they of this "
+                                  "recording?");
+  if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)
+    warnings_.warn("--prior-file",
+                   args_.prior_file + ": tells of no frame's motion; are its times those of the images?");
 }
 
 void RunSession::warn_of_source() {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "dkb/dataset/paced_source.h"
+#include "dkb/detection/boxes_file.h"
+#include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/log.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
@@ -64,6 +66,7 @@ class RunSession {
   int tell_the_end();
   void warn_of_source();
   void warn_of_viewer();
+  void warn_of_unused();
   void warn_of_dropped(size_t next_index);
 
   RunArguments args_;
@@ -83,6 +86,8 @@ class RunSession {
 
   RunFacts facts_;
   std::optional<report::RunLog> log_;
+  std::optional<BoxesByTime> boxes_;  // of a file, while no frame had one
+  bool had_prior_ = false;
   LiveReport camera_;
   std::optional<Progress> progress_;
   std::exception_ptr failure_;

@@ -37,6 +37,8 @@ class OdometryTrack {
 
   // Nothing when one of the times [s] lies outside of the track, or in a gap of more than half a second.
   std::optional<MotionPrior> between(double before, double now) const;
+  double first() const { return poses_.front().timestamp; }  // [s]
+  double last() const { return poses_.back().timestamp; }
 
  private:
   std::optional<Rigid3> at(double time) const;
