@@ -126,6 +126,16 @@ void write_outputs(const std::filesystem::path& folder, const Slam& slam, const 
   write_file_atomically(folder / "stats.json", stats_json(statistics_with(slam, facts), facts));
 }
 
+void remove_earlier_outputs(const std::filesystem::path& folder, const RunFacts& facts, std::set<std::string> written) {
+  if (facts.writes_map) written.insert({"map.dkb", "map.ply"});
+  if (!facts.features_csv.empty()) written.insert("features.csv");
+  if (!facts.debug_log.empty()) written.insert("debug.log");
+  std::error_code ignored;
+  for (const char* name : {"map.dkb", "map.ply", "dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs",
+                           "features.csv", "debug.log", "cv_orb.json"})
+    if (!written.contains(name)) std::filesystem::remove(folder / name, ignored);
+}
+
 std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds) {
   write_file_atomically(folder / "dense.ply", mesh_ply(map.mesh));
   std::string line =

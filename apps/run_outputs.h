@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,10 @@ Statistics statistics_with(const Slam& slam, const RunFacts& facts);
 // takes a moment to smooth. Throws OutputError.
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
                    const RunFacts& facts);
+
+// Removes what an earlier run left in `folder` and this one does not have: of the files that not every run writes,
+// those that are neither among `facts` nor in `written`.
+void remove_earlier_outputs(const std::filesystem::path& folder, const RunFacts& facts, std::set<std::string> written);
 
 // dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws
 // OutputError.

@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
+#include <system_error>
 
 #include "bench/bench_cv_orb.h"
 #include "dkb/dataset/detector_choice.h"
@@ -210,6 +212,9 @@ RunSession::RunSession(const RunArguments& args)
   slam_->localize_only(args.localize);
   slam_->explain_keyframes(args.debug_log || args.viewer.on || args.viewer.record);
   out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
+  std::error_code none;
+  if (fs::equivalent(out_, args.source, none))
+    throw InputError("--out " + out_.string() + ": is the folder of the source; choose another");
   make_output_folder(out_);
   if (!args.quiet) tell(stdout, "{}, results in {}\n", recording_->description(), out_.string());
 
@@ -314,12 +319,15 @@ void RunSession::write(double seconds) {
   facts_.wall_s = seconds;
   facts_.config_yaml = options_.to_yaml();
   if (reader_ != nullptr) facts_.times = reader_->times();
+  std::set<std::string> written;  // of what not every run writes
   if (args_.dense && !failure_) {
     const Stopwatch building;
     const DenseMap map = slam_->dense_map();
     facts_.times.add("dense_build", building.ms());
     const std::string line = write_dense_map(out_, map, building.ms() / 1000);
-    if (!args_.quiet) fmt::print("{}\n", line);
+    if (!args_.quiet) tell(stdout, "{}\n", line);
+    written.insert("dense.ply");
+    if (map.grid) written.insert({"occupancy.pgm", "occupancy.yaml"});
   }
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
   write_outputs(out_, *slam_, trajectories, facts_);
