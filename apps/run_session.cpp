@@ -332,9 +332,19 @@ void RunSession::write(double seconds) {
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
   write_outputs(out_, *slam_, trajectories, facts_);
   const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
-  write_file_atomically(out_ / "report.html",
-                        report_html(*log_, reported, report::evaluated_by_truth(args_.source, reported.trajectory)));
-  if (args_.cv_orb && interrupted_.empty()) write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
+  report::Truth truth = report::evaluated_by_truth(args_.source, reported.trajectory);
+  write_file_atomically(out_ / "report.html", report_html(*log_, reported, truth));
+  if (args_.cv_orb && interrupted_.empty()) {
+    write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
+    written.insert("cv_orb.json");
+  }
+  if (viewer_ && args_.viewer.record) written.insert("session.dkbs");
+  std::error_code none;
+  if (fs::equivalent(args_.load_map, out_ / "map.dkb", none)) written.insert({"map.dkb", "map.ply"});  // not to be lost
+  remove_earlier_outputs(out_, facts_, written);
+  if (!truth.note.empty() && !reported.trajectory.empty())
+    warnings_.warn("ground truth", truth.note + "; the run is not judged by it");
+  if (truth.evaluation) ape_ = truth.evaluation->ape.translation;
 }
 
 void RunSession::warn_of_viewer() {
@@ -345,9 +355,12 @@ void RunSession::warn_of_viewer() {
 int RunSession::tell_the_end() {
   const Statistics s = slam_->statistics();
   if (!args_.quiet)
-    fmt::print("{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_,
-               s.tracked, facts_.offered, s.keyframes, s.map_points,
-               s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+    tell(stdout, "{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_,
+         s.tracked, facts_.offered, s.keyframes, s.map_points,
+         s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
+  if (ape_ && !args_.quiet)
+    tell(stdout, "APE {:.4f} m against groundtruth.txt (RMSE of {} poses)\n", ape_->rmse, ape_->count);
+  if (!args_.quiet) tell(stdout, "report: {}\n", (out_ / "report.html").string());
   if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !args_.quiet && !line.empty())
     tell(stdout, "{}\n", line);
   if (const SourceCounts lost = recording_->counts(); !live_ && !args_.quiet && lost.unpaired + lost.late > 0)

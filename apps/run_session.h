@@ -91,7 +91,8 @@ class RunSession {
   LiveReport camera_;
   std::optional<Progress> progress_;
   std::exception_ptr failure_;
-  std::string interrupted_;  // after how many frames; empty when it was not
+  std::optional<ErrorStatistics> ape_;  // of translations [m], where there is a ground truth
+  std::string interrupted_;             // after how many frames; empty when it was not
 };
 
 }  // namespace dkb
