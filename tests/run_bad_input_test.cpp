@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <functional>
 #include <sstream>
 
@@ -110,7 +111,10 @@ std::vector<Case> cases() {
       {"unknown option", "detectr", [](const fs::path&) {}, {"--detectr", "none"}},
       {"unknown setting", "features.count", [](const fs::path&) {}, {"--set", "featurs.count=5"}},
       {"setting of another type", "features.count", [](const fs::path&) {}, {"--set", "features.count=many"}},
-      {"setting out of range", "pipeline.mapper_latency: 0 is out of range", [](const fs::path&) {}, {"--set", "pipeline.mapper_latency=0"}},
+      {"setting out of range",
+       "pipeline.mapper_latency: 0 is out of range",
+       [](const fs::path&) {},
+       {"--set", "pipeline.mapper_latency=0"}},
       {"unknown preset", "papre", [](const fs::path&) {}, {"--preset", "papre"}},
       {"unknown detector", "yolos", [](const fs::path&) {}, {"--detector", "yolos"}},
       {"unknown inference", "onnxruntme", [](const fs::path&) {}, {"--inference", "onnxruntme"}},
@@ -123,6 +127,60 @@ std::vector<Case> cases() {
        "b.txt:2",
        [](const fs::path& d) { write_text(d / "b.txt", "# t class x y w h\n1700000000.0 person nan 3 4 5\n"); },
        {"--detector", "file", "--boxes", "@/b.txt"}},
+      {"settings of a file that contradict each other",
+       "c.yaml:3: features.fast_threshold",
+       [](const fs::path& d) { write_text(d / "c.yaml", "# mine\nfeatures:\n  fast_threshold: 5\n"); },
+       {"--config", "@/c.yaml"}},
+      {"settings that contradict each other",
+       "--set: dense.obstacle_high",
+       [](const fs::path&) {},
+       {"--set", "dense.obstacle_high=0.05"}},
+      {"presets that contradict each other",
+       "--preset paper",
+       [](const fs::path& d) { write_text(d / "c.yaml", "preset: default\n"); },
+       {"--preset", "paper", "--config", "@/c.yaml"}},
+      {"results into the source", "--out", [](const fs::path&) {}, {"--out", "@/."}},
+      {"a value too many", "unexpected argument \"c=d\"", [](const fs::path&) {}, {"--set", "seed=2", "c=d"}},
+      {"boxes of another recording",
+       "none of its boxes",
+       [](const fs::path& d) { write_text(d / "b.txt", "1.0 person 2 3 40 50\n"); },
+       {"--detector", "file", "--boxes", "@/b.txt"}},
+      {"odometry of another recording",
+       "o.txt: its times, 1.000 ... 2.000 s",
+       [](const fs::path& d) { write_text(d / "o.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"); },
+       {"--prior-file", "@/o.txt"}},
+      {"boxes without a filter",
+       "--boxes: nothing is detected with --filter none",
+       [](const fs::path&) {},
+       {"--filter", "none", "--detector", "file", "--boxes", "@/b.txt"}},
+      {"a detector that the preset switches off",
+       "--detector motion: nothing is detected with --preset orb",
+       [](const fs::path&) {},
+       {"--preset", "orb", "--detector", "motion"}},
+      {"a detector that is disabled",
+       "--disable dr",
+       [](const fs::path&) {},
+       {"--disable", "dr", "--detector", "motion"}},
+      {"classes of no network", "--labels", [](const fs::path&) {}, {"--detector", "motion", "--labels", "x"}},
+      {"a model of no network", "--model", [](const fs::path&) {}, {"--detector", "motion", "--model", "x"}},
+      {"detections of no network",
+       "--detect-every",
+       [](const fs::path&) {},
+       {"--detector", "motion", "--detect-every", "2"}},
+      {"no frames between detections", "--detect-every", [](const fs::path&) {}, {"--detect-every", "0"}},
+      {"detections before their frame", "--detect-latency", [](const fs::path&) {}, {"--detect-latency", "-1"}},
+      {"negative seed", "--seed", [](const fs::path&) {}, {"--seed", "-1"}},
+      {"negative threads", "--threads", [](const fs::path&) {}, {"--threads", "-1"}},
+      {"too many features", "features.count: 100001", [](const fs::path&) {}, {"--set", "features.count=100001"}},
+      {"mapping too late",
+       "pipeline.mapper_latency: 11",
+       [](const fs::path&) {},
+       {"--set", "pipeline.mapper_latency=11"}},
+      {"auto among others", "auto cannot be joined", [](const fs::path&) {}, {"--detector", "auto+motion"}},
+      {"none among others", "none cannot be joined", [](const fs::path&) {}, {"--detector", "none+motion"}},
+      {"the same detector twice", "motion twice", [](const fs::path&) {}, {"--detector", "motion+motion"}},
+      {"address of no page", "--viewer-host", [](const fs::path&) {}, {"--viewer-host", "127.0.0.1"}},
+      {"end of no page", "--viewer-exit", [](const fs::path&) {}, {"--viewer-exit"}},
       {"frames that are none", "max", [](const fs::path&) {}, {"--max-frames", "0"}},
       {"nothing left to run", "", [](const fs::path&) {}, {"--start", "1000"}},
   };
@@ -135,11 +193,13 @@ TEST(RunBadInput, IsRefusedInOneClearLine) {
     const fs::path folder = temp / (c.name == "no such folder" ? "gone" : "data");
     copy_sequence(folder, 8, true);
     c.spoil(folder);
-    std::vector<std::string> arguments = {"run", folder.string(), "--out", (temp / "out").string(), "--quiet"};
+    std::vector<std::string> arguments = {"run", folder.string(), "--quiet"};
+    if (std::find(c.arguments.begin(), c.arguments.end(), "--out") == c.arguments.end())
+      arguments.insert(arguments.end(), {"--out", (temp / "out").string()});
     bool detector = false;
     for (std::string a : c.arguments) {
       if (const size_t at = a.find('@'); at != std::string::npos) a.replace(at, 1, folder.string());
-      detector = detector || a.starts_with("--detect");
+      detector = detector || a == "--detector" || a == "--detectr";
       arguments.push_back(a);
     }
     if (!detector) arguments.insert(arguments.end(), {"--detector", "none"});
@@ -206,6 +266,16 @@ TEST(RunBadInput, NoCommandNoDatasetAndAMisspeltCommandAreRefused) {
     const Finished run = run_program(arguments);
     EXPECT_EQ(run.exit_code, 2);
     EXPECT_EQ(run.error_lines(), 1U) << run.err;
+  }
+}
+
+TEST(RunBadInput, NegativeNumbersOfTheSimulatorAreRefused) {
+  const TempFolder temp;
+  for (const char* option : {"--people", "--seed"}) {
+    const Finished run = run_program({"simulate", "--out", (temp / "made").string(), option, "-1"});
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_NE(run.err.find(option), std::string::npos) << run.err;
+    EXPECT_FALSE(fs::exists(temp / "made"));
   }
 }
 

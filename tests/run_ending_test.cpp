@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// How commands end: by signals, with outputs that cannot be written, and in a folder that has been used before.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <thread>
+
+#include "e2e_support.h"
+
+namespace dkb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+void pause_ms(int ms) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(ms));
+}
+
+// A sequence whose tenth image is a named pipe: a run cannot get past it.
+class Endless {
+ public:
+  explicit Endless(const fs::path& folder) : folder_(folder) {
+    copy_sequence(folder, 20, true);
+    pipe_ = folder / rows_of(folder / "associations.txt")[10][1];
+    fs::remove(pipe_);
+    if (mkfifo(pipe_.c_str(), 0600) != 0) throw std::runtime_error("no named pipes here");
+  }
+  std::vector<std::string> run(const fs::path& out) const {
+    return {"run", folder_.string(), "--out", out.string(), "--detector", "none"};
+  }
+  // Whoever reads the pipe finds an empty file.
+  void let_go() const {
+    const int fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK);
+    if (fd >= 0) close(fd);
+  }
+  // Waits until the run reads the pipe, which it finds open and empty as long as the returned file is open.
+  int hold_up(Program& program) const {
+    int fd = -1;
+    while (fd < 0 && !program.ended()) fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK), pause_ms(5);
+    return fd;
+  }
+
+ private:
+  fs::path folder_, pipe_;
+};
+
+bool wait_for_first_frame(Program& program) {
+  while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause_ms(5);
+  return !program.ended();
+}
+
+// The exit code of a shell's line, in which `@` stands for the program.
+int shell(std::string line) {
+  for (size_t at = 0; (at = line.find('@', at)) != std::string::npos;) line.replace(at, 1, DKB_SLAM_EXECUTABLE);
+  const int status = std::system(("exec 2>/dev/null; " + line).c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+}
+
+TEST(RunEnding, ATerminalThatGoesAwayEndsARunWithItsResults) {
+  std::signal(SIGHUP, SIG_DFL);
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  Program program(endless.run(temp / "out"));
+  ASSERT_TRUE(wait_for_first_frame(program));
+  kill(program.pid(), SIGHUP);
+  while (!program.ended()) endless.let_go(), pause_ms(5);
+  EXPECT_EQ(program.wait().exit_code, 130);
+  EXPECT_TRUE(fs::exists(temp.path() / "out" / "stats.json"));
+}
+
+TEST(RunEnding, ARunUnderNohupOutlivesItsTerminal) {
+  std::signal(SIGHUP, SIG_IGN);
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  Program program(endless.run(temp / "out"));
+  std::signal(SIGHUP, SIG_DFL);
+  ASSERT_TRUE(wait_for_first_frame(program));
+  kill(program.pid(), SIGHUP);
+  while (!program.ended()) endless.let_go(), pause_ms(5);
+  EXPECT_EQ(program.wait().exit_code, 0);
+}
+
+TEST(RunEnding, ASecondInterruptEndsItAtOnce) {
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  std::vector<std::string> arguments = endless.run(temp / "out");
+  arguments.insert(arguments.end(), {"--threads", "1"});  // the pipe holds up the run itself
+  Program program(arguments);
+  const int pipe = endless.hold_up(program);
+  ASSERT_GE(pipe, 0);
+  kill(program.pid(), SIGINT);
+  pause_ms(50);
+  kill(program.pid(), SIGINT);  // the same press, told twice
+  pause_ms(600);
+  ASSERT_FALSE(program.ended());
+  kill(program.pid(), SIGINT);
+  EXPECT_EQ(program.wait().exit_code, 1000 + SIGINT);
+  close(pipe);
+}
+
+TEST(RunEnding, OutputsThatCannotBeWrittenLoseNoResult) {
+  const TempFolder temp;
+  const std::string run = "@ run " + sequence().string() + " --detector none --max-frames 12 --out ";
+  const auto complete = [&](const char* out) { return fs::exists(temp.path() / out / "report.html"); };
+  EXPECT_EQ(shell(run + (temp / "a").string() + " >/dev/null 2>/dev/full"), 0);
+  EXPECT_TRUE(complete("a"));
+  EXPECT_EQ(shell(run + (temp / "b").string() + " >/dev/full"), 1);
+  EXPECT_TRUE(complete("b"));
+  EXPECT_EQ(shell("(" + run + (temp / "c").string() + " 2>&1; echo $? >" + (temp / "code").string() +
+                  ") | head -c 10 >/dev/null"),
+            0);
+  EXPECT_TRUE(complete("c"));
+  EXPECT_EQ(read_text(temp / "code"), "1\n");
+  EXPECT_EQ(shell(run + (temp / "d").string() + " >&- 2>&-"), 1);
+  EXPECT_TRUE(complete("d"));
+  const std::string truth = (sequence() / "groundtruth.txt").string();
+  EXPECT_EQ(shell("@ eval " + truth + " " + truth + " >/dev/full"), 1);
+  EXPECT_EQ(shell("@ eval " + truth + " " + truth + " >/dev/null"), 0);
+  EXPECT_EQ(shell("@ --help >/dev/full"), 1);
+}
+
+TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
+  const TempFolder temp;
+  const fs::path out = temp / "out";
+  const std::vector<std::string> short_run = {"--max-frames", "12"};
+  std::vector<std::string> all = {"--max-frames", "12",       "--dense", "--dump-features",
+                                  "--debug-log",  "--cv-orb", "--record"};
+  ASSERT_EQ(SlamRun(sequence(), out, all).finished.exit_code, 0);
+  for (const char* name : {"dense.ply", "features.csv", "debug.log"}) ASSERT_TRUE(fs::exists(out / name)) << name;
+  fs::copy_file(out / "map.dkb", temp / "map.dkb");
+  ASSERT_EQ(SlamRun(sequence(), out, short_run).finished.exit_code, 0);
+  for (const char* name :
+       {"dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs", "features.csv", "debug.log", "cv_orb.json"})
+    EXPECT_FALSE(fs::exists(out / name)) << name;
+  EXPECT_TRUE(fs::exists(out / "map.dkb"));
+  std::vector<std::string> localising = {"--max-frames", "12", "--localize", "--load-map", (out / "map.dkb").string()};
+  ASSERT_EQ(SlamRun(sequence(), out, localising).finished.exit_code, 0);
+  EXPECT_TRUE(fs::exists(out / "map.dkb")) << "the map that it was found in";
+  localising.back() = (temp / "map.dkb").string();
+  ASSERT_EQ(SlamRun(sequence(), out, localising).finished.exit_code, 0);
+  EXPECT_FALSE(fs::exists(out / "map.dkb"));
+  EXPECT_FALSE(fs::exists(out / "map.ply"));
+}
+
+TEST(RunEnding, TheLastLinesTellTheErrorAndTheReport) {
+  const TempFolder temp;
+  copy_sequence(temp / "data", 12, false);
+  const auto run = [&] {
+    return run_program({"run", (temp / "data").string(), "--detector", "none", "--out", (temp / "out").string()});
+  };
+  const Finished judged = run();
+  EXPECT_NE(judged.out.find("\nAPE 0.00"), std::string::npos) << judged.out;
+  EXPECT_NE(judged.out.find("report.html\n"), std::string::npos) << judged.out;
+  write_text(temp.path() / "data" / "groundtruth.txt", "1 2 3\n");
+  const Finished broken = run();
+  EXPECT_EQ(broken.exit_code, 0);
+  EXPECT_EQ(broken.out.find("APE"), std::string::npos) << broken.out;
+  EXPECT_NE(broken.err.find("warning: " + (temp.path() / "data" / "groundtruth.txt").string() + ":1"),
+            std::string::npos)
+      << broken.err;
+}
+
+TEST(RunEnding, AnInterruptedConversionOrSimulationLeavesNothing) {
+  const TempFolder temp;
+  const auto is_empty = [&] { return fs::is_empty(temp.path()); };
+  Program simulating({"simulate", "--out", (temp / "made").string(), "--scene", "room"});
+  while (!fs::exists(temp.path() / "made" / "rgb") && !simulating.ended()) pause_ms(5);
+  kill(simulating.pid(), SIGINT);
+  EXPECT_EQ(simulating.wait().exit_code, 130);
+  EXPECT_TRUE(is_empty());
+
+  Program converting({"convert", sequence().string(), "--out", (temp / "made.mcap").string()});
+  while (is_empty() && !converting.ended()) pause_ms(1);
+  kill(converting.pid(), SIGINT);
+  EXPECT_EQ(converting.wait().exit_code, 130);
+  EXPECT_TRUE(is_empty());
+}
+
+}  // namespace
+}  // namespace dkb::test
