@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The README is the first thing that a stranger tries: its commands, options and files must exist.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <regex>
 #include <set>
 
@@ -88,6 +91,24 @@ TEST(Readme, OptionsOfTheCommandLineExist) {
     }
   }
   EXPECT_GT(seen, 0) << "README.md shows no dkb-slam command";
+}
+
+TEST(Files, TheSceneOfThePageCanBeDrawn) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_page_scene");
+  std::filesystem::create_directories(folder);
+  std::ofstream scene(folder / "scene.yaml");
+  bool inside = false;
+  for (const std::string& line : read_lines(source_dir() / "docs/files.md")) {
+    if (line.starts_with("```")) inside = line == "```yaml";
+    if (inside && !line.starts_with("```")) scene << line << '\n';
+  }
+  scene.close();
+  const std::string output =
+      output_of(std::string("\"") + DKB_SLAM_EXECUTABLE + "\" simulate --frames 1 --scene \"" +
+                (folder / "scene.yaml").string() + "\" --out \"" + (folder / "out").string() + "\"");
+  EXPECT_NE(output.find(": 1 frames of scene"), std::string::npos) << output;
+  std::filesystem::remove_all(folder);
 }
 #endif
 
