@@ -57,6 +57,9 @@ TEST(Evaluate, APathOnALineOrInOnePlaceTellsNoRotationError) {
     EXPECT_EQ(e.rpe.rotation.count, 30u) << "relative errors need no alignment";
     EXPECT_LT(e.ape.translation.max, 1e-9);
   }
+  Trajectory far = line({0, 0, 1}, 0);
+  for (StampedPose& p : far) p.world_from_cam.translation.x() = 1e17;
+  EXPECT_FALSE(evaluate(far, far).rotation_determined);
   // A walk of 3 m that sways by a centimetre, and one that sways less than files round.
   EXPECT_TRUE(evaluate(line({0.1, 0, 0}, 0.01), line({0.1, 0, 0}, 0.01)).rotation_determined);
   EXPECT_FALSE(evaluate(line({0.1, 0, 0}, 1e-5), line({0.1, 0, 0}, 1e-5)).rotation_determined);
