@@ -3,9 +3,9 @@
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { createRequire } from "node:module";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 
-const [packages] = process.argv.slice(2);
+const packages = resolve(process.argv[2] ?? ".");
 const web = new URL("..", import.meta.url).pathname;
 if (!existsSync(join(packages, "node_modules", "esbuild"))) {
   console.log("skipped: no esbuild in " + packages + "; the page is plain");
