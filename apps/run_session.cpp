@@ -186,8 +186,8 @@ BoxesByTime boxes_of(const RunArguments& args, const Source& source, const Reade
   const bool any = std::any_of(stamps.begin(), stamps.end(), [&](int64_t stamp) { return has_boxes(boxes, stamp); });
   if (!any)
     throw InputError(
-        fmt::format("{}: none of its boxes has the stamp of a colour image ({:.6f} is the first); write "
-                    "stamps as in rgb.txt",
+        fmt::format("{}: none of its boxes has the stamp of a colour image ({:.6f} is the first); write stamps as in "
+                    "rgb.txt",
                     args.detection.boxes.string(), boxes.front().timestamp));
   return boxes;
 }
@@ -391,9 +391,8 @@ void RunSession::warn_of_dropped(size_t next_index) {
 // Files of another recording would do nothing in silence.
 void RunSession::warn_of_unused() {
   if (boxes_ && !boxes_->empty() && !facts_.stamps.empty())
-    warnings_.warn("--boxes", args_.detection.boxes.string() +
-                                  ": no box had the stamp of a frame; are they of this "
-                                  "recording?");
+    warnings_.warn("--boxes",
+                   args_.detection.boxes.string() + ": no box has the stamp of a frame; are they of this run?");
   if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)
     warnings_.warn("--prior-file",
                    args_.prior_file + ": tells of no frame's motion; are its times those of the images?");
