@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which options of a run contradict each other.
 #include <algorithm>
+#include <cstdlib>
 
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/util/errors.h"
@@ -9,26 +10,11 @@
 namespace dkb {
 namespace {
 
-// Why nothing is detected; empty when something may be.
-std::string why_no_filter(const RunArguments& args, const Options& options) {
-  if (options.dynamics.filter != FilterKind::none) return "";
-  if (("," + args.disable + ",").find(",dr,") != std::string::npos) return "--disable dr";
-  if (!args.filter.empty()) return "--filter none";
-  return options.preset() == "orb" ? "--preset orb" : "dynamics.filter none";
-}
-
-void check_detector(const RunArguments& args, const Options& options) {
-  const DetectorChoice& choice = args.detection;
-  const std::string no_filter = why_no_filter(args, options);
-  if (!no_filter.empty()) {
-    std::string given;
-    if (args.has_detector && choice.kinds != "none") given = "--detector " + choice.kinds;
-    if (!choice.model.empty()) given = "--model";
-    if (!choice.boxes.empty()) given = "--boxes";
-    if (!given.empty()) throw InputError(given + ": nothing is detected with " + no_filter + "; leave one of them out");
-  }
-  const DetectorChoice whole = choice_beside(options, args.disable, choice);  // with the model of the environment
-  const std::vector<std::string> kinds = detector_kinds(whole.kinds, !whole.model.empty());
+// That --filter none, --disable dr and --preset orb win over a detector is no contradiction: comparisons of filters run
+// with the same detector.
+void check_detector(const DetectorChoice& choice) {
+  const bool model = !choice.model.empty() || std::getenv("DKB_SLAM_MODEL") != nullptr;
+  const std::vector<std::string> kinds = detector_kinds(choice.kinds, model);
   const bool yolo = std::find(kinds.begin(), kinds.end(), "yolo") != kinds.end();
   const bool slow = yolo || (!kinds.empty() && kinds.back().starts_with("exec:"));
   const auto refuse = [&](const char* option, const char* reader) {
@@ -48,7 +34,7 @@ void check_arguments(const RunArguments& args, const Options& options) {
   if (args.has_preset && options.preset() != args.preset)
     throw InputError("--preset " + args.preset + ": the settings say `preset: " + options.preset() +
                      "`; leave one of them out");
-  check_detector(args, options);
+  check_detector(args.detection);
   if (!args.viewer.on && args.viewer.exit) throw InputError("--viewer-exit: there is no page; add --viewer");
   if (!args.viewer.on && args.viewer.has_host) throw InputError("--viewer-host: there is no page; add --viewer");
 }

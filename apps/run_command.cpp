@@ -29,10 +29,8 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
       ->check(not_negative())
       ->each(given(&RunArguments::has_seed));
   DetectorChoice& detection = args->detection;
-  command
-      ->add_option("--detector", detection.kinds,
-                   "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +")
-      ->each(given(&RunArguments::has_detector));
+  command->add_option("--detector", detection.kinds,
+                      "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
   command->add_option("--inference", detection.inference,

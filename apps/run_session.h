@@ -34,7 +34,7 @@ struct RunArguments {
   SourceOptions reading;
   std::string prior = "auto";
   uint64_t seed = 1;
-  bool has_seed = false, has_preset = false, has_detector = false;  // given, not by default
+  bool has_seed = false, has_preset = false;  // given, not by default
   int threads = 0;
   DetectorChoice detection;
   std::string filter, disable;
