@@ -150,10 +150,6 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   return r;
 }
 
-bool has_boxes(const BoxesByTime& boxes, int64_t stamp_ns) {
-  return find_same_stamp(boxes, seconds_from_ns(stamp_ns), [](const TimedBoxes& t) { return t.timestamp; }) != nullptr;
-}
-
 Options checked(const RunArguments& args) {
   Options options = options_of(args);
   check_arguments(args, options);
@@ -174,22 +170,26 @@ std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr
   return with_prior(std::move(source), std::move(track));
 }
 
-// The boxes of a file, to see whether they belong to these images. Throws InputError when it is known that they do not.
-BoxesByTime boxes_of(const RunArguments& args, const Source& source, const ReaderSource* reader) {
-  BoxesByTime boxes = read_boxes(args.detection.boxes, source.camera().width, source.camera().height);
+// The detector that reads boxes, when there are any, to see whether they belong to these images. Throws InputError when
+// it is known that they do not.
+std::shared_ptr<const FileDetector> boxes_of(const RunArguments& args, const Detectors& detectors,
+                                             const ReaderSource* reader) {
+  std::shared_ptr<const FileDetector> file;
+  for (const auto& detector : detectors.prompt)
+    if (!file) file = std::dynamic_pointer_cast<const FileDetector>(detector);
+  if (!file || file->boxes().empty()) return nullptr;
   const std::vector<int64_t> stamps = reader != nullptr ? reader->stamps_ns() : std::vector<int64_t>();
   const SourceOptions whole;
   const bool all_images = args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
                           args.reading.end == whole.end && !args.reading.max_frames;
   // Those of a part may show nobody.
-  if (!all_images || stamps.empty() || boxes.empty()) return boxes;
-  const bool any = std::any_of(stamps.begin(), stamps.end(), [&](int64_t stamp) { return has_boxes(boxes, stamp); });
-  if (!any)
+  if (!all_images || stamps.empty()) return file;
+  if (std::none_of(stamps.begin(), stamps.end(), [&](int64_t stamp) { return file->at(stamp) != nullptr; }))
     throw InputError(
         fmt::format("{}: none of its boxes has the stamp of a colour image ({:.6f} is the first); write stamps as in "
                     "rgb.txt",
-                    args.detection.boxes.string(), boxes.front().timestamp));
-  return boxes;
+                    args.detection.boxes.string(), file->boxes().front().timestamp));
+  return file;
 }
 
 }  // namespace
@@ -206,7 +206,7 @@ RunSession::RunSession(const RunArguments& args)
   const Stopwatch loading;
   Detectors detectors = make_detectors(detector_choice(args, options_, reader_), recording_->camera());
   loading_s_ = loading.ms() / 1000;
-  if (!args.detection.boxes.empty()) boxes_ = boxes_of(args, *recording_, reader_);
+  boxes_ = boxes_of(args, detectors, reader_);
   slam_.emplace(recording_->camera(), options_, std::move(detectors));
   if (!args.load_map.empty()) slam_->load_map(args.load_map);
   slam_->localize_only(args.localize);
@@ -280,7 +280,7 @@ void RunSession::track() {
     } else {
       facts_.stamps.push_back(next.stamp);
       had_prior_ = had_prior_ || next.frame.prior();
-      if (boxes_ && has_boxes(*boxes_, next.frame.stamp_ns())) boxes_.reset();
+      if (boxes_ && boxes_->at(next.frame.stamp_ns()) != nullptr) boxes_.reset();
       show(next, slam_->process(next.frame));
     }
   }
@@ -390,7 +390,7 @@ void RunSession::warn_of_dropped(size_t next_index) {
 
 // Files of another recording would do nothing in silence.
 void RunSession::warn_of_unused() {
-  if (boxes_ && !boxes_->empty() && !facts_.stamps.empty())
+  if (boxes_ && !facts_.stamps.empty())
     warnings_.warn("--boxes",
                    args_.detection.boxes.string() + ": no box has the stamp of a frame; are they of this run?");
   if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)

@@ -86,7 +86,7 @@ class RunSession {
 
   RunFacts facts_;
   std::optional<report::RunLog> log_;
-  std::optional<BoxesByTime> boxes_;  // of a file, while no frame had one
+  std::shared_ptr<const FileDetector> boxes_;  // while no frame had one of its boxes
   bool had_prior_ = false;
   LiveReport camera_;
   std::optional<Progress> progress_;

@@ -163,6 +163,17 @@ TEST(RunCommand, ChoosesFramesAndReplacesEarlierResults) {
   EXPECT_EQ(read_text(temp.path() / "out" / "mine.txt"), "kept");
 }
 
+TEST(RunCommand, WhatSwitchesTheFilterOffWinsOverADetectorWithoutAnError) {
+  const TempFolder temp;
+  write_text(temp / "boxes.txt", "1 person 10 10 50 50\n");  // of another recording
+  for (const char* off : {"--disable=dr", "--filter=none", "--preset=orb"}) {
+    const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "file",
+                                      "--boxes", (temp / "boxes.txt").string(), "--quiet", off});
+    EXPECT_EQ(run.exit_code, 0) << off;
+    EXPECT_EQ(run.err, "") << off;
+  }
+}
+
 TEST(RunCommand, ShowsProgressUnlessQuiet) {
   const TempFolder temp;
   const Finished loud = run_program(

@@ -79,9 +79,12 @@ std::string boxes_to_text(const BoxesByTime& boxes) {
 FileDetector::FileDetector(const std::filesystem::path& path, int width, int height)
     : boxes_(read_boxes(path, width, height)) {}
 
+const TimedBoxes* FileDetector::at(int64_t stamp_ns) const {
+  return find_same_stamp(boxes_, seconds_from_ns(stamp_ns), [](const TimedBoxes& t) { return t.timestamp; });
+}
+
 Detections FileDetector::detect(const DetectorInput& image) {
-  const TimedBoxes* nearest =
-      find_same_stamp(boxes_, seconds_from_ns(image.stamp_ns), [](const TimedBoxes& t) { return t.timestamp; });
+  const TimedBoxes* nearest = at(image.stamp_ns);
   return nearest == nullptr ? Detections{} : Detections{nearest->boxes, {}};
 }
 

@@ -37,6 +37,7 @@ class FileDetector final : public Detector {
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "file"; }
   const BoxesByTime& boxes() const { return boxes_; }
+  const TimedBoxes* at(int64_t stamp_ns) const;  // those that an image of this stamp gets; may be null
 
  private:
   BoxesByTime boxes_;
