@@ -14,12 +14,12 @@
 #include "dkb/slam/map_merge.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/new_folder.h"
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
 #include "export/keyframe_pictures.h"
 #include "export/map_model.h"
 #include "interrupt.h"
-#include "new_folder.h"
 #include "terminal.h"
 
 namespace dkb {

@@ -9,8 +9,8 @@
 
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/simulator/simulator.h"
+#include "dkb/util/new_folder.h"
 #include "interrupt.h"
-#include "new_folder.h"
 #include "number_check.h"
 
 namespace dkb {

@@ -148,17 +148,7 @@ void BagWriter::salvage() {
   } catch (const OutputError&) {
     chunk_.clear();
   }
-  while (!chunks_.empty()) {
-    file_.cut(end_);
-    try {
-      write_index();
-      return file_.commit();
-    } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
-      end_ = chunks_.back().at;
-      chunks_.pop_back();
-    }
-  }
-  throw OutputError("no message of the recording could be kept; make room on the disk");
+  commit_whole_chunks(file_, chunks_, end_, 0, [this] { write_index(); });
 }
 
 void BagWriter::write_index() {

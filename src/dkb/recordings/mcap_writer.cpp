@@ -168,24 +168,15 @@ void McapWriter::close() {
 }
 
 void McapWriter::salvage() {
-  const OutputError nothing("no message of the recording could be kept; make room on the disk");
-  if (end_ < topics_at_) throw nothing;
-  file_.cut(end_);
-  try {
-    flush_chunk();
-  } catch (const OutputError&) {
-    chunk_.clear();
-  }
-  for (; !chunks_.empty() && end_ > topics_at_; chunks_.pop_back()) {
+  if (end_ >= topics_at_) {
     file_.cut(end_);
     try {
-      write_index();
-      return file_.commit();
-    } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
-      end_ = chunks_.back().at;
+      flush_chunk();
+    } catch (const OutputError&) {
+      chunk_.clear();
     }
   }
-  throw nothing;
+  commit_whole_chunks(file_, chunks_, end_, topics_at_, [this] { write_index(); });
 }
 
 void McapWriter::write_index() {

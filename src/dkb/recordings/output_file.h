@@ -5,6 +5,9 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "dkb/util/errors.h"
 
 namespace dkb {
 
@@ -31,5 +34,23 @@ class OutputFile {
   int fd_ = -1;
   uint64_t size_ = 0;
 };
+
+// Ends a file of chunks on a disk that is full: with as many of its whole `chunks`, of which the last ends at byte
+// `end`, as leave room for the index. What comes before byte `least` must stay. Throws OutputError when no chunk can be
+// kept.
+template <class Chunk, class WriteIndex>
+void commit_whole_chunks(OutputFile& file, std::vector<Chunk>& chunks, uint64_t end, uint64_t least,
+                         const WriteIndex& write_index) {
+  for (; !chunks.empty() && end > least; chunks.pop_back()) {
+    file.cut(end);
+    try {
+      write_index();
+      return file.commit();
+    } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
+      end = chunks.back().at;
+    }
+  }
+  throw OutputError("no message of the recording could be kept; make room on the disk");
+}
 
 }  // namespace dkb

@@ -16,6 +16,7 @@
 #include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/new_folder.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
@@ -49,15 +50,17 @@ bool is_jpeg(std::string_view file) {
 class FolderPairWriter final : public PairWriter {
  public:
   FolderPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text, int png_level)
-      : path_(path.has_filename() ? path : path.parent_path()), camera_(camera), png_level_(png_level) {
+      : path_(path.has_filename() ? path : path.parent_path()),
+        temporary_((path_.has_parent_path() ? path_.parent_path() : ".") /
+                   ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()))),
+        camera_(camera),
+        png_level_(png_level) {
     std::error_code error;
     if (fs::exists(path_, error) && !(fs::is_directory(path_, error) && fs::is_empty(path_, error)))
       throw InputError(path_.string() + ": is there already and not empty; choose another folder with --out");
-    const fs::path above = path_.has_parent_path() ? path_.parent_path() : ".";
-    temporary_.path = above / ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()));
-    make_output_folder(temporary_.path / "rgb");
-    make_output_folder(temporary_.path / "depth");
-    write_image_file(temporary_.path / "camera.yaml", camera_text);
+    make_output_folder(temporary_.path() / "rgb");
+    make_output_folder(temporary_.path() / "depth");
+    write_image_file(temporary_.path() / "camera.yaml", camera_text);
   }
 
   void add(const PairToWrite& pair) override {
@@ -97,19 +100,8 @@ class FolderPairWriter final : public PairWriter {
   struct Row {
     std::string stamp, colour, depth_stamp, depth;  // as in the lists
   };
-  struct Temporary {
-    fs::path path;  // empty: it is in its place
-    Temporary() = default;
-    Temporary(const Temporary&) = delete;
-    Temporary& operator=(const Temporary&) = delete;
-    ~Temporary() {
-      std::error_code error;
-      if (!path.empty()) fs::remove_all(path, error);
-    }
-  };
-
   void write_images(const Row& row, const PairToWrite& pair, const std::optional<Image<uint16_t>>& units) const {
-    const fs::path colour = temporary_.path / row.colour;
+    const fs::path colour = temporary_.path() / row.colour;
     if (!pair.colour_file.empty())
       write_image_file(colour, pair.colour_file);
     else if (pair.picture->colour.empty())
@@ -118,16 +110,16 @@ class FolderPairWriter final : public PairWriter {
       write_image_file(colour, encode_png(pair.picture->colour, png_level_));
     // An image that the pair before shares is there, and would be broken by a write that fails.
     if (rows_.size() > 1 && rows_[rows_.size() - 2].depth == row.depth) return;
-    write_image_file(temporary_.path / row.depth, units ? encode_png(*units, png_level_) : encode_tiff(*pair.depth));
+    write_image_file(temporary_.path() / row.depth, units ? encode_png(*units, png_level_) : encode_tiff(*pair.depth));
   }
 
   void drop_last() {
     std::error_code error;
     const Row row = std::move(rows_.back());
     rows_.pop_back();
-    fs::remove(temporary_.path / row.colour, error);
+    fs::remove(temporary_.path() / row.colour, error);
     // Pairs in a row may share a depth image.
-    if (rows_.empty() || rows_.back().depth != row.depth) fs::remove(temporary_.path / row.depth, error);
+    if (rows_.empty() || rows_.back().depth != row.depth) fs::remove(temporary_.path() / row.depth, error);
   }
 
   void write_lists() const {
@@ -141,20 +133,20 @@ class FolderPairWriter final : public PairWriter {
       last_depth_stamp = &row.depth_stamp;
       associations += row.stamp + " " + row.colour + " " + row.depth_stamp + " " + row.depth + "\n";
     }
-    write_image_file(temporary_.path / "rgb.txt", colour);
-    write_image_file(temporary_.path / "depth.txt", depth);
-    write_image_file(temporary_.path / "associations.txt", associations);
+    write_image_file(temporary_.path() / "rgb.txt", colour);
+    write_image_file(temporary_.path() / "depth.txt", depth);
+    write_image_file(temporary_.path() / "associations.txt", associations);
   }
 
   void put_in_place() {
     std::error_code error;
-    fs::rename(temporary_.path, path_, error);  // also over an empty folder
+    fs::rename(temporary_.path(), path_, error);  // also over an empty folder
     if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
-    temporary_.path.clear();
+    temporary_.keep();
   }
 
   const fs::path path_;
-  Temporary temporary_;
+  NewFolder temporary_;  // until it is in its place
   const Camera camera_;
   const int png_level_;
   std::vector<Row> rows_;

@@ -7,7 +7,7 @@
 
 namespace dkb {
 
-// A folder that a command fills: it is removed when the command does not get to keep(), unless it was there before.
+// A folder that is being filled: it is removed where nobody gets to keep() it, unless it was there before.
 class NewFolder {
  public:
   explicit NewFolder(std::filesystem::path path) : path_(std::move(path)) {
@@ -20,6 +20,7 @@ class NewFolder {
   }
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
   void keep() { kept_ = true; }
 
  private:
