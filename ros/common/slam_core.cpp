@@ -12,7 +12,6 @@ namespace dkb_ros {
 namespace {
 
 constexpr int64_t kRepeatAfter = 10'000'000'000;  // [ns] before the same complaint is made again
-constexpr size_t kMaxUnplaced = 30;               // [frames] that wait for the robot's odometry
 
 // Messages that differ in their numbers say the same.
 std::string without_digits(std::string text) {
@@ -300,8 +299,6 @@ bool SlamCore::start(const ImagePair& pair) {
 }
 
 std::shared_ptr<dkb::Slam> SlamCore::make_slam(const dkb::Camera& camera, const dkb::Options& options) {
-  // A map that cannot be read is told before a network is loaded.
-  if (!parameters_.load_map.empty()) dkb::Slam(camera, options, dkb::Detectors::none()).load_map(parameters_.load_map);
   auto slam = std::make_shared<dkb::Slam>(camera, options, dkb::make_detectors(parameters_.detector, camera));
   slam->localize_only(parameters_.localize_only);
   if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
@@ -371,105 +368,6 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
   const std::optional<Rigid3> found = middleware_.transform(camera_frame_, frame, std::nullopt);
   if (found) cam_from_frame_.emplace(frame, *found);
   return found;
-}
-
-void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
-  publish_odometry(result);
-  const double out_ms =
-      1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
-  {
-    const std::lock_guard lock(report_mutex_);
-    trouble_.clear();
-    state_ = result.state;
-    hindrance_ = hindrance_of(result);
-    last_result_stamp_ns_ = result.stamp_ns;
-    ++counts_.frames;
-    counts_.tracked += result.tracked();
-    counts_.predicted += result.state == dkb::TrackingState::predicted;
-    counts_.lost += result.state == dkb::TrackingState::lost;
-    counts_.ambiguous += result.ambiguous;
-    ++recent_.frames;
-    recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
-    recent_.tracking_ms.add(result.tracking_ms);
-    recent_.latency_ms.add(out_ms);
-    recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
-  }
-  publish_transforms(result);
-  if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
-    MoversOutput movers = movers_of(result);
-    movers.frame_id = parameters_.map_frame;
-    middleware_.publish(movers);
-  }
-  if (middleware_.wanted(Topic::features_image)) {
-    ColourImageOutput image = draw_features(input.colour, result);
-    image.stamp_ns = result.stamp_ns;
-    image.frame_id = camera_frame_;
-    middleware_.publish(image);
-  }
-}
-
-void SlamCore::publish_odometry(const dkb::FrameResult& result) {
-  if (!result.tracked()) {
-    last_pose_.reset();
-    return;
-  }
-  const Rigid3 odom_from_base = *result.odom_from_cam * base_from_cam_.inverse();
-  const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
-  OdometryOutput odometry;
-  odometry.pose = {result.stamp_ns, parameters_.odom_frame, odom_from_base,
-                   ros_covariance(covariance, base_from_cam_, odom_from_base.rotation)};
-  odometry.child_frame_id = parameters_.base_frame;
-  const Matrix6d to_base = adjoint(base_from_cam_);
-  const Matrix6d in_base = to_base * covariance * to_base.transpose();
-  const double dt = last_pose_ ? 1e-9 * static_cast<double>(result.stamp_ns - last_pose_->stamp_ns) : 0;
-  if (dt > 0) {
-    // The errors of both poses are taken for independent: an upper bound, since they share the map's.
-    odometry.twist = twist_of(last_pose_->odom_from_base.inverse() * odom_from_base) / dt;
-    odometry.twist_covariance = (last_pose_->covariance + in_base) / (dt * dt);
-  } else {
-    odometry.twist_covariance = 1e6 * Matrix6d::Identity();  // not known
-  }
-  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
-  middleware_.publish(odometry);
-}
-
-void SlamCore::publish_transforms(const dkb::FrameResult& result) {
-  const Rigid3 cam_from_base = base_from_cam_.inverse();
-  std::vector<TransformOutput> transforms;
-  if (result.tracked()) {
-    const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
-    if (parameters_.publish_odom_tf) {
-      map_from_odom_ = result.world_from_odom;
-      transforms.push_back(
-          {result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, *result.odom_from_cam * cam_from_base});
-    } else {
-      place_robots_odometry(result.stamp_ns, map_from_base);
-    }
-    if (middleware_.wanted(Topic::pose))
-      middleware_.publish(PoseMessage{
-          result.stamp_ns, parameters_.map_frame, map_from_base,
-          ros_covariance(result.covariance.value_or(Matrix6d::Identity()), base_from_cam_, map_from_base.rotation)});
-  }
-  // While the camera is lost, the last one holds.
-  if (parameters_.publish_map_tf && map_from_odom_)
-    transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
-  if (!transforms.empty()) middleware_.publish(transforms);
-}
-
-// map -> odom, where odom -> base is the robot's. Its odometry of a frame's time may come later than the frame's pose.
-void SlamCore::place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base) {
-  unplaced_.emplace_back(stamp_ns, map_from_base);
-  if (unplaced_.size() > kMaxUnplaced) unplaced_.pop_front();
-  for (auto frame = unplaced_.rbegin(); frame != unplaced_.rend(); ++frame) {
-    const auto odom_from_base = middleware_.transform(parameters_.odom_frame, parameters_.base_frame, frame->first);
-    if (!odom_from_base) continue;
-    map_from_odom_ = frame->second * odom_from_base->inverse();
-    unplaced_.erase(unplaced_.begin(), frame.base());
-    return;
-  }
-  if (unplaced_.size() == kMaxUnplaced)
-    complain(LogLevel::warning, "no transform from " + parameters_.odom_frame + " to " + parameters_.base_frame +
-                                    " at the images' times; with `publish_odom_tf` false the robot must send it");
 }
 
 // After a service: the images that follow may have any stamps.
