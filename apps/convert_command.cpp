@@ -31,19 +31,12 @@ Compression default_compression(const std::filesystem::path& out) {
   return Compression::none;
 }
 
-// Of an option; compression_named() words it for what is read.
-Compression compression_chosen(const std::string& name) {
-  for (const char* known : {"none", "lz4", "bz2", "zstd"})
-    if (name == known) return compression_named(name);
-  throw InputError("there is no \"" + name + "\"; give none, lz4, bz2 (bag) or zstd (mcap)");
-}
-
 void run_convert(const ConvertArguments& arguments) {
   ConvertOptions options = arguments.options;
   options.warn = [](const std::string& line) { std::fprintf(stderr, "warning: %s\n", line.c_str()); };
   try {
     options.compression =
-        arguments.compression.empty() ? default_compression(arguments.out) : compression_chosen(arguments.compression);
+        arguments.compression.empty() ? default_compression(arguments.out) : compression_named(arguments.compression);
   } catch (const InputError& e) {
     throw InputError(std::string("--compression: ") + e.what());
   }
@@ -66,8 +59,10 @@ void register_convert(CLI::App& app, int& exit_code) {
   command->add_option("--out", arguments->out, "FILE.bag, FILE.mcap, or a new folder")->required();
   SourceOptions& source = arguments->options.source;
   command->add_option("--camera", source.camera, "camera file or name, where the input does not tell it");
-  command->add_option("--compression", arguments->compression,
-                      "of a recording: none, lz4, bz2 (bag) or zstd (mcap); default: zstd in mcap files, else lz4");
+  command
+      ->add_option("--compression", arguments->compression,
+                   "of a recording: none, lz4, bz2 (bag) or zstd (mcap); default: zstd in mcap files, else lz4")
+      ->check(CLI::IsMember({"none", "lz4", "bz2", "zstd"}));
   command->add_option("--colour-topic", source.colour_topic,
                       "recording to folder: colour images, where there are several");
   command->add_option("--depth-topic", source.depth_topic, "recording to folder: depth images");

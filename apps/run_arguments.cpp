@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which options of a run contradict each other.
 #include <algorithm>
-#include <cstdlib>
 
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/util/errors.h"
@@ -13,8 +12,7 @@ namespace {
 // That --filter none, --disable dr and --preset orb win over a detector is no contradiction: comparisons of filters run
 // with the same detector.
 void check_detector(const DetectorChoice& choice) {
-  const bool model = !choice.model.empty() || std::getenv("DKB_SLAM_MODEL") != nullptr;
-  const std::vector<std::string> kinds = detector_kinds(choice.kinds, model);
+  const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model_of(choice).empty());
   const bool yolo = std::find(kinds.begin(), kinds.end(), "yolo") != kinds.end();
   const bool slow = yolo || (!kinds.empty() && kinds.back().starts_with("exec:"));
   const auto refuse = [&](const char* option, const char* reader) {

@@ -281,12 +281,8 @@ std::vector<SpacePath> floor_below(const std::vector<SpacePath>& paths, double* 
     grid.points.emplace_back(ax, ay, level);
     grid.points.emplace_back(bx, by, level);
   };
-  // Counted: far from the origin a step may be too small to lead on.
-  const Eigen::Array2d lines = ((last - first) / *step).round().min(20);
-  for (int k = 0; k <= static_cast<int>(lines.x()); ++k)
-    add(first.x() + k * *step, first.y(), first.x() + k * *step, last.y());
-  for (int k = 0; k <= static_cast<int>(lines.y()); ++k)
-    add(first.x(), first.y() + k * *step, last.x(), first.y() + k * *step);
+  for (const double x : svg::ticks({first.x(), last.x()}, *step)) add(x, first.y(), x, last.y());
+  for (const double y : svg::ticks({first.y(), last.y()}, *step)) add(first.x(), y, last.x(), y);
   SpacePath shadow = paths.back();
   shadow.style = "shadow";
   for (Eigen::Vector3d& p : shadow.points) p.z() = level;

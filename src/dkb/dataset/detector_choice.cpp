@@ -48,8 +48,13 @@ std::vector<std::string> detector_kinds(const std::string& detector, bool has_mo
   return kinds;
 }
 
+std::filesystem::path model_of(const DetectorChoice& choice) {
+  const char* model = std::getenv("DKB_SLAM_MODEL");
+  return choice.model.empty() && model != nullptr ? model : choice.model;
+}
+
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
-  if (const char* model = std::getenv("DKB_SLAM_MODEL"); choice.model.empty() && model != nullptr) choice.model = model;
+  choice.model = model_of(choice);
   if (options.dynamics.filter != FilterKind::none) return choice;
   const bool asked_for = ("," + disabled + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
   if (asked_for) choice.masks.clear();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,11 @@ namespace dkb {
 // model, else `motion`, and `network` is another name of `yolo`. Throws InputError for one that does not exist.
 std::vector<std::string> detector_kinds(const std::string& kinds, bool has_model);
 
-// What of the choice holds beside the options: the model is that of $DKB_SLAM_MODEL where none is named, and without a
-// filter nothing is detected. `disabled`: the parts given to Options::disable(); without `dr` masks are not read
-// either.
+// The model that is named, else that of $DKB_SLAM_MODEL; may be empty.
+std::filesystem::path model_of(const DetectorChoice& choice);
+
+// What of the choice holds beside the options: the model is model_of(), and without a filter nothing is detected.
+// `disabled`: the parts given to Options::disable(); without `dr` masks are not read either.
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice);
 
 }  // namespace dkb

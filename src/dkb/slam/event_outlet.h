@@ -25,7 +25,8 @@ class EventOutlet {
     }
     // What a callback throws must not cost the events that come after it.
     std::exception_ptr thrown;
-    for (const Event& e : events) try {
+    for (const Event& e : events) {
+      try {
         if (executor_)
           executor_([callback = callback_, e] { callback(e); });
         else
@@ -33,6 +34,7 @@ class EventOutlet {
       } catch (...) {
         if (!thrown) thrown = std::current_exception();
       }
+    }
     if (thrown) std::rethrow_exception(thrown);
   }
   std::vector<Event> take() {
