@@ -18,14 +18,14 @@ if(DKB_SANITIZE)
   target_link_options(dkb_compile_options INTERFACE -fsanitize=${DKB_SANITIZE})
   # Under AddressSanitizer Eigen hands out memory 16 bytes into a block, which only its own functions can free. Ceres,
   # built without it, frees such memory directly where the linker has taken our copy of Eigen's allocation.
-  target_compile_definitions(dkb_compile_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  target_compile_definitions(dkb_compile_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1 DKB_SANITIZED=1)
 endif()
 if(DKB_FUZZ AND CMAKE_CXX_COMPILER_ID MATCHES Clang)
   target_compile_options(dkb_compile_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 add_library(dkb_warnings INTERFACE)
 target_compile_options(dkb_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
-  -Wno-restrict)  # GCC 12 warns falsely on string concatenation (GCC bug 105651)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # GCC 12 warns falsely on string concatenation (GCC bug 105651)
 if(DKB_WERROR)
   target_compile_options(dkb_warnings INTERFACE -Werror)
 endif()
@@ -54,6 +54,17 @@ function(dkb_unit_test program label)
   set(${label} ${found} PARENT_SCOPE)
 endfunction()
 
+# dkb_add_tests(PROGRAM PREFIX properties ...): each test of a program is one of CTest's. Under a sanitizer the program is,
+# since to start it takes longer there than most tests.
+function(dkb_add_tests program prefix)
+  if(DKB_SANITIZE)
+    add_test(NAME ${program} COMMAND ${program})
+    set_tests_properties(${program} PROPERTIES TIMEOUT 1200 ${ARGN})
+  else()
+    gtest_discover_tests(${program} TEST_PREFIX ${prefix}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 ${ARGN})
+  endif()
+endfunction()
+
 # One program of a room's tests; LOOK_AT: files beside theirs that may have to do with threads.
 function(dkb_room_tests name suffix)
   cmake_parse_arguments(PROGRAM "" "" "FILES;LOOK_AT;DEPENDS" ${ARGN})
@@ -61,7 +72,7 @@ function(dkb_room_tests name suffix)
   add_executable(${program} ${PROGRAM_FILES})
   dkb_unit_test(${program} label ${PROGRAM_FILES} ${PROGRAM_LOOK_AT})
   target_link_libraries(${program} PRIVATE dkb_${name} dkb_warnings ${PROGRAM_DEPENDS} GTest::gtest GTest::gtest_main)
-  gtest_discover_tests(${program} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 LABELS ${label})
+  dkb_add_tests(${program} ${name} LABELS ${label})
 endfunction()
 
 # dkb_room(NAME [NOT_INSTALLED] SOURCES a.cpp ... TESTS a_test.cpp ... THREAD_TESTS ... DEPENDS lower rooms and libraries

@@ -6,6 +6,7 @@
 #   scripts/deps.sh          what `make demo`, `make test` and `make bench` need
 #   scripts/deps.sh check    installs nothing: fails with one line when something is missing that `make build` needs
 #   scripts/deps.sh python   what `make python` and `pip install .` need
+#   scripts/deps.sh san      what `make test-san` needs
 #   scripts/deps.sh docs     what `make docs` needs
 #   scripts/deps.sh lint     the same and the tools of `make format` and `make lint`
 #   scripts/deps.sh ros      what `make test` needs, and ROS 1 for the tests of its package
@@ -35,10 +36,13 @@ packages=(
 # is plain and its tests are skipped.
 if ! command -v node >/dev/null || ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
 if grep -qs '^ID=debian' /etc/os-release && ! command -v chromium >/dev/null; then packages+=(chromium-headless-shell); fi
+clang=(clang llvm)  # llvm: names in what a sanitizer prints
+if grep -qs '^ID=debian' /etc/os-release; then clang+=(libclang-rt-dev); fi  # elsewhere a part of clang
 case "${1:-}" in
   "") ;;
   check) packages=("${needed[@]}") ;;
   python) packages=("${needed[@]}" "${python[@]}") ;;
+  san) packages+=("${clang[@]}") ;;
   docs) packages=(doxygen) ;;
   ros)
     packages+=(
@@ -50,7 +54,7 @@ case "${1:-}" in
     ;;
   lint) packages+=(clang-format clang-tidy cppcheck git) ;;
   slurm) packages+=(slurm-wlm munge) ;;
-  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|docs|lint|ros|slurm]" >&2; exit 2 ;;
+  *) echo "error: unknown argument \"$1\"; usage: scripts/deps.sh [check|python|san|docs|lint|ros|slurm]" >&2; exit 2 ;;
 esac
 
 if [[ "${DKB_SKIP_DEPS:-}" == 1 ]]; then

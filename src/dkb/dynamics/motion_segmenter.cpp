@@ -217,8 +217,8 @@ void MotionSegmenter::carry_scores(CellRange block) {
           const bool same = seen & !hole & (then > 0) & (std::abs(then - there[i]) < tolerances[i] + walked);
           const float score_if_near = too_near ? keep_hole * std::max(0.0f, carried) : 0.0f;
           scores[i] = same ? keep * carried : score_if_near;
-          knowns[i] = too_near | same ? 1 : 0;
-          verdict[i] = seen & !hole & !same ? 1 : 0;
+          knowns[i] = (too_near | same) ? 1 : 0;
+          verdict[i] = (seen & !hole & !same) ? 1 : 0;
         }
       });
   for (size_t i = 0; i < block.count; ++i) {
@@ -264,8 +264,8 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
           const float z = depth_there[i], near = nearest[i], far = farthest[i], tolerated = tolerance[i];
           const bool known = (cell[i] >= 0) & (depth[i] > 0) & (far > 0);
           const bool before = z + tolerated < near, same = !before & (z < far + tolerated);
-          intruding[i] |= known & (depth_then[i] > 0) & stands_before(z, tolerated, near, far, noise) ? 1 : 0;
-          still[i] += known & same & (score_then[i] < kMayMove) ? weight : 0.0f;
+          intruding[i] |= (known & (depth_then[i] > 0) & stands_before(z, tolerated, near, far, noise)) ? 1 : 0;
+          still[i] += (known & same & (score_then[i] < kMayMove)) ? weight : 0.0f;
         }
       });
 }
@@ -289,7 +289,7 @@ void MotionSegmenter::find_vacated() {
                 nearest = there_.nearest.data(), vacated = vacated_.data() + first, noise = noise_]() DKB_KERNEL_BODY {
           for (size_t i = 0; i < count; ++i) {
             const float tolerance = static_cast<float>(noise.surface_tolerance(z[i]));
-            vacated[i] = (cells[i] >= 0) & (before[i] > 0) & (z[i] + tolerance < nearest[i]) ? 1 : 0;
+            vacated[i] = ((cells[i] >= 0) & (before[i] > 0) & (z[i] + tolerance < nearest[i])) ? 1 : 0;
           }
         });
   }
@@ -361,7 +361,7 @@ MoverMask MotionSegmenter::mask() {
     for (size_t i = 0; i < count; ++i) {
       const int32_t cell = cells[i];
       const float there = score[cell < 0 ? 0 : cell];
-      marked[i] = (cell >= 0) & (there > threshold) ? 255 : 0;
+      marked[i] = ((cell >= 0) & (there > threshold)) ? 255 : 0;
     }
   });
   return result;

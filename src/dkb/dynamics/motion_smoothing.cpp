@@ -39,7 +39,7 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
       for (int x = begin; x < end; ++x) {
         const float bend = before[x] + after[x] - 2.0f * here[x];
         const bool known = (before[x] > 0) & (after[x] > 0);
-        out[x] = known & (bend > kCrease) ? kCreaseLink : out[x];
+        out[x] = (known & (bend > kCrease)) ? kCreaseLink : out[x];
       }
     };
     mark(here - kArm, here + kArm, kArm, width - kArm);

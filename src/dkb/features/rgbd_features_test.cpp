@@ -160,7 +160,7 @@ TEST(RgbdFeatures, UndistortionByTableIsThatOfTheCamera) {
   const UndistortionTable table(camera);
   Random random(3);
   for (int i = 0; i < 500; ++i) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width - 1), random.uniform(0, camera.height - 1));
+    const Eigen::Vector2d pixel{random.uniform(0, camera.width - 1), random.uniform(0, camera.height - 1)};
     const Eigen::Vector2f by_table = table(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
     EXPECT_LT((by_table.cast<double>() - camera.undistort(pixel)).norm(), 0.05);
   }
@@ -188,7 +188,7 @@ TEST(RgbdFeatures, DepthsAreCarriedToTheColourImagesTime) {
   Random random(1);
   std::vector<Eigen::Vector2f> pixels;
   for (int i = 0; i < 200; ++i)
-    pixels.emplace_back(static_cast<float>(30 + random.below(580)), static_cast<float>(30 + random.below(420)));
+    pixels.push_back({static_cast<float>(30 + random.below(580)), static_cast<float>(30 + random.below(420))});
   const RgbdFeatures corrected = make(corners_at(pixels), image, camera, velocity);
   DepthOptions off;
   off.model_time_offset = false;

@@ -16,7 +16,7 @@ Points random_points(int n, uint64_t seed, Eigen::Vector3d spread = {1, 2, 3}) {
   Random random(seed);
   Points points;
   for (int i = 0; i < n; ++i)
-    points.emplace_back(spread.x() * random.normal(), spread.y() * random.normal(), spread.z() * random.normal());
+    points.push_back({spread.x() * random.normal(), spread.y() * random.normal(), spread.z() * random.normal()});
   return points;
 }
 

@@ -18,7 +18,7 @@ TEST(Rigid3, InverseUndoesTheMotion) {
   Random r(1);
   for (int i = 0; i < 20; ++i) {
     const Rigid3 b_from_a = random_motion(r);
-    const Eigen::Vector3d p(r.normal(), r.normal(), r.normal());
+    const Eigen::Vector3d p{r.normal(), r.normal(), r.normal()};
     EXPECT_NEAR((b_from_a.inverse() * (b_from_a * p) - p).norm(), 0, 1e-12);
     EXPECT_NEAR((b_from_a * centre_in_world(b_from_a)).norm(), 0, 1e-12);
   }
@@ -80,7 +80,7 @@ TEST(Rigid3, ProductAppliesTheRightOperandFirst) {
 TEST(Rigid3, RotationVectorRoundTrips) {
   Random r(3);
   for (int i = 0; i < 50; ++i) {
-    const Eigen::Vector3d w = Eigen::Vector3d(r.normal(), r.normal(), r.normal()).normalized() * r.uniform(0, 3.1);
+    const Eigen::Vector3d w = Eigen::Vector3d{r.normal(), r.normal(), r.normal()}.normalized() * r.uniform(0, 3.1);
     EXPECT_NEAR((vector_from_rotation(rotation_from_vector(w)) - w).norm(), 0, 1e-9);
   }
   EXPECT_NEAR((vector_from_rotation(rotation_from_vector({1e-14, 0, 0}))).norm(), 1e-14, 1e-16);

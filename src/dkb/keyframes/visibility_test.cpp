@@ -30,8 +30,7 @@ std::vector<int> nearest_by_all_pairs(const Points& cloud, int of) {
 TEST(NearestNeighbours, EqualTheSearchOverAllPairs) {
   Random random(3);
   Points cloud;
-  for (int i = 0; i < 400; ++i)
-    cloud.emplace_back(random.uniform(-2, 2), random.uniform(-1, 1), random.uniform(1, 1.2));
+  for (int i = 0; i < 400; ++i) cloud.push_back({random.uniform(-2, 2), random.uniform(-1, 1), random.uniform(1, 1.2)});
   std::vector<int> of(cloud.size());
   std::iota(of.begin(), of.end(), 0);
   const auto found = nearest_neighbours(cloud, of);

@@ -89,7 +89,8 @@ std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from) {
   length[static_cast<size_t>(from)] = 0;
   open.emplace(0.0, from);
   while (!open.empty()) {
-    const auto [path_length, at] = open.top();
+    const double path_length = open.top().first;
+    const KeyframeId at = open.top().second;
     open.pop();
     if (path_length > length[static_cast<size_t>(at)]) continue;
     const Keyframe& k = *map.keyframe(at);

@@ -151,7 +151,7 @@ std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, c
     k.image_pixel = {static_cast<float>(random.uniform(16, camera.width - 16)),
                      static_cast<float>(random.uniform(16, camera.height - 16))};
     k.pixel = undistort(k.image_pixel.x(), k.image_pixel.y());
-    if (!follow) k.pixel += Eigen::Vector2f(static_cast<float>(random.normal()), static_cast<float>(random.normal()));
+    if (!follow) k.pixel += Eigen::Vector2f{static_cast<float>(random.normal()), static_cast<float>(random.normal())};
     k.depth = random.below(5) == 0 ? 0.0f : static_cast<float>(random.below(20000)) / 5000.0f;
     k.angle = static_cast<float>(random.uniform(0, 6.28));
     k.response = static_cast<float>(random.uniform(20, 200));
@@ -194,7 +194,7 @@ KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen,
     p.id = point;
     p.position = {random.normal(), random.normal(), random.normal()};
     p.normal =
-        Eigen::Vector3f(static_cast<float>(random.normal()), static_cast<float>(random.normal()), 1.0f).normalized();
+        Eigen::Vector3f{static_cast<float>(random.normal()), static_cast<float>(random.normal()), 1.0f}.normalized();
     p.reference_distance = static_cast<float>(random.uniform(0.5, 5));
     p.reference_scale = 1.2f;
     const auto f = static_cast<size_t>(feature);

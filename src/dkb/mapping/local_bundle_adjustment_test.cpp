@@ -18,7 +18,7 @@ class LocalBa : public ::testing::Test {
   void build(int keyframes, const ViewOptions& options, double pose_error, double point_error) {
     Random random(4);
     const auto noise = [&](double sigma) {
-      return Eigen::Vector3d(sigma * random.normal(), sigma * random.normal(), sigma * random.normal());
+      return Eigen::Vector3d{sigma * random.normal(), sigma * random.normal(), sigma * random.normal()};
     };
     std::vector<Rigid3> start;
     for (int k = 0; k < keyframes; ++k) {

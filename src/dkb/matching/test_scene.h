@@ -41,7 +41,7 @@ class TestScene {
   explicit TestScene(int count, uint64_t seed = 1, double nearest = 1.5, double farthest = 3.5) {
     Random random(seed);
     for (int i = 0; i < count; ++i) {
-      points.emplace_back(random.uniform(-3, 3), random.uniform(-2, 2), random.uniform(nearest, farthest));
+      points.push_back({random.uniform(-3, 3), random.uniform(-2, 2), random.uniform(nearest, farthest)});
       descriptors.push_back(random_descriptor(random));
       fine_at_.push_back(random.uniform(1.5, 6.0));
     }
@@ -81,9 +81,9 @@ class TestScene {
     for (size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d in_cam = cam_from_world * points[i];
       // Drawn for every point, in view or not, so that the same seed treats a point alike in every view.
-      const Eigen::Vector2d noise(random.normal(), random.normal());
+      const Eigen::Vector2d noise{random.normal(), random.normal()};
       const bool misplaced = random.uniform() < options.misplaced, deep = random.uniform() < options.depth_share;
-      const Eigen::Vector2d off(random.uniform(20, 60), -random.uniform(20, 60));
+      const Eigen::Vector2d off{random.uniform(20, 60), -random.uniform(20, 60)};
       const double depth_noise = options.depth_noise * random.normal();
       if (in_cam.z() < 0.3 || static_cast<int>(i) == options.hidden) continue;
       const int level = octave(static_cast<int>(i), in_cam.norm());
@@ -92,9 +92,12 @@ class TestScene {
       if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() >= camera.width || pixel.y() >= camera.height) continue;
       add(static_cast<int>(i), pixel, deep ? in_cam.z() + depth_noise : 0, level, descriptors[i]);
     }
-    for (int i = 0; i < options.clutter; ++i)
-      add(-1, {random.uniform(0, camera.width), random.uniform(0, camera.height)}, random.uniform(1, 4),
-          static_cast<int>(random.below(kLevels)), random_descriptor(random));
+    for (int i = 0; i < options.clutter; ++i) {
+      const Eigen::Vector2d pixel{random.uniform(0, camera.width), random.uniform(0, camera.height)};
+      const double depth = random.uniform(1, 4);
+      const int level = static_cast<int>(random.below(kLevels));
+      add(-1, pixel, depth, level, random_descriptor(random));
+    }
     features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
     view.features = std::move(features);
     return view;

@@ -42,7 +42,7 @@ std::string label(const Kind& kind) {
 
 // The most memory this process ever had. The sanitizers keep what was freed, so it says nothing there and is zero.
 long peak_memory_mb() {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef DKB_SANITIZED
   return 0;
 #endif
   rusage usage{};

@@ -27,9 +27,9 @@ bool straddles_edge(const Image<float>& inverse_depth, int x, int y, int half_wi
   const int left = std::max(x - half_window, 0), right = std::min(x + half_window, inverse_depth.width() - 1);
   for (const int dy : {-half_window, 0, half_window}) {
     const float* row = inverse_depth.row(std::clamp(y + dy, 0, inverse_depth.height() - 1));
-    if ((std::abs(row[left] - inverse) > step) | (std::abs(row[x] - inverse) > step) |
-        (std::abs(row[right] - inverse) > step))
-      return true;
+    const float most =
+        std::max({std::abs(row[left] - inverse), std::abs(row[x] - inverse), std::abs(row[right] - inverse)});
+    if (most > step) return true;
   }
   return false;
 }

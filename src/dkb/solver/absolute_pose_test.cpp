@@ -9,7 +9,7 @@ namespace dkb {
 namespace {
 
 Rigid3 random_pose(Random& random) {
-  const Eigen::Vector3d w(random.normal(), random.normal(), random.normal());
+  const Eigen::Vector3d w{random.normal(), random.normal(), random.normal()};
   return {rotation_from_vector(w), {random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2)}};
 }
 
@@ -27,7 +27,7 @@ TEST(P3p, FindsTheTruePoseAmongAtMostFour) {
     Eigen::Vector3d points[3], rays[3];
     for (int k = 0; k < 3; ++k) {
       const double z = random.uniform(0.5, 5);
-      const Eigen::Vector3d in_cam(z * random.uniform(-0.6, 0.6), z * random.uniform(-0.5, 0.5), z);
+      const Eigen::Vector3d in_cam{z * random.uniform(-0.6, 0.6), z * random.uniform(-0.5, 0.5), z};
       points[k] = truth.inverse() * in_cam;
       rays[k] = in_cam.normalized();
     }
@@ -61,11 +61,11 @@ std::vector<PoseObservation> matches(const CameraModel& camera, const Rigid3& tr
     o.pixel = {random.uniform(0, 640), random.uniform(0, 480)};
     const double z = random.uniform(0.8, 4);
     o.point_in_world = truth.inverse() * camera.unproject(o.pixel, z);
-    o.pixel += Eigen::Vector2d(random.normal(), random.normal());
+    o.pixel += Eigen::Vector2d{random.normal(), random.normal()};
     if (depth) o.depth = z + 0.01 * random.normal();
     outlier.push_back(random.uniform() < outliers);
     if (outlier.back())
-      o.point_in_world = truth.inverse() * Eigen::Vector3d(random.normal(), random.normal(), 2 + random.normal());
+      o.point_in_world = truth.inverse() * Eigen::Vector3d{random.normal(), random.normal(), 2 + random.normal()};
     observations.push_back(o);
   }
   return observations;

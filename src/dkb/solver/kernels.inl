@@ -303,7 +303,6 @@ DKB_KERNEL void schur(const SchurInput& in, double* blocks, double* gradient, do
       const int* row = block_row;
       for (int a = 0; a < chunk_end; row += count - a, ++a) {
         double made[24];
-        const double* ya = kept + 24 * (a - chunk);
         if (a < chunk) {
           const double* w = in.pair_sums + static_cast<long>(kPairStride) * (first + a);
           for (int k = 0; k < 6; ++k) {
@@ -311,8 +310,8 @@ DKB_KERNEL void schur(const SchurInput& in, double* blocks, double* gradient, do
             made[8 + k] = (w[6 + k] - l10 * made[k]) * i11;
             made[16 + k] = (w[12 + k] - l20 * made[k] - l21 * made[8 + k]) * i22;
           }
-          ya = made;
         }
+        const double* ya = a < chunk ? made : kept + 24 * (a - chunk);
         Pack factor[27];
         for (int c = 0; c < 3; ++c) {
           for (int k = 0; k < 3; ++k) {

@@ -24,8 +24,8 @@ struct Data {
     set_pose(pose);
     for (int i = 0; i < count; ++i) {
       const bool behind = !ordinary && i % 11 == 7;
-      const Eigen::Vector3d in_cam(random.uniform(-1, 1), random.uniform(-1, 1),
-                                   behind ? -1.0 : random.uniform(0.5, 4));
+      const Eigen::Vector3d in_cam{random.uniform(-1, 1), random.uniform(-1, 1),
+                                   behind ? -1.0 : random.uniform(0.5, 4)};
       const Eigen::Vector3d world = pose.inverse() * in_cam;
       x[i] = world.x(), y[i] = world.y(), z[i] = world.z();
       const double error = !ordinary && i % 5 == 2 ? 30 : 1;

@@ -31,29 +31,36 @@ TEST(PoseOptimiser, FindsTheExactPoseWithoutNoise) {
 }
 
 TEST(PoseOptimiser, ReachesTheMinimumThatCeresReachesOnItsInliers) {
-  TestWorld world({.cameras = 1, .fixed = 0, .outlier_share = 0.2, .seed = 5});
-  const auto observations = world.pose_observations(0);
-  const PoseEstimate estimate = optimise_pose(world.problem.camera, nearby(world.cam_from_world[0]), observations);
-  ASSERT_TRUE(estimate.ok);
-  BaProblem problem = world.problem;
-  problem.points = world.points;
-  problem.cam_from_world[0] = nearby(world.cam_from_world[0]);
-  std::vector<uint8_t> left_out;
-  for (const uint8_t in : estimate.inlier) left_out.push_back(!in);
-  // The scale: of the median of what fits, beside 20 observations as given.
-  std::vector<double> fits;
-  for (size_t i = 0; i < observations.size(); ++i) {
-    const PoseObservation& o = observations[i];
-    const Eigen::Vector3d p = estimate.cam_from_world * o.point_in_world;
-    const double pixel = (world.problem.camera.project(p) - o.pixel).squaredNorm() / (o.pixel_sigma * o.pixel_sigma);
-    const double depth = o.depth > 0 ? std::pow((p.z() - o.depth) / o.depth_sigma, 2) : 0;
-    if (estimate.inlier[i]) fits.push_back(pixel + depth);
+  int to_the_digit = 0;
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    TestWorld world({.cameras = 1, .fixed = 0, .outlier_share = 0.2, .seed = seed});
+    const auto observations = world.pose_observations(0);
+    const PoseEstimate estimate = optimise_pose(world.problem.camera, nearby(world.cam_from_world[0]), observations);
+    ASSERT_TRUE(estimate.ok);
+    BaProblem problem = world.problem;
+    problem.points = world.points;
+    problem.cam_from_world[0] = nearby(world.cam_from_world[0]);
+    std::vector<uint8_t> left_out;
+    for (const uint8_t in : estimate.inlier) left_out.push_back(!in);
+    // The scale: of the median of what fits, beside 20 observations as given.
+    std::vector<double> fits;
+    for (size_t i = 0; i < observations.size(); ++i) {
+      const PoseObservation& o = observations[i];
+      const Eigen::Vector3d p = estimate.cam_from_world * o.point_in_world;
+      const double pixel = (world.problem.camera.project(p) - o.pixel).squaredNorm() / (o.pixel_sigma * o.pixel_sigma);
+      const double depth = o.depth > 0 ? std::pow((p.z() - o.depth) / o.depth_sigma, 2) : 0;
+      if (estimate.inlier[i]) fits.push_back(pixel + depth);
+    }
+    std::sort(fits.begin(), fits.end());
+    const auto n = static_cast<double>(fits.size());
+    const double variance = (n * fits[fits.size() / 2] / 1.386 + 20) / (n + 20);
+    ceres_bundle_adjust(problem, {.robust = true, .fixed_points = true, .student_variance = variance}, left_out);
+    const double apart = distance(estimate.cam_from_world, problem.cam_from_world[0]);
+    // A match at the very limit may change sides after the last step; a tenth of the pose's own error then.
+    EXPECT_LT(apart, 2e-4) << seed;
+    to_the_digit += apart < 1e-5;
   }
-  std::sort(fits.begin(), fits.end());
-  const auto n = static_cast<double>(fits.size());
-  const double variance = (n * fits[fits.size() / 2] / 1.386 + 20) / (n + 20);
-  ceres_bundle_adjust(problem, {.robust = true, .fixed_points = true, .student_variance = variance}, left_out);
-  EXPECT_LT(distance(estimate.cam_from_world, problem.cam_from_world[0]), 1e-4);
+  EXPECT_GE(to_the_digit, 10);
 }
 
 TEST(PoseOptimiser, TellsOutliersApart) {
@@ -112,7 +119,7 @@ TEST(PoseOptimiser, CovarianceEqualsTheSpreadOfEstimates) {
   for (int trial = 0; trial < kTrials; ++trial) {
     auto observations = truth;
     for (PoseObservation& o : observations) {
-      o.pixel += o.pixel_sigma * Eigen::Vector2d(random.normal(), random.normal());
+      o.pixel += o.pixel_sigma * Eigen::Vector2d{random.normal(), random.normal()};
       if (o.depth > 0) {
         o.depth_sigma = 0.02;
         o.depth = (true_pose * o.point_in_world).z() + o.depth_sigma * random.normal();

@@ -47,7 +47,7 @@ struct TestWorld {
     }
     const double length = options.step * options.cameras;
     for (int p = 0; p < options.points; ++p) {
-      points.emplace_back(random.uniform(-1.5, length + 1.5), random.uniform(-1.2, 1.2), random.uniform(1.5, 4.5));
+      points.push_back({random.uniform(-1.5, length + 1.5), random.uniform(-1.2, 1.2), random.uniform(1.5, 4.5)});
     }
     const CameraModel& camera = problem.camera;
     for (int c = 0; c < options.cameras; ++c) {

@@ -35,7 +35,7 @@ TEST_F(TrackerTest, ProvisionalPointsOfALaterKeyframeAddToTheMapBeforeMappingPub
 
 TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
   // A map of half the scene: the other half has no depth at the only keyframe.
-  publish(start(on_path(0), {.depth_share = 0.5}));
+  publish(start(on_path(0), {.depth_share = 0.6}));
   int shown = 0, guessed = 0;
   for (int f = 1; f <= 4; ++f) {
     const TrackedFrame o = track(on_path(f));
@@ -56,7 +56,7 @@ TEST_F(TrackerTest, WhatHasJustComeIntoViewHelpsFromTheNextFrameOn) {
 }
 
 TEST_F(TrackerTest, AnOdometryPointThatMovesByThreePixelsStartsAnew) {
-  publish(start(on_path(0), {.depth_share = 0.5}));
+  publish(start(on_path(0), {.depth_share = 0.6}));
   TrackedFrame o;
   for (int f = 1; f <= 3; ++f) o = track(on_path(f));
   // Of the features of this frame that show an odometry point, the place of the one nearest to the image's middle.
@@ -83,7 +83,7 @@ TEST_F(TrackerTest, AnOdometryPointThatMovesByThreePixelsStartsAnew) {
 }
 
 TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
-  publish(start(on_path(0), {.depth_share = 0.5}));
+  publish(start(on_path(0), {.depth_share = 0.6}));
   track(on_path(1));
   const TrackedFrame second = track(on_path(2));
   const KeyframePacket packet = insert(second);
@@ -95,7 +95,7 @@ TEST_F(TrackerTest, AKeyframeTurnsOdometryPointsIntoMapPoints) {
 
 // Odometry points are named after the features of the last frame; a map that starts anew has other features.
 TEST_F(TrackerTest, ALossEndsOdometryPointsBeforeAnotherMapStarts) {
-  publish(start(on_path(0), {.depth_share = 0.5}));
+  publish(start(on_path(0), {.depth_share = 0.6}));
   track(on_path(1));
   const TrackedFrame before = track(on_path(2));
   int followed = 0;
@@ -130,7 +130,7 @@ TEST_F(TrackerTest, RetractedPointsAreNeverMatchedAgain) {
     EXPECT_FALSE(shows_a_retracted_one()) << "frame " << f;
   }
   black = true;
-  track({});
+  track(Rigid3{});
   black = false;
   track(on_path(6));
   o = track(on_path(6));
@@ -200,7 +200,7 @@ TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
   const int hidden = scene_point(map.live_points()[3]);
   TrackedFrame o;
   for (int f = 0; f < 10; ++f) {
-    o = track({}, {.hidden = hidden});
+    o = track(Rigid3{}, {.hidden = hidden});
   }
   const KeyframePacket packet = insert(o);
   ASSERT_GT(packet.visibility.size(), 100U);
@@ -217,7 +217,7 @@ TEST_F(TrackerTest, VisibilityCountsWhatWasInViewAndWhatWasMatched) {
       EXPECT_EQ(s.found, 10);
     }
   }
-  EXPECT_TRUE(insert(track({})).visibility.size() < 2 * packet.visibility.size());
+  EXPECT_TRUE(insert(track(Rigid3{})).visibility.size() < 2 * packet.visibility.size());
 }
 
 TEST_F(TrackerTest, FarDepthsMakePointsOnlyWhenCloseOnesAreFew) {
@@ -253,7 +253,7 @@ TEST_F(TrackerTest, CountsTheReferencesPoints) {
 
 TEST_F(TrackerTest, FusedPointsAreShownByOneFeature) {
   publish(start());
-  const TrackedFrame o = track({});
+  const TrackedFrame o = track(Rigid3{});
   std::vector<PointId> shown;
   for (PointId p : o.points)
     if (p != kNoPoint) shown.push_back(p);

@@ -11,10 +11,10 @@ namespace dkb {
 namespace {
 
 TEST_F(TrackerTest, AMapStartsOnceEnoughFeaturesHaveDepth) {
-  const TrackedFrame blind = track({}, {.depth_share = 0});
+  const TrackedFrame blind = track(Rigid3{}, {.depth_share = 0});
   EXPECT_EQ(blind.state, TrackingState::initialising);
   EXPECT_FALSE(blind.starts_map);
-  const TrackedFrame first = track({});
+  const TrackedFrame first = track(Rigid3{});
   EXPECT_EQ(first.state, TrackingState::tracking);
   EXPECT_TRUE(first.starts_map);
 }
@@ -103,14 +103,14 @@ TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
 
 TEST_F(TrackerTest, LostBeforeTheFirstMapArrivesItWaitsForIt) {
   const KeyframePacket packet = start();
-  track({});
+  track(Rigid3{});
   black = true;
-  EXPECT_EQ(track({}).state, TrackingState::lost);
+  EXPECT_EQ(track(Rigid3{}).state, TrackingState::lost);
   black = false;
-  EXPECT_EQ(track({}).state, TrackingState::lost);
+  EXPECT_EQ(track(Rigid3{}).state, TrackingState::lost);
   publish(packet);
-  EXPECT_EQ(track({}).state, TrackingState::lost) << "found, and yet to be confirmed";
-  EXPECT_EQ(track({}).state, TrackingState::relocalised);
+  EXPECT_EQ(track(Rigid3{}).state, TrackingState::lost) << "found, and yet to be confirmed";
+  EXPECT_EQ(track(Rigid3{}).state, TrackingState::relocalised);
 }
 
 TEST_F(TrackerTest, ATakenViewMovesPoseVelocityAndPendingKeyframesWithTheWorld) {
@@ -219,10 +219,10 @@ TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   const TestScene home = scene;
   scene = TestScene(700, 99);
   black = true;
-  for (int f = 0; f < 20; ++f) EXPECT_EQ(track({}).state, TrackingState::lost) << "the dark starts no map";
+  for (int f = 0; f < 20; ++f) EXPECT_EQ(track(Rigid3{}).state, TrackingState::lost) << "the dark starts no map";
   black = false;
-  for (int f = 0; f < 4; ++f) EXPECT_EQ(track({}).state, TrackingState::lost);
-  TrackedFrame o = track({});
+  for (int f = 0; f < 4; ++f) EXPECT_EQ(track(Rigid3{}).state, TrackingState::lost);
+  TrackedFrame o = track(Rigid3{});
   ASSERT_EQ(o.state, TrackingState::tracking);
   EXPECT_TRUE(o.starts_map);
   EXPECT_LT(distance_between(o.cam_from_world, last.cam_from_world), 1e-12) << "where it was seen last";
