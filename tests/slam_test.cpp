@@ -241,6 +241,25 @@ TEST_F(SlamTest, TheCovarianceIsOneAndSpeaksOfMillimetres) {
   }
 }
 
+TEST_F(SlamTest, AMapThatHangsOnAGuessIsAsUncertainAsTheGuess) {
+  // Nothing of the first image is seen again: the map begins anew, hung on the first frame by a camera of unknown
+  // speed.
+  const TempFolder folder;
+  const auto other =
+      open_folder(simulated(folder / "other", {"--scene", "room", "--people", "0", "--seed", "9", "--frames", "1"}));
+  const SourceFrame strange = other->next();
+  Options options;
+  options.dynamics.filter = FilterKind::none;  // no depth is compared that would tell the step
+  Slam slam(camera, options);
+  slam.process({frames[0].stamp_ns(), strange.frame.colour(), strange.frame.depth(), {}, {}});
+  std::vector<FrameResult> results = feed(slam, 1, 20);
+  ASSERT_TRUE(results.back().tracked());
+  slam.finish();
+  const auto sd = [](const FrameResult& r) { return std::sqrt(r.covariance->topLeftCorner<3, 3>().trace()); };
+  EXPECT_GT(sd(results.front()), 0.005) << "[m]";
+  EXPECT_GT(sd(results.back()), 0.005) << "[m]";
+}
+
 TEST_F(SlamTest, RawBuffersAreTheSameImages) {
   Slam by_frame(camera), by_buffer(camera);
   for (size_t i = 0; i < 10; ++i) {

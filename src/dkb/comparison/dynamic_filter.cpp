@@ -97,11 +97,12 @@ std::vector<uint8_t> multiview_filter(std::span<const FilterFeature> features,
   std::vector<Spot> spots;
   for (const Eigen::Vector3d& p : seen_in_camera) {
     if (p.z() < 0.1) continue;
-    const Eigen::Vector2d at = camera.distort(camera.project(p));
-    const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+    const auto at = image_pixel(camera, p);
+    if (!at) continue;
+    const int x = static_cast<int>(std::lround(at->x())), y = static_cast<int>(std::lround(at->y()));
     if (!depth.contains(x, y)) continue;
     const double z = depth(x, y);
-    if (z > 0 && p.z() - z > kDepthJump) spots.push_back({at, z});
+    if (z > 0 && p.z() - z > kDepthJump) spots.push_back({*at, z});
   }
   std::vector<uint8_t> dynamic(features.size(), 0);
   for (size_t i = 0; i < features.size(); ++i)

@@ -13,9 +13,9 @@ constexpr double kSway = 0.05;         // [m] that who stands still moves by
 // Pixel of a point before the camera.
 bool pixel_of(const CameraModel& camera, const Eigen::Vector3d& p, Eigen::Vector2i* pixel) {
   if (p.z() < kNearestPoint) return false;
-  const Eigen::Vector2d at = camera.distort(camera.project(p));
-  if (!(at.x() > -1e4 && at.y() > -1e4 && at.x() < 1e5 && at.y() < 1e5)) return false;
-  *pixel = {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))};
+  const auto at = image_pixel(camera, p);
+  if (!at || !(at->x() > -1e4 && at->y() > -1e4 && at->x() < 1e5 && at->y() < 1e5)) return false;
+  *pixel = {static_cast<int>(std::lround(at->x())), static_cast<int>(std::lround(at->y()))};
   return true;
 }
 

@@ -237,8 +237,9 @@ bool MoverTracker::stands_behind(const Track& t, const DepthImage& depth) const 
     for (const double across : {-0.15, 0.0, 0.15}) {
       const Eigen::Vector3d p = middle + Eigen::Vector3d(across, down, 0);
       if (p.z() < kBefore) continue;
-      const Eigen::Vector2d at = camera_.distort(camera_.project(p));
-      const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+      const auto at = image_pixel(camera_, p);
+      if (!at) continue;
+      const int x = static_cast<int>(std::lround(at->x())), y = static_cast<int>(std::lround(at->y()));
       if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
       ++seen;
       nearer += static_cast<double>(depth(x, y)) < p.z() - kBefore;

@@ -62,6 +62,31 @@ Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const
   return {fx * x + cx, fy * y + cy};
 }
 
+namespace {
+
+// Whether the image moves outwards with a ray all the way from the axis to a squared tangent u of its angle: the slope
+// 1 + 3 k1 u + 5 k2 u^2 + 7 k3 u^3 of the radial polynomial is positive there and where it is least before.
+bool unfolded(const CameraModel& c, double u) {
+  const auto slope = [&](double at) { return 1 + at * (3 * c.k1 + at * (5 * c.k2 + at * 7 * c.k3)); };
+  if (!(slope(u) > 0)) return false;
+  const double root = 25 * c.k2 * c.k2 - 63 * c.k1 * c.k3;  // of a quarter of the discriminant of its derivative
+  if (root < 0) return true;
+  const double q = -5 * c.k2 - std::copysign(std::sqrt(root), c.k2);
+  for (const double least : {q / (21 * c.k3), 3 * c.k1 / q})
+    if (least > 0 && least < u && !(slope(least) > 0)) return false;
+  return true;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eigen::Vector3d& point) {
+  if (!(point.z() > 0)) return std::nullopt;
+  const Eigen::Vector2d ideal = camera.project(point);
+  if (!camera.distorted()) return ideal;
+  if (!unfolded(camera, (point.head<2>() / point.z()).squaredNorm())) return std::nullopt;
+  return camera.distort(ideal);
+}
+
 std::optional<CameraModel> builtin_camera(const std::string& name) {
   CameraModel c;
   c.fps = 30;

@@ -15,6 +15,10 @@ using CameraModel = Camera;
 // TUM's Kinects is ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);
 
+// [px] Where the image as read shows `point` [m, in the camera]. Nothing where it shows it nowhere: behind the camera,
+// and so far aside that the distortion polynomial has turned back and would show it a second time.
+std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eigen::Vector3d& point);
+
 // [px per m, px per rad] How the image of `point` [m, in the camera] moves with a small motion [v, w] of the point
 // under the camera: by v + w x point.
 inline Eigen::Matrix<double, 2, 6> pixel_by_motion(const CameraModel& camera, const Eigen::Vector3d& point) {

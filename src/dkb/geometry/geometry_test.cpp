@@ -116,6 +116,40 @@ TEST(CameraModel, DistortsByHandComputedNumbers) {
   EXPECT_NEAR(d.y(), 71.35, 1e-9);
 }
 
+TEST(CameraModel, ShowsNoPointTwice) {
+  const CameraModel c = *builtin_camera("bonn");
+  // 1 + 3 k1 u + 5 k2 u^2 = 0 at u = 1.545, tan = 1.243; at tan = 1.7 the polynomial is back inside the image.
+  const Eigen::Vector3d aside(1.7, 0, 1);
+  EXPECT_LT(c.distort(c.project(aside)).x(), c.width);
+  EXPECT_FALSE(image_pixel(c, aside));
+  EXPECT_FALSE(image_pixel(c, {1.25, 0, 1}));
+  EXPECT_GT(image_pixel(c, {1.24, 0, 1})->x(), c.width);
+  EXPECT_FALSE(image_pixel(c, {0, 0, -1}));
+  const Eigen::Vector3d ahead(0.3, -0.2, 1.5);
+  EXPECT_EQ(*image_pixel(c, ahead), c.distort(c.project(ahead)));
+  CameraModel plain;
+  EXPECT_EQ(*image_pixel(plain, aside), plain.project(aside));
+}
+
+TEST(CameraModel, ImageGrowsOutwardsWhereASearchSaysSo) {
+  Random random(5);
+  int folded = 0;
+  for (int i = 0; i < 2000; ++i) {
+    CameraModel c;
+    c.k1 = random.uniform(-0.6, 0.6), c.k2 = random.uniform(-1, 1), c.k3 = i % 3 == 0 ? 0 : random.uniform(-1, 1);
+    const double tangent = random.uniform(0.1, 2);
+    const auto radius = [&](double t) { return t * (1 + t * t * (c.k1 + t * t * (c.k2 + t * t * c.k3))); };
+    double least = 1;  // step of the radius
+    for (int k = 0; k < 2000; ++k)
+      least = std::min(least, (radius(tangent * (k + 1) / 2000) - radius(tangent * k / 2000)) * 2000 / tangent);
+    if (std::abs(least) < 0.01) continue;  // too near to tell by steps
+    folded += least < 0;
+    EXPECT_EQ(image_pixel(c, {0, tangent, 1}).has_value(), least > 0) << c.k1 << " " << c.k2 << " " << c.k3;
+  }
+  EXPECT_GT(folded, 200);
+  EXPECT_LT(folded, 1800);
+}
+
 TEST(CameraModel, CheckNamesTheFieldThatIsWrong) {
   CameraModel c;
   c.fx = -1;

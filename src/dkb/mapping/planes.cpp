@@ -103,8 +103,9 @@ std::vector<int> PlaneRecogniser::compare(const PlaneView& here, const PlaneView
       const Eigen::Vector3d ray = rays_(x, y).homogeneous().cast<double>();
       const Eigen::Vector3d point = there_from_here * Eigen::Vector3d(ray / here.patches[patch].over_distance.dot(ray));
       if (!(point.z() >= camera_.depth_min)) continue;
-      const Eigen::Vector2d pixel = (camera_.distort(camera_.project(point)).array() + 0.5) / kBlock;
-      const double u = std::floor(pixel.x()), v = std::floor(pixel.y());
+      const auto pixel = image_pixel(camera_, point);
+      if (!pixel) continue;
+      const double u = std::floor((pixel->x() + 0.5) / kBlock), v = std::floor((pixel->y() + 0.5) / kBlock);
       if (!(u >= 0 && v >= 0 && u < rays_.width() && v < rays_.height())) continue;
       ++looked[patch];
       const uint8_t seen = there.patch_at(static_cast<int>(u), static_cast<int>(v));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/geometry/camera.h"
 #include "dkb/image/image.h"
 
 namespace dkb {
@@ -24,11 +25,10 @@ DepthRegistration::DepthRegistration(const Camera& depth_camera, const Camera& c
 DepthImage DepthRegistration::registered(const DepthImage& depth) const {
   // Wider than the pixel's size, so that rounding leaves no gaps on slanted surfaces; narrower than two pixels where
   // both cameras see equally fine.
-  constexpr double kMargin = 0.1, kMaxReach = 8;  // [px]
-  constexpr double kFarOutside = 1.0;             // [image sides] beyond the border distortion is not to be trusted
+  constexpr double kMargin = 0.1, kMaxReach = 8;         // [px]
   const auto near = [&](const Eigen::Vector2d& pixel) {  // false for what is no number
-    return pixel.x() > -kFarOutside * colour_.width && pixel.x() < (1 + kFarOutside) * colour_.width &&
-           pixel.y() > -kFarOutside * colour_.height && pixel.y() < (1 + kFarOutside) * colour_.height;
+    return pixel.x() > -colour_.width && pixel.x() < 2 * colour_.width && pixel.y() > -colour_.height &&
+           pixel.y() < 2 * colour_.height;
   };
   DepthImage out(colour_.width, colour_.height);
   const Eigen::Matrix3d rotation = colour_from_depth_.matrix3();
@@ -37,17 +37,14 @@ DepthImage DepthRegistration::registered(const DepthImage& depth) const {
     if (!(z > 0) || !std::isfinite(z)) continue;
     const Eigen::Vector3d seen(z * rays_[i].x(), z * rays_[i].y(), z);
     const Eigen::Vector3d point = rotation * seen + colour_from_depth_.translation;
-    if (!(point.z() > 0)) continue;
-    Eigen::Vector2d pixel = colour_.project(point);
-    if (!near(pixel)) continue;
-    if (colour_.distorted()) pixel = colour_.distort(pixel);
-    if (!near(pixel)) continue;  // strong distortion leaves the range of numbers
+    const auto pixel = image_pixel(colour_, point);
+    if (!pixel || !near(*pixel)) continue;
     const double reach = std::min(0.5 * scale_ * z / point.z() + kMargin, kMaxReach);
     const auto metres = static_cast<float>(point.z());
-    const int left = std::max(0, static_cast<int>(std::ceil(pixel.x() - reach)));
-    const int right = std::min(colour_.width - 1, static_cast<int>(std::floor(pixel.x() + reach)));
-    const int top = std::max(0, static_cast<int>(std::ceil(pixel.y() - reach)));
-    const int bottom = std::min(colour_.height - 1, static_cast<int>(std::floor(pixel.y() + reach)));
+    const int left = std::max(0, static_cast<int>(std::ceil(pixel->x() - reach)));
+    const int right = std::min(colour_.width - 1, static_cast<int>(std::floor(pixel->x() + reach)));
+    const int top = std::max(0, static_cast<int>(std::ceil(pixel->y() - reach)));
+    const int bottom = std::min(colour_.height - 1, static_cast<int>(std::floor(pixel->y() + reach)));
     for (int y = top; y <= bottom; ++y)
       for (int x = left; x <= right; ++x) {
         float& there = out(x, y);

@@ -176,7 +176,8 @@ void add_people(Scene* scene, const FloorPlan& plan, const std::vector<int>& roo
     area.camera_distance = 0.85;
     const Footprint in = scene->inside;
     area.next_target = [in](Random& random) {
-      return Vector2d(random.uniform(in.x0, in.x1), random.uniform(in.y0, in.y1));
+      const double y = random.uniform(in.y0, in.y1);
+      return Vector2d(random.uniform(in.x0, in.x1), y);
     };
     SceneRequest own = request;
     own.seed = hash64(request.seed, static_cast<uint64_t>(i), 0x9E0);

@@ -121,6 +121,11 @@ void Furnisher::picture_on_wall(const Rigid3& wall_frame, double x, double z, do
   add(s, wall_frame);
 }
 
+Eigen::Quaterniond Furnisher::leaf_turn(double angle) {
+  const double y = random_.uniform(-1, 1);
+  return rotation_from_vector(Vector3d(random_.uniform(-1, 1), y, angle));
+}
+
 void Furnisher::books(const Rigid3& at, double length, double depth, double height) {
   Surfaces s;
   double x = 0;
@@ -277,7 +282,7 @@ void Furnisher::small_thing(const Rigid3& at, uint32_t kind) {
       look.texture = leaf;
       for (int i = 0; i < 9; ++i) {
         const double a = random_.uniform(0, 6.28), r = random_.uniform(0.01, 0.06);
-        const Eigen::Quaterniond q = rotation_from_vector(Vector3d(random_.uniform(-1, 1), random_.uniform(-1, 1), a));
+        const Eigen::Quaterniond q = leaf_turn(a);
         s.add_ellipsoid(Vector3d(r * std::cos(a), r * std::sin(a), 0.1 + random_.uniform(0, 0.1)), q.toRotationMatrix(),
                         Vector3d(0.05, 0.02, 0.008), look);
       }
@@ -373,7 +378,7 @@ void Furnisher::plant(const Rigid3& at) {
   look.texture = leaf;
   for (int i = 0; i < 34; ++i) {
     const double a = random_.uniform(0, 6.28), r = random_.uniform(0.03, 0.2);
-    const Eigen::Quaterniond q = rotation_from_vector(Vector3d(random_.uniform(-1, 1), random_.uniform(-1, 1), a));
+    const Eigen::Quaterniond q = leaf_turn(a);
     s.add_ellipsoid(Vector3d(r * std::cos(a), 0.22 + 0.8 * r * std::sin(a), random_.uniform(0.45, 1.25)),
                     q.toRotationMatrix(), Vector3d(0.12, 0.045, 0.012), look);
   }
@@ -390,7 +395,8 @@ void Furnisher::cartons(const Rigid3& at, double width, double depth) {
     const int t = detail(Material::carton, 200, 0.5, 0.3), u = detail(Material::carton, 200, 0.5, 0.3);
     Surfaces one;
     box(&one, Vector3d(-w / 2, 0.01, 0), Vector3d(w, d, h), {u, t, -1, t, -1, u});
-    s.append(one.moved(placed(random_.uniform(-0.02, 0.02), 0, z, random_.uniform(-0.06, 0.06))));
+    const double turn = random_.uniform(-0.06, 0.06);
+    s.append(one.moved(placed(random_.uniform(-0.02, 0.02), 0, z, turn)));
     z += h;
     if (z > 1.3) break;
   }

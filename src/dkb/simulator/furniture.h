@@ -69,6 +69,8 @@ class Furnisher {
   void monitor(const Rigid3& at);
   void small_thing(const Rigid3& at, uint32_t kind);
   void books(const Rigid3& at, double length, double depth, double height);
+  // Of a leaf: anyhow, about the vertical by `angle` [rad] more or less.
+  Eigen::Quaterniond leaf_turn(double angle);
 
   Materials* const materials_;
   Furnishing* const target_;

@@ -29,6 +29,10 @@ Colour dark(Random& random) {
   return {static_cast<float>(v + random.uniform(0, 15)), static_cast<float>(v + random.uniform(0, 12)),
           static_cast<float>(v + random.uniform(0, 22))};
 }
+// Here and below what is drawn at random is drawn in a stated order: C++ states none for a function's arguments.
+Ink ink(Colour (*kind)(Random&), Random& random) {
+  return {random.next(), kind(random)};
+}
 
 void shapes(Canvas& c, double x0, double y0, double x1, double y1, int count, Random& random) {
   const double size = std::min(x1 - x0, y1 - y0);
@@ -50,8 +54,10 @@ void shapes(Canvas& c, double x0, double y0, double x1, double y1, int count, Ra
                    colour);
         break;
       }
-      default:
-        c.line(x, y, random.uniform(x0, x1), random.uniform(y0, y1), size * 0.012, colour);
+      default: {
+        const double y_end = random.uniform(y0, y1), x_end = random.uniform(x0, x1);
+        c.line(x, y, x_end, y_end, size * 0.012, colour);
+      }
     }
   }
 }
@@ -66,12 +72,14 @@ void paint_planks(Canvas& c, Random& random) {
       c.rect(x, y, x + length, y + plank, colour);
       for (int k = 0; k < 3; ++k) {
         const double gy = y + random.uniform(0.01, plank - 0.01), gx = x + random.uniform(0, length * 0.6);
-        c.line(gx, gy, std::min(x + length, gx + random.uniform(0.1, 0.5)), gy + random.uniform(-0.006, 0.006), 0.004,
+        const double down = random.uniform(-0.006, 0.006), across = random.uniform(0.1, 0.5);
+        c.line(gx, gy, std::min(x + length, gx + across), gy + down, 0.004,
                {colour.r * 0.7F, colour.g * 0.68F, colour.b * 0.66F});
       }
-      if (random.below(3) == 0)
-        c.disc(x + random.uniform(0.05, length), y + random.uniform(0.02, 0.1), random.uniform(0.006, 0.014),
-               {60, 38, 24}, 0.8F);
+      if (random.below(3) == 0) {
+        const double size = random.uniform(0.006, 0.014), down = random.uniform(0.02, 0.1);
+        c.disc(x + random.uniform(0.05, length), y + down, size, {60, 38, 24}, 0.8F);
+      }
       c.rect(x, y, x + 0.004, y + plank, {48, 32, 22});
       x += length;
     }
@@ -93,16 +101,16 @@ void paint_wood(Canvas& c, Random& random) {
 void paint_poster(Canvas& c, Random& random) {
   const double w = c.width_m(), h = c.height_m(), m = 0.06 * w;
   c.fill(random.below(3) == 0 ? vivid(random) : pale(random));
-  const Colour ink = dark(random), bar = vivid(random);
+  const Colour black = dark(random), bar = vivid(random);
   c.rect(0, 0, w, h * 0.16, bar);
-  c.text(m, h * 0.035, w - m, h * 0.07, pale(random), random.next());
+  c.text(m, h * 0.035, w - m, h * 0.07, ink(pale, random));
   const double split = random.uniform(0.35, 0.65), top = h * 0.2, middle = h * random.uniform(0.5, 0.65);
   c.rect(m, top, w - m, middle, vivid(random));
   shapes(c, m, top, w - m, middle, 26, random);
   const double size = std::max(0.008, h * 0.018);
-  c.paragraph(m, middle + m * 0.6, w * split - m * 0.3, h - m, size, ink, random.next());
+  c.paragraph(m, middle + m * 0.6, w * split - m * 0.3, h - m, size, {random.next(), black});
   if (random.below(2) == 0) {
-    c.paragraph(w * split + m * 0.3, middle + m * 0.6, w - m, h - m, size, ink, random.next());
+    c.paragraph(w * split + m * 0.3, middle + m * 0.6, w - m, h - m, size, {random.next(), black});
   } else {
     c.rect(w * split + m * 0.3, middle + m * 0.6, w - m, h - m, pale(random));
     shapes(c, w * split + m * 0.3, middle + m * 0.6, w - m, h - m, 14, random);
@@ -114,10 +122,10 @@ void paint_picture(Canvas& c, Random& random) {
   const double w = c.width_m(), h = c.height_m();
   const Colour sky = vivid(random);
   c.fill(sky);
-  c.stain(w * 0.5, vivid(random), 0.9F, random.next());
-  c.stain(w * 0.15, vivid(random), 0.7F, random.next());
+  c.stain(w * 0.5, ink(vivid, random), 0.9F);
+  c.stain(w * 0.15, ink(vivid, random), 0.7F);
   shapes(c, 0, h * 0.3, w, h, 34, random);
-  c.stain(w * 0.05, dark(random), 0.35F, random.next());
+  c.stain(w * 0.05, ink(dark, random), 0.35F);
   const double f = 0.035 * std::min(w, h) + 0.008;
   const Colour frame = dark(random);
   c.rect(0, 0, w, f, frame);
@@ -129,16 +137,16 @@ void paint_picture(Canvas& c, Random& random) {
 void paint_page(Canvas& c, Random& random) {
   const double w = c.width_m(), h = c.height_m(), m = 0.1 * w;
   c.fill({226, 226, 220});
-  const Colour ink = dark(random);
-  c.text(m, m, w - m, h * 0.035, ink, random.next());
+  const Colour black = dark(random);
+  c.text(m, m, w - m, h * 0.035, {random.next(), black});
   if (random.below(2) == 0) {
     const double y = h * random.uniform(0.2, 0.55), y1 = y + h * 0.25;
-    c.paragraph(m, m + h * 0.07, w - m, y - 0.01, h * 0.013, ink, random.next());
+    c.paragraph(m, m + h * 0.07, w - m, y - 0.01, h * 0.013, {random.next(), black});
     c.rect(m, y, w - m, y1, pale(random));
     shapes(c, m, y, w - m, y1, 14, random);
-    c.paragraph(m, y1 + 0.01, w - m, h - m, h * 0.013, ink, random.next());
+    c.paragraph(m, y1 + 0.01, w - m, h - m, h * 0.013, {random.next(), black});
   } else {
-    c.paragraph(m, m + h * 0.07, w - m, h - m, h * 0.013, ink, random.next());
+    c.paragraph(m, m + h * 0.07, w - m, h - m, h * 0.013, {random.next(), black});
   }
 }
 
@@ -146,11 +154,11 @@ void paint_cover(Canvas& c, Random& random) {
   const double w = c.width_m(), h = c.height_m();
   c.fill(vivid(random));
   c.rect(0, h * 0.08, w, h * 0.3, random.below(2) == 0 ? dark(random) : pale(random));
-  c.text(w * 0.08, h * 0.11, w * 0.92, h * 0.06, vivid(random), random.next());
-  c.text(w * 0.08, h * 0.2, w * 0.7, h * 0.045, vivid(random), random.next());
+  c.text(w * 0.08, h * 0.11, w * 0.92, h * 0.06, ink(vivid, random));
+  c.text(w * 0.08, h * 0.2, w * 0.7, h * 0.045, ink(vivid, random));
   c.rect(w * 0.1, h * 0.38, w * 0.9, h * 0.85, pale(random));
   shapes(c, w * 0.1, h * 0.38, w * 0.9, h * 0.85, 22, random);
-  c.text(w * 0.2, h * 0.9, w * 0.8, h * 0.04, pale(random), random.next());
+  c.text(w * 0.2, h * 0.9, w * 0.8, h * 0.04, ink(pale, random));
 }
 
 void paint_spine(Canvas& c, Random& random) {
@@ -159,7 +167,8 @@ void paint_spine(Canvas& c, Random& random) {
   const Colour ink = random.below(2) == 0 ? pale(random) : vivid(random);
   for (int i = 0; i < 2; ++i) {
     const double y = h * random.uniform(0.03, 0.9);
-    c.rect(0, y, w, y + h * random.uniform(0.015, 0.08), vivid(random));
+    const Colour colour = vivid(random);
+    c.rect(0, y, w, y + h * random.uniform(0.015, 0.08), colour);
   }
   // The title runs down the spine: bars of the length of words.
   for (double y = h * random.uniform(0.12, 0.25); y < h * 0.75; y += h * 0.05) {
@@ -177,8 +186,8 @@ void paint_carton(Canvas& c, Random& random) {
   const double x = w * random.uniform(0.05, 0.3), y = h * random.uniform(0.1, 0.4), x1 = x + w * 0.55,
                y1 = y + h * 0.45;
   c.rect(x, y, x1, y1, pale(random));
-  c.text(x + w * 0.03, y + h * 0.04, x1 - w * 0.02, h * 0.1, dark(random), random.next());
-  c.paragraph(x + w * 0.03, y + h * 0.18, x1 - w * 0.02, y1, h * 0.045, dark(random), random.next());
+  c.text(x + w * 0.03, y + h * 0.04, x1 - w * 0.02, h * 0.1, ink(dark, random));
+  c.paragraph(x + w * 0.03, y + h * 0.18, x1 - w * 0.02, y1, h * 0.045, ink(dark, random));
   shapes(c, w * 0.6, h * 0.55, w * 0.96, h * 0.95, 6, random);
 }
 
@@ -193,8 +202,8 @@ void paint_keyboard(Canvas& c, Random& random) {
       c.rect(x, y, x + px * 0.86, y + py * 0.86, black ? Colour{66, 66, 72} : Colour{150, 148, 142});
       c.rect(x + px * 0.06, y + py * 0.04, x + px * 0.78, y + py * 0.72,
              black ? Colour{30, 30, 34} : Colour{214, 212, 204});
-      c.text(x + px * 0.2, y + py * 0.16, x + px * 0.62, py * 0.34, black ? Colour{210, 210, 210} : Colour{50, 50, 50},
-             random.next());
+      c.text(x + px * 0.2, y + py * 0.16, x + px * 0.62, py * 0.34,
+             Ink{random.next(), black ? Colour{210, 210, 210} : Colour{50, 50, 50}});
     }
 }
 
@@ -208,8 +217,7 @@ void paint_screen(Canvas& c, Random& random) {
                    y1 = y + h * 0.5;
       c.rect(x, y, x1, y1, i == 1 ? Colour{36, 38, 46} : pale(random));
       c.rect(x, y, x1, y + h * 0.05, vivid(random));
-      c.paragraph(x + 0.01, y + h * 0.07, x1 - 0.01, y1 - 0.005, 0.007, i == 1 ? vivid(random) : dark(random),
-                  random.next());
+      c.paragraph(x + 0.01, y + h * 0.07, x1 - 0.01, y1 - 0.005, 0.007, ink(i == 1 ? vivid : dark, random));
     }
   }
   const Colour frame{24, 24, 27};
@@ -217,7 +225,7 @@ void paint_screen(Canvas& c, Random& random) {
   c.rect(0, h - 0.015, w, h, frame);
   c.rect(0, 0, 0.015, h, frame);
   c.rect(w - 0.015, 0, w, h, frame);
-  c.text(w * 0.46, h - 0.012, w * 0.55, 0.008, {180, 180, 185}, random.next());
+  c.text(w * 0.46, h - 0.012, w * 0.55, 0.008, {random.next(), {180, 180, 185}});
 }
 
 void paint_fabric(Canvas& c, Random& random) {
@@ -236,8 +244,8 @@ void paint_fabric(Canvas& c, Random& random) {
   }
   // A print on the chest, which is at u = 0.5.
   shapes(c, w * 0.38, h * 0.2, w * 0.62, h * 0.55, 14, random);
-  c.text(w * 0.38, h * 0.6, w * 0.62, h * 0.07, dark(random), random.next());
-  c.text(w * 0.88, h * 0.25, w, h * 0.08, pale(random), random.next());
+  c.text(w * 0.38, h * 0.6, w * 0.62, h * 0.07, ink(dark, random));
+  c.text(w * 0.88, h * 0.25, w, h * 0.08, ink(pale, random));
   c.grain(0.16, 0.3, 0.35F, 4, random.next());  // folds
   c.grain(0.01, 0.01, 0.12F, 2, random.next());
 }
@@ -267,7 +275,7 @@ void paint_whiteboard(Canvas& c, Random& random) {
     const std::array<Colour, 4> pens{Colour{30, 30, 34}, Colour{30, 40, 140}, Colour{170, 30, 30}, Colour{20, 110, 50}};
     const Colour pen = pens[random.below(4)];
     if (block % 2 == 0) {
-      c.paragraph(x, y, x + w * 0.28, y + h * 0.25, 0.03, pen, random.next());
+      c.paragraph(x, y, x + w * 0.28, y + h * 0.25, 0.03, {random.next(), pen});
     } else {
       double px = x, py = y;
       for (int k = 0; k < 7; ++k) {
@@ -299,7 +307,7 @@ void paint_door(Canvas& c, Random& random) {
   c.disc(w * 0.92, h * 0.5, 0.03, {190, 180, 140});
   c.disc(w * 0.92, h * 0.54, 0.012, {30, 28, 26});
   c.rect(w * 0.35, h * 0.47, w * 0.65, h * 0.53, pale(random));
-  c.text(w * 0.38, h * 0.485, w * 0.64, h * 0.022, dark(random), random.next());
+  c.text(w * 0.38, h * 0.485, w * 0.64, h * 0.022, ink(dark, random));
 }
 
 void paint_drawers(Canvas& c, Random& random) {
@@ -312,10 +320,12 @@ void paint_drawers(Canvas& c, Random& random) {
     c.rect(0, y, w, y + 0.008, {70, 70, 72});
     c.rect(w * 0.38, y + (y1 - y) * 0.2, w * 0.62, y + (y1 - y) * 0.2 + 0.015, {66, 66, 70});
     c.rect(w * 0.36, y + (y1 - y) * 0.45, w * 0.64, y + (y1 - y) * 0.75, {224, 224, 214});
-    c.text(w * 0.38, y + (y1 - y) * 0.52, w * 0.62, (y1 - y) * 0.13, dark(random), random.next());
+    c.text(w * 0.38, y + (y1 - y) * 0.52, w * 0.62, (y1 - y) * 0.13, ink(dark, random));
   }
-  for (int i = 0; i < 5; ++i)
-    shapes(c, w * random.uniform(0, 0.7), h * random.uniform(0, 0.8), w * 0.98, h * 0.98, 1, random);
+  for (int i = 0; i < 5; ++i) {
+    const double y = h * random.uniform(0, 0.8), x = w * random.uniform(0, 0.7);
+    shapes(c, x, y, w * 0.98, h * 0.98, 1, random);
+  }
   c.grain(0.3, 0.3, 0.06F, 4, random.next());
 }
 
@@ -325,13 +335,14 @@ void paint_plain(Canvas& c, Material material, Random& random) {
       c.fill(pale(random));
       c.grain(1.2, 1.2, 0.10F, 3, random.next());
       c.grain(0.12, 0.12, 0.07F, 4, random.next());
-      for (int i = 0; i < static_cast<int>(c.width_m() * c.height_m() * 3); ++i)
-        c.disc(random.uniform(0, c.width_m()), random.uniform(0, c.height_m()), random.uniform(0.004, 0.012),
-               {120, 116, 108}, 0.5F);
+      for (int i = 0; i < static_cast<int>(c.width_m() * c.height_m() * 3); ++i) {
+        const double size = random.uniform(0.004, 0.012), y = random.uniform(0, c.height_m());
+        c.disc(random.uniform(0, c.width_m()), y, size, {120, 116, 108}, 0.5F);
+      }
       break;
     case Material::carpet:
       c.fill(vivid(random));
-      c.stain(0.6, dark(random), 0.4F, random.next());
+      c.stain(0.6, ink(dark, random), 0.4F);
       for (int i = 0; i < 80; ++i) shapes(c, 0, 0, c.width_m(), c.height_m(), 1, random);
       c.grain(0.03, 0.03, 0.35F, 3, random.next());
       break;
@@ -353,7 +364,7 @@ void paint_plain(Canvas& c, Material material, Random& random) {
     }
     case Material::denim:
       c.fill(dark(random));
-      c.stain(0.2, vivid(random), 0.5F, random.next());
+      c.stain(0.2, ink(vivid, random), 0.5F);
       c.grain(0.1, 0.25, 0.35F, 4, random.next());
       break;
     case Material::hair:
@@ -370,7 +381,7 @@ void paint_plain(Canvas& c, Material material, Random& random) {
       break;
     case Material::leaves:
       c.fill({58, 110, 52});
-      c.stain(0.06, {120, 160, 70}, 0.8F, random.next());
+      c.stain(0.06, {random.next(), {120, 160, 70}}, 0.8F);
       c.grain(0.02, 0.02, 0.3F, 3, random.next());
       break;
     default:

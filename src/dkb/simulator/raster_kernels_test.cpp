@@ -24,7 +24,7 @@ struct Row {
 Texture noisy_texture(Random& random) {
   Canvas canvas(64, 32, 1, 1);
   canvas.grain(0.2, 0.1, 0.9F, 3, random.next());
-  canvas.stain(0.3, {250, 20, 130}, 0.8F, random.next());
+  canvas.stain(0.3, {random.next(), {250, 20, 130}}, 0.8F);
   return Texture(canvas);
 }
 

@@ -170,7 +170,8 @@ Scene build_straight(const SceneRequest& request) {
   const double end = scene.frames / request.fps;
   area.next_target = [duration, end](Random& random) {
     const double cart = 5.0 * eased(random.uniform(0, end) / duration, 0.06);
-    return Vector2d(cart + random.uniform(0.8, 3.6), random.uniform(-1.3, 1.3));
+    const double aside = random.uniform(-1.3, 1.3);
+    return Vector2d(cart + random.uniform(0.8, 3.6), aside);
   };
   add_walkers(&scene, area, people_of(request, 4), end, request);
   return scene;
@@ -229,7 +230,8 @@ Scene build_chair(const SceneRequest& request) {
   std::vector<Waypoint> points{{{-0.9, 0.1}, 0.4}};
   double t = 0.4;
   for (int i = 1; t < duration; ++i) {
-    const Vector2d next((i % 2 == 0 ? -1 : 1) * random.uniform(0.4, 1.2), random.uniform(-0.55, 0.6));
+    const double y = random.uniform(-0.55, 0.6);
+    const Vector2d next((i % 2 == 0 ? -1 : 1) * random.uniform(0.4, 1.2), y);
     t += (next - points.back().position).norm() / random.uniform(0.5, 0.9) + 0.35;
     points.push_back({next, t});
     if (random.below(2) == 0) {

@@ -111,21 +111,22 @@ void Canvas::grain(double size_x, double size_y, float strength, int octaves, ui
   }
 }
 
-void Canvas::stain(double size, Colour c, float amount, uint64_t seed) {
+void Canvas::stain(double size, const Ink& ink, float amount) {
   std::vector<float> noise(static_cast<size_t>(width_));
   for (int y = 0; y < height_; ++y) {
-    fractal_noise_row(static_cast<float>(1 / sx_ / size), static_cast<float>(y / sy_ / size), 4, seed, &noise);
+    fractal_noise_row(static_cast<float>(1 / sx_ / size), static_cast<float>(y / sy_ / size), 4, ink.seed, &noise);
     for (int x = 0; x < width_; ++x)
-      blend(x, y, c, amount * std::clamp(0.5F + 1.2F * noise[static_cast<size_t>(x)], 0.0F, 1.0F));
+      blend(x, y, ink.colour, amount * std::clamp(0.5F + 1.2F * noise[static_cast<size_t>(x)], 0.0F, 1.0F));
   }
 }
 
-void Canvas::text(double x, double y, double x_end, double size, Colour c, uint64_t seed) {
+void Canvas::text(double x, double y, double x_end, double size, const Ink& ink) {
+  const Colour c = ink.colour;
   const double cell = size * 0.5, pen = size * 0.16;
-  uint64_t h = hash64(seed);
+  uint64_t h = hash64(ink.seed);
   int left_in_word = 2 + static_cast<int>(h % 7);
   for (int i = 0; x + cell < x_end; ++i, x += cell * 1.25) {
-    h = hash64(seed, static_cast<uint64_t>(i) + 1);
+    h = hash64(ink.seed, static_cast<uint64_t>(i) + 1);
     if (left_in_word-- == 0) {
       left_in_word = 1 + static_cast<int>(h % 9);
       continue;
@@ -142,13 +143,13 @@ void Canvas::text(double x, double y, double x_end, double size, Colour c, uint6
   }
 }
 
-void Canvas::paragraph(double x0, double y0, double x1, double y1, double size, Colour c, uint64_t seed) {
+void Canvas::paragraph(double x0, double y0, double x1, double y1, double size, const Ink& ink) {
   uint64_t i = 0;
   for (double y = y0; y + size < y1; y += size * 1.7, ++i) {
-    const uint64_t h = hash64(seed, i);
+    const uint64_t h = hash64(ink.seed, i);
     if (h % 11 == 0) continue;  // between paragraphs
     const double end = h % 5 == 0 ? x0 + (x1 - x0) * (0.3 + 0.5 * unit_float(h)) : x1;
-    text(x0, y, end, size, c, h);
+    text(x0, y, end, size, {h, ink.colour});
   }
 }
 

@@ -13,6 +13,12 @@ struct Colour {
   float r = 128, g = 128, b = 128;  // display values, 0 ... 255
 };
 
+// What a stain or text is painted with; the seed tells its shape.
+struct Ink {
+  uint64_t seed = 0;
+  Colour colour;
+};
+
 // What procedural textures are painted on: floats, later packed into a Texture. Coordinates of the drawing functions
 // are metres of the painted surface, x right, y down, so that a drawing looks alike at any resolution.
 class Canvas {
@@ -27,12 +33,12 @@ class Canvas {
   void triangle(const std::array<double, 6>& xy, Colour c);
   // Multiplies brightness by 1 + strength * noise; `size_x`, `size_y` [m] are the largest features.
   void grain(double size_x, double size_y, float strength, int octaves, uint64_t seed);
-  // Adds a noise that mixes in `c`.
-  void stain(double size, Colour c, float amount, uint64_t seed);
+  // Adds a noise that mixes in the ink.
+  void stain(double size, const Ink& ink, float amount);
   // A line of letter-like shapes of height `size` from (x, y), ending before `x_end`.
-  void text(double x, double y, double x_end, double size, Colour c, uint64_t seed);
+  void text(double x, double y, double x_end, double size, const Ink& ink);
   // Lines of text filling a box.
-  void paragraph(double x0, double y0, double x1, double y1, double size, Colour c, uint64_t seed);
+  void paragraph(double x0, double y0, double x1, double y1, double size, const Ink& ink);
 
   int width() const { return width_; }
   int height() const { return height_; }

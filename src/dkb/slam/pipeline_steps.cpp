@@ -332,7 +332,13 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
   const KeyframeId id = next_keyframe_++;
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);
-  if (since_keyframe_) packet.motion = std::make_shared<const KeyframeMotion>(*since_keyframe_);
+  if (since_keyframe_) {
+    packet.motion = std::make_shared<const KeyframeMotion>(*since_keyframe_);
+  } else if (tracked.starts_map && tracked.predicted && packet.reference != kNoKeyframe) {
+    // No image tells how the map hangs on the one before it: the prediction does, as well as it knows.
+    const MotionPrior since{packet.cam_from_reference.inverse(), false, tracked.covariance};
+    packet.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{packet.reference, since});
+  }
   if (options_.mapping.planes && !tracked.starts_map) packet.planes = find_planes(scene);
   since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
