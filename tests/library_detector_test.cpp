@@ -113,6 +113,21 @@ TEST_F(LibraryDetectors, ASlowOnesMasksCountAsWellAsItsBoxes) {
   }
 }
 
+TEST_F(LibraryDetectors, WhereASlowOneFailsMotionGoesOn) {
+  int asked = 0;
+  const auto failing = std::make_shared<FunctionDetector>([&asked](const DetectorInput&) -> Detections {
+    if (++asked > 3) throw std::runtime_error("no memory left");
+    return {};
+  });
+  Slam slam = slam_with(slow(failing, {.every = 1, .latency = 1}));
+  int masked = 0;
+  for (const Frame& frame : people) masked += !slam.process(frame).mask.empty();
+  slam.finish();
+  EXPECT_GT(masked, 10);
+  EXPECT_EQ(leaked_points(slam), 0);
+  ASSERT_EQ(warnings_of(slam).size(), 1U);
+}
+
 TEST_F(LibraryDetectors, WhatALateAnswerShowsIsRetracted) {
   for (const Gives gives : kGives) {
     // Somebody is in view for up to ten frames, and in keyframes, before the first answer that shows them.

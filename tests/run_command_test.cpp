@@ -45,6 +45,8 @@ TEST(RunCommand, EverySecondOrThirdFrameIsEnough) {
     const SlamRun run(folder.path(), folder / "out");
     ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
     EXPECT_EQ(run.stats["tracked"], (rows.size() + step - 1) / step) << step;
+    EXPECT_NE(read_file(run.out / "report.html").find("At " + std::to_string(30 / step) + " frames a second"),
+              std::string::npos);
     EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.005 * static_cast<double>(step)) << step;
   }
 }
@@ -167,8 +169,8 @@ TEST(RunCommand, WhatSwitchesTheFilterOffWinsOverADetectorWithoutAnError) {
   const TempFolder temp;
   write_text(temp / "boxes.txt", "1 person 10 10 50 50\n");  // of another recording
   for (const char* off : {"--disable=dr", "--filter=none", "--preset=orb"}) {
-    const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "file",
-                                      "--boxes", (temp / "boxes.txt").string(), "--quiet", off});
+    const Finished run = run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector",
+                                      "file", "--boxes", (temp / "boxes.txt").string(), "--quiet", off});
     EXPECT_EQ(run.exit_code, 0) << off;
     EXPECT_EQ(run.err, "") << off;
   }

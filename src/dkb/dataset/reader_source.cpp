@@ -1,16 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/reader_source.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "dkb/util/stamps.h"
 
 namespace dkb {
+namespace {
+
+constexpr double kOtherRate = 1.4;  // less is taken for gaps among the first images
+
+}  // namespace
 
 void ReaderSource::start(PairStream pairs, const Camera& camera, bool threaded) {
   camera_ = camera;
   reader_ = std::make_unique<RgbdReader>(std::move(pairs), RgbdReaderOptions{.threaded = threaded});
-  if (camera_.fps == 0) camera_.fps = frame_rate_of(reader_->first_stamps());
+  // A recording may hold every third image of a camera that is known to give 30 a second.
+  const double told = frame_rate_of(reader_->first_stamps());
+  if (camera_.fps == 0 || std::max(told, camera_.fps) > kOtherRate * std::min(told, camera_.fps)) camera_.fps = told;
 }
 
 SourceFrame ReaderSource::next() {

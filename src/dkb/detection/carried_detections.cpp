@@ -98,7 +98,7 @@ void move_mask(const GreyImage& mask, const Box& from, const AxisMotion& x_motio
 }  // namespace
 
 Detections carry(const Detections& from, std::span<const PointMotion> motions, int frames, int width, int height,
-                 const CarryOptions& options) {
+                 const CarryOptions& options, std::vector<size_t>* kept) {
   if (frames <= 0) return from;
   const std::vector<Points> points = points_of(from.boxes, motions, options.min_points);
   const auto steps = static_cast<float>(frames);
@@ -131,7 +131,10 @@ Detections carry(const Detections& from, std::span<const PointMotion> motions, i
     const float right = x_motion.at(d.box.x + d.box.w, x_motion.high) + growth;
     const float bottom = y_motion.at(d.box.y + d.box.h, y_motion.high) + growth;
     const Box box = clip({left, top, right - left, bottom - top}, width, height);
-    if (box.w > 0 && box.h > 0) to.boxes.push_back({d.class_name, box, d.score});
+    if (box.w > 0 && box.h > 0) {
+      to.boxes.push_back({d.class_name, box, d.score});
+      if (kept != nullptr) kept->push_back(i);
+    }
     if (!to.mask.empty()) move_mask(from.mask, d.box, x_motion, y_motion, &to.mask);
   }
   return to;

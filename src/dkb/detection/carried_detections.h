@@ -23,8 +23,9 @@ struct CarryOptions {
 // it, scaled by the median change of the distances to the points' centre, grown by the uncertainty, and clipped to the
 // image (width x height [px]). Boxes that left the image are dropped. Where boxes overlap, a point counts for the
 // smallest box that holds it, and for the others only when these have too few of their own. The mask, if any, moves
-// with its boxes; what lies in no box stays. Pure and deterministic; classes and scores are kept.
+// with its boxes; what lies in no box stays. `kept`, if any, gets the number in `from` of each box that is left. Pure
+// and deterministic; classes and scores are kept.
 Detections carry(const Detections& from, std::span<const PointMotion> motions, int frames, int width, int height,
-                 const CarryOptions& options = {});
+                 const CarryOptions& options = {}, std::vector<size_t>* kept = nullptr);
 
 }  // namespace dkb

@@ -67,21 +67,17 @@ std::vector<Detection> CarriedObjects::boxes() const {
   return boxes;
 }
 
-// carry() may drop boxes that left the image, so each goes alone and keeps its count of misses.
 void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid) {
   if (carried_.empty()) mask_ = {};  // what it showed has left the image
   if (past.empty() || carried_.empty()) return;
-  const auto moved_points = motions(past.back(), pyramid, boxes());
-  const auto carried = [&](const Detections& d) {
-    return carry(d, moved_points, 1, camera_.width, camera_.height, options_.carry);
-  };
-  if (!mask_.empty()) mask_ = carried({boxes(), mask_}).mask;
+  const Detections here{boxes(), std::move(mask_)};
+  std::vector<size_t> kept;
+  Detections there =
+      carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, options_.carry, &kept);
   std::vector<Carried> moved;
-  for (const Carried& c : carried_) {
-    const Detections there = carried({{c.detection}, {}});
-    if (!there.boxes.empty()) moved.push_back({there.boxes.front(), c.missed});
-  }
+  for (size_t i = 0; i < kept.size(); ++i) moved.push_back({there.boxes[i], carried_[kept[i]].missed});
   carried_ = std::move(moved);
+  mask_ = std::move(there.mask);
 }
 
 MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {

@@ -114,6 +114,39 @@ TEST_F(CarriedObjectsTest, BoxesFollowFromFrameToFrame) {
   expect_near(carried.boxes()[0].box, person(7), 9);
 }
 
+TEST_F(CarriedObjectsTest, WhoWalksBeforeSomebodyWhoStandsDoesNotTakeTheOthersBoxAlong) {
+  // Only what is inside the walking one's box moves.
+  const auto only_the_person_moves = [&](FrameIndex f) {
+    PastFrame made = frame(f);
+    auto image = std::make_shared<RgbdImage>(*made.image);
+    image->grey = world.render();
+    const GreyImage moved = world.render({1, 0, -static_cast<double>(kStep * f), 0}), mask = mask_of(f);
+    for (size_t i = 0; i < mask.size(); ++i)
+      if (mask.data()[i] != 0) image->grey.data()[i] = moved.data()[i];
+    auto pyramid = std::make_shared<ImagePyramid>(options.flow.pyramid());
+    pyramid->build(image->grey);
+    std::vector<PixelCorner> corners;
+    FastCornerFinder().find(image->grey, 30, 20, corners);
+    made.corners.clear();
+    for (const PixelCorner& c : corners) made.corners.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y));
+    made.pyramid = std::move(pyramid);
+    made.image = std::move(image);
+    return made;
+  };
+  const Box stands{30, 20, 240, 200};
+  past.push_back(only_the_person_moves(0));
+  carried.receive(0, {{{"person", stands, 1}, {"person", person(0), 1}}, {}}, past);
+  constexpr FrameIndex kFrames = 8;
+  for (FrameIndex f = 1; f <= kFrames; ++f) {
+    const PastFrame next = only_the_person_moves(f);
+    carried.follow(past, *next.pyramid);
+    past.push_back(next);
+  }
+  ASSERT_EQ(carried.boxes().size(), 2U);
+  expect_near(carried.boxes()[0].box, stands, kFrames + 3);               // grown by a pixel a frame
+  expect_near(carried.boxes()[1].box, person(kFrames), 2 * kFrames + 3);  // what stands at its border holds it back
+}
+
 TEST_F(CarriedObjectsTest, MasksAreCarriedWithTheirBoxes) {
   see(4);
   receive(1, {{{"person", person(1), 1}}, mask_of(1)});

@@ -21,6 +21,7 @@ constexpr size_t kViewsPerFrame = 4;   // of them compared with each frame, in t
 constexpr double kViewInterval = 0.2;  // [s] between views when they are taken; with age they thin out
 constexpr double kViewAge = 15;        // [s] older views are dropped, so that a parked chair becomes part of the room
 constexpr float kSlope = 1;            // share of a view's depth range over 3 x 3 cells added to the tolerance
+constexpr double kLongAgo = 0.5;       // [s] after which the frame before no longer tells where who walked is now
 constexpr double kSettle = 0.5;        // [s] agreement with a view counts in proportion to its age up to this
 constexpr double kHoleMemory = 1;      // [s] the memory of what is too near for the sensor
 
@@ -130,6 +131,10 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->time = image.depth_timestamp;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
+  if (previous_ && current_->time - previous_->time > kLongAgo) {
+    keep_as_view(*previous_);
+    spare_.push_back(std::move(previous_));
+  }
   find_pose(step_covariance);
   choose_views();
   // Some cells through all steps before the next: what they read and write stays in the nearest cache.

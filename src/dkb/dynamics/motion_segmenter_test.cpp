@@ -153,6 +153,19 @@ TEST(MotionSegmenter, FindsABoxThatComesInAndNothingElse) {
       });
 }
 
+TEST(MotionSegmenter, DoesNotTakeTheRoomForWhoLeftDuringAGap) {
+  World world;
+  MotionSegmenter segmenter(world.camera, {}, {});
+  const auto see = [&](int frame, const std::vector<Panel>& movers) {
+    const Picture p = world.render(frame, movers);
+    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(frame), kStepCovariance);
+    segmenter.commit(world.cam_from_world(frame));
+    return judge(mask, p.truth);
+  };
+  for (int f = 0; f < 30; ++f) see(f, {box_at(-0.6 + 0.02 * f, 2.6)});
+  EXPECT_LT(see(90, {}).wrong, 0.05) << "two seconds later he is gone";
+}
+
 TEST(MotionSegmenter, KeepsABoxMarkedThatStops) {
   run(
       World(), 120, [](int f) { return std::vector{box_at(std::min(0.1, -1.4 + 0.05 * f))}; },

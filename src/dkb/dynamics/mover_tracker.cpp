@@ -72,14 +72,17 @@ void MoverSighting::move_to(const Rigid3& world_from_cam_found) {
 
 MoverSighting MoverTracker::look(double timestamp, const DepthImage& depth, const MoverMask& mask,
                                  std::span<const Detection> boxes, const Rigid3& world_from_cam_expected) {
-  predict(std::max(0.0, timestamp - time_));
+  const double interval = std::max(0.0, timestamp - time_);
+  predict(interval);
   time_ = timestamp;
-  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : kDoubtMemory); });
+  // What the frame before saw has not been missed yet, however long ago that was.
+  const auto at_least = [&](double memory) { return std::max(memory, 1.5 * interval); };
+  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : at_least(kDoubtMemory)); });
   MoverSighting sighting;
   // Tracks whose place is known well enough to tell whose surface is whose.
   std::vector<ExpectedMover> expected;
   for (size_t i = 0; i < tracks_.size(); ++i) {
-    if (time_ - tracks_[i].seen > kClaims) continue;
+    if (time_ - tracks_[i].seen > at_least(kClaims)) continue;
     expected.push_back({tracks_[i].state.head<3>(), tracks_[i].covariance.topLeftCorner<3, 3>()});
     sighting.tracks.push_back(i);
   }

@@ -45,6 +45,14 @@ TEST(MoverTracker, TheThirdObservationGivesAnId) {
   EXPECT_NEAR(movers[0].position_in_world.z(), 2, 1e-6);
 }
 
+TEST(MoverTracker, FewImagesASecondAreEnough) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  for (int i = 0; i < 6; ++i) movers = show(&tracker, 0.25 * i, one_person(0, 2));
+  ASSERT_EQ(movers.size(), 1u);
+  EXPECT_EQ(movers[0].id, 1);
+}
+
 TEST(MoverTracker, VelocityIsThatOfTheMover) {
   MoverTracker tracker(MoverTestScene().camera, {});
   std::vector<Mover> movers;

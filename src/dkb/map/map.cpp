@@ -312,12 +312,14 @@ KeyframeId Map::moved_on_from(KeyframeId id) const {
 
 // What told of the way to this keyframe and from it tells of the way past it.
 void Map::hand_on_motion(KeyframeId id) {
-  const KeyframeId next = moved_on_from(id);
-  if (next == kNoKeyframe) return;
-  const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion, after = keyframe(next)->motion;
-  edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
-                                   KeyframeMotion{before->previous, joined(before->since, after->since)})
-                             : nullptr;
+  const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
+  for (KeyframeId next = id + 1; next < keyframe_count(); ++next) {
+    const std::shared_ptr<const KeyframeMotion> after = keyframe(next)->motion;
+    if (keyframe(next)->culled || !after || after->previous != id) continue;
+    edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
+                                     KeyframeMotion{before->previous, joined(before->since, after->since)})
+                               : nullptr;
+  }
 }
 
 PlaneId Map::plane(PlaneId id) const {

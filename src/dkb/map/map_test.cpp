@@ -262,6 +262,18 @@ TEST(Map, TheMotionOfACulledKeyframeJoinsThatOfTheNext) {
   EXPECT_FALSE(map.keyframe(1)->motion);
 }
 
+TEST(Map, AMotionPastOtherKeyframesOutlivesTheOneItBeganAt) {
+  Map map;
+  map.add_keyframe(keyframe_at(0, 0));
+  map.add_keyframe(moved(1, 0));
+  map.add_keyframe(keyframe_at(2, 2));
+  map.add_keyframe(moved(3, 1));
+  map.cull_keyframe(1);
+  ASSERT_TRUE(map.keyframe(3)->motion);
+  EXPECT_EQ(map.keyframe(3)->motion->previous, 0);
+  EXPECT_TRUE(map.keyframe(3)->motion->since.previous_from_current.translation.isApprox(Eigen::Vector3d(-2, 0, 0)));
+}
+
 TEST(Map, AGapInTheMotionStaysAGapWhenAKeyframeBesideItIsCulled) {
   Map map;
   map.add_keyframe(keyframe_at(0, 0));

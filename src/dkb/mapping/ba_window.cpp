@@ -2,6 +2,7 @@
 #include "dkb/mapping/ba_window.h"
 
 #include "dkb/mapping/planes.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 
@@ -23,7 +24,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
     const int previous = motion ? camera_of[static_cast<size_t>(motion->previous)] : -1;
     if (previous >= 0 && !(problem.fixed[c] && problem.fixed[static_cast<size_t>(previous)]))
       problem.motions.push_back(
-          {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), true});
+          {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), kChi2SixDof99});
   }
 
   add_planes(map, window.keyframes, problem);

@@ -63,7 +63,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics&
   for (KeyframeId k : keyframes) {
     const auto& motion = map.keyframe(k)->motion;
     for (const KeyframeId other : {motion ? motion->previous : kNoKeyframe, map.moved_on_from(k)})
-      if (other != kNoKeyframe && !std::binary_search(keyframes.begin(), keyframes.end(), other) &&
+      if (map.live_keyframe(other) != nullptr && !std::binary_search(keyframes.begin(), keyframes.end(), other) &&
           std::none_of(around.begin(), around.end(), [other](const Covisible& c) { return c.keyframe == other; }))
         around.push_back({other, 0});
   }

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "dkb/matching/candidates.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 namespace {
@@ -203,7 +204,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     const Rigid3 cam_from_world = map_.keyframe(keyframe)->cam_from_world;
     const Eigen::Vector3d in_cam = cam_from_world * p->position;
     if ((optics_.camera.project(in_cam) - kp.pixel.cast<double>()).squaredNorm() >
-        5.991 * tolerance * tolerance * optics_.corner_variance(kp))
+        kChi2TwoDof95 * tolerance * tolerance * optics_.corner_variance(kp))
       continue;
     if (!may_show(kp, in_cam.z(), optics_.noise, tolerance)) continue;
     const PointId there = map_.keyframe(keyframe)->points[static_cast<size_t>(m.feature)];

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <optional>
 
+#include "dkb/util/chi_square.h"
+
 namespace dkb {
 namespace {
 
-constexpr int kMaxDistance = 50;        // [bits] largest Hamming distance of an epipolar match
-constexpr double kChi2Epipolar = 3.84;  // squared distance to the epipolar line over sigma^2 (1 d.o.f., 95 %)
-constexpr double kChi2Pixel = 5.991;    // squared reprojection error over sigma^2 (2 d.o.f., 95 %)
+constexpr int kMaxDistance = 50;  // [bits] largest Hamming distance of an epipolar match
 
 // Point nearest to two rays, from the least squares of both; nothing when they are parallel or it lies behind.
 std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a,
@@ -77,7 +77,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
     if (b_from_a.translation.norm() < 0.02) continue;  // [m] nothing can be triangulated over so short a base
     const Eigen::Matrix3d rotation_b_from_a = b_from_a.matrix3();
     const Eigen::Matrix3d essential = skew(b_from_a.translation) * rotation_b_from_a;
-    const std::vector<FreeFeature> free_b = free_features(b, kChi2Epipolar, optics);
+    const std::vector<FreeFeature> free_b = free_features(b, kChi2OneDof95, optics);
     struct Found {
       int feature_a, feature_b, distance;
       Eigen::Vector3d point;
@@ -104,7 +104,7 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
       const auto fits = [&](const Rigid3& cam_from_world, const Keypoint& k) {
         const Eigen::Vector3d in_cam = cam_from_world * *point;
         if (in_cam.z() < 0.1) return false;
-        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2Pixel * optics.corner_variance(k))
+        if ((camera.project(in_cam) - k.pixel.cast<double>()).squaredNorm() > kChi2TwoDof95 * optics.corner_variance(k))
           return false;
         return may_show(k, in_cam.z(), optics.noise);
       };

@@ -48,6 +48,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
   const Eigen::Vector3f centre = centre_in_world(cam_from_world).cast<float>();
   const float fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
   const float cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  const bool distorted = camera.distorted();
   const float width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
   std::array<float, 32> scales{};
   for (int l = 0; l < 32; ++l) scales[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l));
@@ -64,7 +65,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (p.z() < 0.05f) continue;
     const float inv_z = 1.0f / p.z();
     const float u = fx * p.x() * inv_z + cx, v = fy * p.y() * inv_z + cy;
-    if (!(u >= 0 && v >= 0 && u < width && v < height)) continue;
+    if (distorted ? !shows(camera, p.cast<double>()) : !(u >= 0 && v >= 0 && u < width && v < height)) continue;
     const Eigen::Vector3f ray = centre - world;
     const float distance = ray.norm();
     const float scale = c.reference_scale * c.reference_distance / distance;

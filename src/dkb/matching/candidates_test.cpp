@@ -70,6 +70,20 @@ TEST_F(CandidateMatching, FindsTheNearestDescriptorWithinTheRadius) {
   EXPECT_EQ(m[0].distance, 20);
 }
 
+TEST_F(CandidateMatching, InViewIsWhatTheImageAsReadShows) {
+  // A barrel-shaped image shows at its left border what an ideal one would show 30 px outside.
+  camera.k1 = -0.2;
+  const Eigen::Vector2d ideal = camera.undistort({5, 240});
+  ASSERT_LT(ideal.x(), -20);
+  add_feature(static_cast<float>(ideal.x()), 240, {});
+  features.keypoints[0].image_pixel = {5, 240};
+  EXPECT_EQ(match({at(ideal.x(), 240)}).size(), 1U);
+  const Eigen::Vector2d outside = camera.undistort({-5, 240});
+  std::vector<uint8_t> visible{0};
+  match({at(outside.x(), 240)}, nullptr, &visible);
+  EXPECT_EQ(visible[0], 0);
+}
+
 TEST_F(CandidateMatching, ProjectsWithThePose) {
   // The camera stands 0.1 m to the right: at 2 m everything moves 25 px to the left.
   cam_from_world.translation = {-0.1, 0, 0};

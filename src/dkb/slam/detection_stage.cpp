@@ -90,6 +90,7 @@ std::vector<DueDetections> DetectionStage::take_due(FrameIndex index) {
   while (auto answer = take(index)) {
     answered_ = true;
     if (!answer->warning.empty()) warnings_.push_back(std::move(answer->warning));
+    failed_ = answer->failed;
     if (!answer->failed) {
       times_.add("detection", answer->ms);
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;

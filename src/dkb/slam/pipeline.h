@@ -57,7 +57,8 @@ class Pipeline {
   void localize_only(bool on) { localize_only_ = on; }
   void suggest_pose(const PosePrediction& pose) {
     tracker_.suggest(pose);
-    odometry_.lost();  // how the camera came there is not known
+    if (outcome_) outcome_->cam_from_world.reset();  // nor where the frame before was
+    odometry_.lost();                                // how the camera came there is not known
   }
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
   const TrackingMap& map() const { return tracker_.map(); }

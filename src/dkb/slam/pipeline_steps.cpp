@@ -242,7 +242,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   std::sort(matched.begin(), matched.end());
   const DepthImage& depth = scene.extracted.image().depth;
   for (const PointInView& point : tracker_.points_in_view()) {
-    const Eigen::Vector2f at = undistort_.image_pixel(point.pixel);
+    const Eigen::Vector2f at = point.image_pixel.cast<float>();
     if (!scene.mask.at(at.x(), at.y())) continue;
     const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;

@@ -133,6 +133,8 @@ void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDete
   for (auto* task : {&segmenting_, &carrying_})
     if (*task) (*task)->drop();
   if (before) learn(*before);
+  // Motion, which only supported the detector, is all that is left without it.
+  if (slow_stage_ && slow_stage_->failed() && !rival_) segments_motion_ = true;
   if (segmenting_) {
     const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
     segmentation_task_ = {frame, expected.cam_from_world, covariance};
@@ -191,6 +193,8 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   scene.boxes = objects_.boxes();
   std::vector<Detection> unmasked;
   MoverMask given = ask_prompt_detectors(scene.extracted.frame, scene.boxes, unmasked);
+  MoverMask bodies = given;
+  unite(bodies, {1, objects_.mask()}, camera_.width, camera_.height);
   unite(given, carried.mask, camera_.width, camera_.height);
   times_.add("flow", watch.ms());
   const MoverMask moving = take_motion(scene.boxes);
@@ -209,6 +213,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
     const Silhouettes prompt = silhouettes_of(image, unmasked);
     unite(boxed.mask, prompt.mask, camera_.width, camera_.height);
     unite(boxed.body, prompt.body, camera_.width, camera_.height);
+    if (motion_) motion_->take_bodies(bodies);
     if (motion_ && !boxed.mask.empty()) {
       boxed = without_still(std::move(boxed), motion_->still());
       motion_->take_bodies(boxed.body);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
@@ -41,8 +42,8 @@ struct Best {
 // Squared errors of the observations, and where they stop being inliers.
 class Errors {
  public:
-  Errors(const CameraModel& camera, std::span<const PoseObservation> observations, double chi2)
-      : camera_(camera), observations_(observations), chi2_(chi2) {}
+  Errors(const CameraModel& camera, std::span<const PoseObservation> observations)
+      : camera_(camera), observations_(observations) {}
 
   // True where it is better than the best so far, which it then is.
   bool offer(const Rigid3& pose, Best& best) const {
@@ -65,18 +66,15 @@ class Errors {
 
  private:
   double of_limit(const Rigid3& pose, const PoseObservation& o) const {
-    const PoseOptions defaults;
     const Eigen::Vector3d point = pose * o.point_in_world;
-    if (!(point.z() > defaults.depth_in_front)) return std::numeric_limits<double>::infinity();
+    if (!(point.z() > PoseOptions().depth_in_front)) return std::numeric_limits<double>::infinity();
     const double pixel = ((camera_.project(point) - o.pixel) / o.pixel_sigma).squaredNorm();
     const double depth = o.depth > 0 ? (point.z() - o.depth) / o.depth_sigma : 0.0;
-    const double limit = o.depth > 0 ? chi2_ * defaults.chi2_depth / defaults.chi2_pixel : chi2_;
-    return (pixel + depth * depth) / limit;
+    return (pixel + depth * depth) / (o.depth > 0 ? kChi2ThreeDof95 : kChi2TwoDof95);
   }
 
   const CameraModel& camera_;
   const std::span<const PoseObservation> observations_;
-  const double chi2_;
 };
 
 std::vector<PoseObservation> only(std::span<const PoseObservation> all, const std::vector<uint8_t>& marked) {
@@ -93,7 +91,6 @@ constexpr int kRefinements = 3;
 void RansacOptions::check() const {
   require_option(max_iterations >= 1, "max_iterations", max_iterations, ">= 1");
   require_option(confidence > 0 && confidence < 1, "confidence", confidence, "in (0, 1)");
-  require_option(chi2 > 0, "chi2", chi2, "> 0");
   require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
 }
 
@@ -105,7 +102,7 @@ RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const Pos
   result.inlier.assign(count, 0);
   if (count < static_cast<size_t>(options.min_inliers)) return result;
 
-  const Errors errors(camera, observations, options.chi2);
+  const Errors errors(camera, observations);
   Random random(options.seed);
   Best best;
   int needed = options.max_iterations;

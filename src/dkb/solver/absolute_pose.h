@@ -15,7 +15,6 @@ namespace dkb {
 struct RansacOptions {
   int max_iterations = 300;   // samples drawn at most, >= 1
   double confidence = 0.999;  // of having drawn one sample without outliers, (0, 1); ends early
-  double chi2 = 5.991;        // inlier limit of the squared error over sigma^2, > 0
   int min_inliers = 10;       // fewer: not ok, >= 3
   uint64_t seed = 1;
 
@@ -35,8 +34,8 @@ struct RansacPose {
 std::vector<Rigid3> solve_p3p(const Eigen::Vector3d (&points_in_world)[3], const Eigen::Vector3d (&rays)[3]);
 
 // cam_from_world from 2D-3D matches with outliers (relocalisation): RANSAC over P3P, then optimise_pose on the inliers
-// of the best sample, whose inliers are those returned. Depths of the observations take part in that refinement and,
-// within 7.815, in the choice of inliers. Deterministic for a seed.
+// of the best sample, whose inliers are those returned. Depths of the observations take part in that refinement and in
+// the choice of inliers. Deterministic for a seed.
 RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const PoseObservation> observations,
                                   const RansacOptions& options = {});
 

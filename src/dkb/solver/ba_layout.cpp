@@ -18,14 +18,14 @@ void require_index(int index, int count, const char* what) {
 
 }  // namespace
 
-BaLayout::BaLayout(const BaProblem& problem, double huber_chi2)
+BaLayout::BaLayout(const BaProblem& problem)
     : cameras(static_cast<int>(problem.cam_from_world.size())), points(static_cast<int>(problem.points.size())) {
   check(problem);
   for (int c = 0; c < cameras; ++c) {
     free_of_camera.push_back(problem.fixed[c] ? -1 : static_cast<int>(camera_of_free.size()));
     if (!problem.fixed[c]) camera_of_free.push_back(c);
   }
-  motions.emplace(problem.motions, free_of_camera, huber_chi2, "bundle adjustment");
+  motions.emplace(problem.motions, free_of_camera, "bundle adjustment");
   sort_observations(problem);
   number_pairs();
   find_blocks();

@@ -16,8 +16,8 @@ namespace dkb::solver {
 // entries of no weight that belong to an extra point and an extra pair. (point, free camera) pairs stand point by
 // point, cameras ascending.
 struct BaLayout {
-  // Throws InputError for indices that do not fit. `huber_chi2`: corner of the kernel of robust motions.
-  BaLayout(const BaProblem& problem, double huber_chi2);
+  // Throws InputError for indices that do not fit.
+  explicit BaLayout(const BaProblem& problem);
 
   int cameras, points;
   std::vector<int> free_of_camera;  // -1 = fixed

@@ -30,10 +30,7 @@ struct State {
 class BundleAdjuster {
  public:
   BundleAdjuster(BaProblem& problem, const BaOptions& options)
-      : problem_(problem),
-        options_(options),
-        layout_(problem, options.chi2_motion),
-        cholesky_(layout_.pattern, kernels_) {
+      : problem_(problem), options_(options), layout_(problem), cholesky_(layout_.pattern, kernels_) {
     const size_t entries = layout_.observation_of_entry.size();
     values_.assign(entries * kArrays, 0.0);
     for (size_t e = 0; e < entries; ++e) {
@@ -367,7 +364,6 @@ void BaOptions::check() const {
   for (const int iterations : rounds) require_option(iterations >= 1, "rounds", iterations, ">= 1");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
   require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
-  require_option(chi2_motion > 0, "chi2_motion", chi2_motion, "> 0");
   require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
   require_option(initial_damping > 0, "initial_damping", initial_damping, "> 0");
   require_option(relative_tolerance >= 0, "relative_tolerance", relative_tolerance, ">= 0");

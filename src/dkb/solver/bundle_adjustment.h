@@ -9,6 +9,7 @@
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/solver/pose_edges.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 
@@ -33,15 +34,14 @@ struct BaProblem {
 };
 
 struct BaOptions {
-  std::vector<int> rounds = {5, 10};  // Levenberg-Marquardt iterations of each round, >= 1; outliers are told apart
-                                      // after each round and left out of the next
-  bool prefilter = false;             // leave out observations beyond the limits before the first round (DKB 3.3)
-  double chi2_pixel = 5.991;          // outlier limit and Huber corner of the unweighted error without depth, > 0
-  double chi2_depth = 7.815;          // the same with depth, > 0
-  double chi2_motion = 16.81;         // the same of robust motions (6 d.o.f., 99 %), > 0
-  double depth_in_front = 0.01;       // [m] points nearer than this along the optical axis are outliers, > 0
-  double initial_damping = 1e-5;      // Marquardt's factor on the diagonal at the start, > 0
-  double relative_tolerance = 1e-5;   // a step that lowers the cost by less than this part ends the round, >= 0
+  std::vector<int> rounds = {5, 10};    // Levenberg-Marquardt iterations of each round, >= 1; outliers are told apart
+                                        // after each round and left out of the next
+  bool prefilter = false;               // leave out observations beyond the limits before the first round (DKB 3.3)
+  double chi2_pixel = kChi2TwoDof95;    // outlier limit and Huber corner of the unweighted error without depth, > 0
+  double chi2_depth = kChi2ThreeDof95;  // the same with depth, > 0
+  double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
+  double initial_damping = 1e-5;        // Marquardt's factor on the diagonal at the start, > 0
+  double relative_tolerance = 1e-5;     // a step that lowers the cost by less than this part ends the round, >= 0
 
   void check() const;  // throws InvalidOption
 };
@@ -54,8 +54,8 @@ struct BaResult {
   int outliers = 0;
   // Of the camera that was asked for, where the fixed cameras are known exactly: the inverse of the normal equations at
   // the end, times how much farther apart the parts of its image pull than they claim (Liang and Zeger, "Longitudinal
-  // data analysis using generalized linear models", 1986). Right perturbation of world_from_cam, [translation m, rotation
-  // rad]; null where the observations leave it open.
+  // data analysis using generalized linear models", 1986). Right perturbation of world_from_cam, [translation m,
+  // rotation rad]; null where the observations leave it open.
   std::optional<Matrix6d> covariance;
 };
 

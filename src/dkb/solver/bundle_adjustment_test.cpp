@@ -74,8 +74,8 @@ std::vector<PoseEdge> motions_of(const TestWorld& world, double sigma, bool robu
     weight << 1, 2, 0.5, 3, 1, 2;
     Matrix6d information = weight.asDiagonal();
     information(0, 4) = information(4, 0) = 0.6;
-    motions.push_back(
-        {c, c - 1, previous_from_this * rigid3_from_tangent(error), information / (sigma * sigma), robust});
+    motions.push_back({c, c - 1, previous_from_this * rigid3_from_tangent(error), information / (sigma * sigma),
+                       robust ? kChi2SixDof99 : PoseEdge().huber_chi2});
   }
   return motions;
 }
@@ -99,7 +99,7 @@ TEST(BundleAdjustment, MotionsAloneCarryCamerasThatShareNoPoint) {
   world.problem.motions = motions_of(world, 1e-6, true);
   std::erase_if(world.problem.motions, [](const PoseEdge& e) { return e.a % 5 == 0; });
   world.problem.motions.push_back(
-      {5, 4, world.cam_from_world[4] * world.cam_from_world[5].inverse(), 1e12 * Matrix6d::Identity(), true});
+      {5, 4, world.cam_from_world[4] * world.cam_from_world[5].inverse(), 1e12 * Matrix6d::Identity(), kChi2SixDof99});
   bundle_adjust(world.problem, to_convergence());
   const auto step = [](const std::vector<Rigid3>& poses, int c) { return poses[c] * poses[c - 1].inverse(); };
   for (int c = 3; c < 6; ++c)
@@ -112,7 +112,7 @@ TEST(BundleAdjustment, AMotionThatThePointsContradictIsLeftOutInTheEnd) {
   wrong.motions.push_back({8, 7,
                            rigid3_from_tangent((Vector6d() << 0.06, 0, 0, 0, 0, 0).finished()) *
                                (world.cam_from_world[7] * world.cam_from_world[8].inverse()),
-                           1e5 * Matrix6d::Identity(), true});
+                           1e5 * Matrix6d::Identity(), kChi2SixDof99});
   const auto pull = [&](std::vector<int> rounds) {
     BaProblem without = plain, with = wrong;
     BaOptions options;
@@ -300,7 +300,7 @@ TEST(BundleAdjustment, RefusesIndicesThatDoNotFit) {
   problem.fixed.pop_back();
   EXPECT_THROW(bundle_adjust(problem), InputError);
   problem = world.problem;
-  problem.motions.push_back({0, 2, {}, Matrix6d::Identity(), true});
+  problem.motions.push_back({0, 2, {}, Matrix6d::Identity(), kChi2SixDof99});
   EXPECT_THROW(bundle_adjust(problem), InputError);
   BaOptions options;
   options.rounds = {};

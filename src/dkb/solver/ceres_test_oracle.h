@@ -102,7 +102,7 @@ struct CeresBaOptions {
   bool robust = true;
   bool fixed_points = false;
   double student_variance = 0;  // above 0: CeresStudent's in the place of Huber's
-  double chi2_pixel = 5.991, chi2_depth = 7.815, chi2_motion = 16.81;
+  double chi2_pixel = kChi2TwoDof95, chi2_depth = kChi2ThreeDof95;
   ceres::LinearSolverType solver = ceres::DENSE_SCHUR;
 };
 
@@ -142,8 +142,8 @@ inline CeresBa ceres_bundle_adjust(BaProblem& problem, const CeresBaOptions& opt
   for (const PoseEdge& e : problem.motions) {
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<CeresMotion, 6, 6, 6>(new CeresMotion{e}),
-        e.robust && options.robust ? new ceres::HuberLoss(std::sqrt(options.chi2_motion)) : nullptr, poses[e.a].data(),
-        poses[e.b].data());
+        std::isfinite(e.huber_chi2) && options.robust ? new ceres::HuberLoss(std::sqrt(e.huber_chi2)) : nullptr,
+        poses[e.a].data(), poses[e.b].data());
     ordering->AddElementToGroup(poses[e.a].data(), 1);
     ordering->AddElementToGroup(poses[e.b].data(), 1);
   }

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string>
 
+#include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -71,13 +72,13 @@ struct PointResiduals {
 };
 
 std::vector<PointResiduals> inlying_residuals(const BaProblem& problem) {
-  constexpr double kDepthInFront = 0.01, kChi2 = 5.991;
+  constexpr double kDepthInFront = 0.01;
   std::vector<PointResiduals> residuals(problem.points.size());
   for (const BaObservation& o : problem.observations) {
     const Eigen::Vector3d point = problem.cam_from_world[o.camera] * problem.points[o.point];
     if (!(point.z() > kDepthInFront)) continue;
     const double chi2 = ((problem.camera.project(point) - Eigen::Vector2d(o.u, o.v)) * o.inv_sigma).squaredNorm();
-    if (!(chi2 <= kChi2)) continue;
+    if (!(chi2 <= kChi2TwoDof95)) continue;
     PointResiduals& r = residuals[o.point];
     r.pixel += chi2;
     r.pixels += 2;

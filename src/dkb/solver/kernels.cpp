@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/solver/kernels.h"
 
+#include "dkb/util/chi_square.h"
+
 // Groups of four are passed by value only between functions that are inlined into one another.
 #pragma GCC diagnostic ignored "-Wpsabi"
 

@@ -96,7 +96,6 @@ struct SolverKernels {
 };
 
 inline constexpr double kBehindCost = 1e4;
-inline constexpr double kChi2OneDof = 3.841;  // 95%, of a depth alone
 
 const SolverKernels& baseline_kernels();
 // The fastest that this processor runs.

@@ -54,7 +54,7 @@ DKB_KERNEL inline void weigh(const ObservationArrays& o, int i, const RobustLimi
   const Pack corner2 = select(r.inv_depth_sigma > zero, all(limits.chi2_depth), all(limits.chi2_pixel));
   // The kernels of a part bend before the common one does.
   const bool bends = any(s > corner2) || any(select(weight > one, s_pixel, zero) > all(limits.chi2_pixel)) ||
-                     any(select(weight < one, s_depth, zero) > all(kChi2OneDof));
+                     any(select(weight < one, s_depth, zero) > all(kChi2OneDof95));
   if (!limits.robust || !bends) {
     r.weight_pixel = weight;
     r.weight_depth = one;
@@ -65,7 +65,7 @@ DKB_KERNEL inline void weigh(const ObservationArrays& o, int i, const RobustLimi
     const Pack rho = huber(s, corner2, slope);
     // A kernel of its own with the whole weight where there is no depth: pixel corner, the same as the common one.
     const Pack rho_pixel = huber(s_pixel, all(limits.chi2_pixel), slope_pixel);
-    const Pack rho_depth = huber(s_depth, all(kChi2OneDof), slope_depth);
+    const Pack rho_depth = huber(s_depth, all(kChi2OneDof95), slope_depth);
     r.weight_pixel = common * slope + more_pixel * slope_pixel;
     r.weight_depth = common * slope + more_depth * slope_depth;
     r.cost = common * rho + more_pixel * rho_pixel + more_depth * rho_depth;

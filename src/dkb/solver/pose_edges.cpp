@@ -9,9 +9,9 @@
 
 namespace dkb::solver {
 
-PoseEdges::PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera, double huber_chi2,
+PoseEdges::PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera,
                      const std::string& problem)
-    : edges_(edges), huber_chi2_(huber_chi2) {
+    : edges_(edges) {
   const int n = static_cast<int>(free_of_camera.size());
   free_ =
       static_cast<size_t>(std::count_if(free_of_camera.begin(), free_of_camera.end(), [](int f) { return f >= 0; }));
@@ -50,7 +50,7 @@ void PoseEdges::judge(const std::vector<Rigid3>& poses) {
     const PoseEdge& e = edges_[k];
     const Vector6d error =
         relative_pose_error(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
-    placed_[k].outlier = e.robust && !(error.dot(e.information * error) <= huber_chi2_);
+    placed_[k].outlier = !(error.dot(e.information * error) <= e.huber_chi2);
   }
 }
 
@@ -62,8 +62,7 @@ double PoseEdges::cost(const std::vector<Rigid3>& poses) const {
     const Vector6d error =
         relative_pose_error(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
     const double s = error.dot(e.information * error);
-    const bool beyond = e.robust && s > huber_chi2_;
-    total += beyond ? 2 * std::sqrt(huber_chi2_ * s) - huber_chi2_ : s;
+    total += s > e.huber_chi2 ? 2 * std::sqrt(e.huber_chi2 * s) - e.huber_chi2 : s;
   }
   return total;
 }
@@ -71,8 +70,7 @@ double PoseEdges::cost(const std::vector<Rigid3>& poses) const {
 // The information of an edge as its kernel weighs it.
 Matrix6d PoseEdges::weighed(const PoseEdge& edge, const Vector6d& error) const {
   const double s = error.dot(edge.information * error);
-  const bool beyond = edge.robust && s > huber_chi2_;
-  return (beyond ? std::sqrt(huber_chi2_ / s) : 1.0) * edge.information;
+  return (s > edge.huber_chi2 ? std::sqrt(edge.huber_chi2 / s) : 1.0) * edge.information;
 }
 
 void PoseEdges::add(const std::vector<Rigid3>& poses, std::vector<double>& blocks,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,7 @@ struct PoseEdge {
   int a = 0, b = 0;  // indices of poses, a != b
   Rigid3 b_from_a;
   Matrix6d information = Matrix6d::Identity();
-  bool robust = false;  // Huber kernel on d^T information d
+  double huber_chi2 = std::numeric_limits<double>::infinity();  // corner of the Huber kernel on d^T information d
 };
 
 }  // namespace dkb
@@ -30,17 +31,16 @@ using PoseColumns = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 // equations by right perturbations of world_from_cam. Deterministic.
 class PoseEdges {
  public:
-  // `free_of_camera`: number of each pose among the free ones, -1 = fixed. `huber_chi2`: corner of the robust kernel.
-  // Throws InputError, beginning with `problem`, for edges that do not join two of the poses.
-  PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera, double huber_chi2,
-            const std::string& problem);
+  // `free_of_camera`: number of each pose among the free ones, -1 = fixed. Throws InputError, beginning with `problem`,
+  // for edges that do not join two of the poses.
+  PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera, const std::string& problem);
 
   // Per free pose, the free ones behind it that an edge joins it with; may repeat.
   std::vector<std::vector<int>> later_neighbours() const;
   // Where the blocks lie; the pattern must hold all of them.
   void find_blocks(const BlockPattern& pattern);
 
-  // Leaves out, until it is called again, the robust edges that these poses contradict beyond the kernel's corner.
+  // Leaves out, until it is called again, the edges that these poses contradict beyond the corner of their kernels.
   void judge(const std::vector<Rigid3>& cam_from_world);
   double cost(const std::vector<Rigid3>& cam_from_world) const;
   // Adds to the blocks of the pattern and to the gradient (6 numbers per free pose).
@@ -57,7 +57,6 @@ class PoseEdges {
   Matrix6d weighed(const PoseEdge& edge, const Vector6d& error) const;
 
   const std::vector<PoseEdge>& edges_;
-  double huber_chi2_;
   size_t free_ = 0;
   std::vector<Placed> placed_;
 };

@@ -80,7 +80,7 @@ class PoseGraphOptimiser {
       free_of_camera_[c] = static_cast<int>(camera_of_free_.size());
       camera_of_free_.push_back(c);
     }
-    edges_.emplace(graph_.edges, free_of_camera_, options_.huber_chi2, "pose graph");
+    edges_.emplace(graph_.edges, free_of_camera_, "pose graph");
     std::vector<std::vector<int>> rows = edges_->later_neighbours();
     for (size_t f = 0; f < rows.size(); ++f) rows[f].push_back(static_cast<int>(f));
     solver::BlockPattern pattern;
@@ -129,7 +129,6 @@ class PoseGraphOptimiser {
 
 void PoseGraphOptions::check() const {
   require_option(iterations >= 1, "iterations", iterations, ">= 1");
-  require_option(huber_chi2 > 0, "huber_chi2", huber_chi2, "> 0");
   require_option(initial_damping > 0, "initial_damping", initial_damping, "> 0");
   require_option(relative_tolerance >= 0, "relative_tolerance", relative_tolerance, ">= 0");
 }

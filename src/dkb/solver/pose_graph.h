@@ -17,7 +17,6 @@ struct PoseGraph {
 
 struct PoseGraphOptions {
   int iterations = 20;               // Levenberg-Marquardt steps, >= 1
-  double huber_chi2 = 16.81;         // corner of the kernel of robust edges (6 d.o.f., 99 %), > 0
   double initial_damping = 1e-6;     // Marquardt's factor on the diagonal at the start, > 0
   double relative_tolerance = 1e-6;  // a step that lowers the cost by less than this part is the last, >= 0
 

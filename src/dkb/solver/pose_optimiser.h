@@ -8,6 +8,7 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 
@@ -36,8 +37,8 @@ struct PoseOptions {
   int iterations = 10;                  // Levenberg-Marquardt steps of one round, >= 1
   int robust_rounds = 2;                // first rounds that use the Huber kernel, >= 0
   int tail_rounds = 3;                  // of weights by how well an observation fits, and a step, >= 0
-  double chi2_pixel = 5.991;            // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
-  double chi2_depth = 7.815;            // the same with depth (3 d.o.f.), > 0
+  double chi2_pixel = kChi2TwoDof95;    // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
+  double chi2_depth = kChi2ThreeDof95;  // the same with depth (3 d.o.f.), > 0
   double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
   double translation_tolerance = 1e-4;  // [m] a step below both tolerances ends a round, >= 0
   double rotation_tolerance = 1e-4;     // [rad] >= 0
@@ -61,7 +62,7 @@ struct PoseEstimate {
   Matrix6d covariance = Matrix6d::Zero();
   std::vector<uint8_t> inlier;  // per observation
   int inliers = 0;
-  int iterations = 0;    // over all rounds
+  int iterations = 0;  // over all rounds
 };
 
 // Pose that minimises sum rho(e^T Sigma^-1 e), e = [reprojection px, depth m], by Levenberg-Marquardt on 6 numbers;

@@ -49,8 +49,9 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
   // Of look-alike places the true one differs least from what is seen.
   const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.log_odds > b.log_odds; };
   std::stable_sort(proposals.begin(), proposals.end(), better);
-  if (!proposals.front().verified()) return std::nullopt;
-  PoseProposal& best = proposals.front();
+  const auto verified = std::find_if(proposals.begin(), proposals.end(), [](const auto& p) { return p.verified(); });
+  if (verified == proposals.end()) return std::nullopt;
+  PoseProposal& best = *verified;
   for (const PoseProposal& other : proposals)
     if (!same_place(other.fit.cam_from_world, best.fit.cam_from_world) && other.log_odds > best.log_odds - kClearLead)
       best.ambiguous = true;

@@ -7,6 +7,7 @@
 
 #include "dkb/geometry/decompositions.h"
 #include "dkb/matching/pose_observation.h"
+#include "dkb/util/chi_square.h"
 #include "dkb/util/radix_sort.h"
 
 namespace dkb {
@@ -153,7 +154,7 @@ double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, cons
     squares[i] = squared_error(pairs[i], pose.cam_from_world, features);
     of_inliers.push_back(squares[i]);
   }
-  if (of_inliers.empty()) return PoseOptions().chi2_pixel;
+  if (of_inliers.empty()) return kChi2TwoDof95;
   const double limit = kStudent90 * variance_by_median(of_inliers);
   for (size_t i = first; i < pairs.size(); ++i)
     if (squares[i] > limit) followed[static_cast<size_t>(pairs[i].feature)].reset();
@@ -382,6 +383,7 @@ bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& i
   if (last_->index + 1 == frame.index && track_from_last(frame, input)) return true;
   last_ = std::move(before_loss);
   state_ = before;
+  candidates_made_.reset();  // those around the place that was no place
   return false;
 }
 

@@ -32,8 +32,8 @@ struct TrackingOptions {
 // A map point where a pose puts it.
 struct PointInView {
   PointId id = kNoPoint;
-  Eigen::Vector2d pixel;  // [px] ideal
-  double depth = 0;       // [m]
+  Eigen::Vector2d image_pixel;  // [px] as read
+  double depth = 0;             // [m]
 };
 
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.

@@ -172,7 +172,7 @@ TEST_F(TrackerTest, TellsThePointsThatItsPosePutsInView) {
   std::vector<PointId> seen;
   for (const PointInView& p : tracker.points_in_view()) {
     const Eigen::Vector3d in_cam = on_path(2) * scene.points[static_cast<size_t>(scene_point(p.id))];
-    EXPECT_LT((scene.camera.project(in_cam) - p.pixel).norm(), 0.05);
+    EXPECT_LT((scene.camera.project(in_cam) - p.image_pixel).norm(), 0.05);
     EXPECT_NEAR(in_cam.z(), p.depth, 1e-3);
     seen.push_back(p.id);
   }

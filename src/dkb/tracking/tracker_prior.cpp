@@ -5,6 +5,7 @@
 
 #include "dkb/geometry/decompositions.h"
 #include "dkb/tracking/tracker.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 constexpr double kMaxGuessedPosition = 0.25;  // [m]
 constexpr double kMaxGuessedRotation = 0.25;  // [rad]
 
-constexpr double kChi2Pose = 16.81;  // of six degrees of freedom, 1 %
 // What a pose by the images may be off beside the prior: a relocaliser's, with the rolling shutter not yet modelled.
 constexpr double kFoundPositionSd = 0.02;  // [m]
 constexpr double kFoundRotationSd = 0.01;  // [rad]
@@ -66,7 +66,7 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
   Matrix6d sum = covariance;
   sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
   sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
-  return delta.dot(solve_symmetric(sum, delta)) <= kChi2Pose;
+  return delta.dot(solve_symmetric(sum, delta)) <= kChi2SixDof99;
 }
 
 // The frame has no pose by its images: the predicted one stands in where there is one, and the next frame goes on from

@@ -6,6 +6,7 @@
 #include "dkb/matching/pose_observation.h"
 #include "dkb/solver/second_motion.h"
 #include "dkb/tracking/tracker.h"
+#include "dkb/util/chi_square.h"
 
 namespace dkb {
 namespace {
@@ -171,8 +172,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   for (size_t f = 0; f < followed.size(); ++f) {
     if (!followed[f]) continue;
     const Pair pair = odometry_pair(static_cast<int>(f), *followed[f], by_still.cam_from_world);
-    if (followed[f]->moves ||
-        squared_error(pair, by_still.cam_from_world, *by_still.features) <= PoseOptions().chi2_pixel)
+    if (followed[f]->moves || squared_error(pair, by_still.cam_from_world, *by_still.features) <= kChi2TwoDof95)
       by_still.odometry[f] = followed[f];
   }
   frame = std::move(by_still);
