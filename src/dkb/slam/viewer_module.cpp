@@ -18,10 +18,11 @@ void* viewer_symbol(const char* name, const std::string& what) {
 std::unique_ptr<Viewer> open_viewer(const ViewerOptions& options) {
   const auto open =
       reinterpret_cast<OpenViewer>(viewer_symbol(kOpenViewerSymbol, options.port ? "viewer" : "recording"));
-  std::string reason;
-  std::unique_ptr<Viewer> viewer(open(options, &reason));
-  if (viewer == nullptr) throw InputError(reason);
-  return viewer;
+  ViewerRefusal refusal;
+  std::unique_ptr<Viewer> viewer(open(options, &refusal));
+  if (viewer != nullptr) return viewer;
+  if (refusal.output) throw OutputError(refusal.reason);
+  throw InputError(refusal.reason);
 }
 
 }  // namespace dkb

@@ -25,18 +25,22 @@ AccessRules rules_of(const std::string& host) {
 }  // namespace
 
 PageServer::PageServer(const std::string& host, int port, HttpService& service)
-    : host_(host), rules_(rules_of(host)), server_(host, port, rules_, service), thread_([this] {
-        set_thread_priority(ThreadPriority::background);
-        try {
-          server_.run();
-        } catch (const std::exception&) {
-          // Out of memory, most likely: the page ends, the run goes on.
-        }
-      }) {}
+    : host_(host), rules_(rules_of(host)), server_(host, port, rules_, service) {}
+
+void PageServer::start() {
+  thread_ = std::thread([this] {
+    set_thread_priority(ThreadPriority::background);
+    try {
+      server_.run();
+    } catch (const std::exception&) {
+      // Out of memory, most likely: the page ends, the run goes on.
+    }
+  });
+}
 
 PageServer::~PageServer() {
   server_.stop();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 std::string PageServer::url() const {

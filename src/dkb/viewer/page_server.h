@@ -11,9 +11,11 @@ namespace dkb {
 // An HttpServer on a thread of its own, of low priority, with the rules that follow from where it is bound to.
 class PageServer {
  public:
-  // `host`: anything but a loopback name asks every visitor for a token. Throws InputError.
+  // Binds; nobody is answered before start(). `host`: anything but a loopback name asks every visitor for a token.
+  // Throws InputError.
   PageServer(const std::string& host, int port, HttpService& service);
   ~PageServer();
+  void start();  // once
 
   std::string url() const;  // to open; holds the token where one is asked for
   void wake() { server_.wake(); }

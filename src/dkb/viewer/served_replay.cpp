@@ -12,7 +12,9 @@ namespace {
 class ServedReplay final : public Replay, private HttpService {
  public:
   explicit ServedReplay(const ReplayOptions& options)
-      : sessions_(options.files), server_(options.host, options.port, *this) {}
+      : sessions_(options.files), server_(options.host, options.port, *this) {
+    server_.start();
+  }
   std::string url() const override { return server_.url(); }
 
  private:

@@ -5,6 +5,8 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "dkb/slam/viewer_module.h"
+#include "dkb/util/errors.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/viewer/dense_messages.h"
 #include "dkb/viewer/page_files.h"
@@ -44,9 +46,12 @@ class Session::Stream final : public HttpStream {
 };
 
 Session::Session(const ViewerOptions& options) : realtime_(options.realtime), model_(options) {
-  if (!options.record.empty()) recorder_.emplace(model_, options.record, options.realtime);
   HttpService& service = *this;
+  // The port first: where it is taken, an earlier recording is not emptied. Visitors come last, since they call into
+  // the recorder.
   if (options.port) page_.emplace(options.host, *options.port, service);
+  if (!options.record.empty()) recorder_.emplace(model_, options.record, options.realtime);
+  if (page_) page_->start();
 }
 
 Session::~Session() {
@@ -204,12 +209,14 @@ void Session::tick(size_t streams) {
 
 }  // namespace dkb
 
-extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_3(const dkb::ViewerOptions& options,
-                                                                                 std::string* error) {
+extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_4(const dkb::ViewerOptions& options,
+                                                                                 dkb::ViewerRefusal* refusal) {
   try {
     return new dkb::Session(options);
+  } catch (const dkb::OutputError& e) {
+    *refusal = {e.what(), true};
   } catch (const std::exception& e) {
-    *error = e.what();
+    *refusal = {e.what(), false};
   }
   return nullptr;
 }
