@@ -75,7 +75,7 @@ struct DKB_SLAM_API Detectors {
 /// What the command line's detector options say; a file that is not named is not used.
 struct DetectorChoice {
   std::string kinds = "auto";      ///< auto, yolo (or network), motion, file, none, exec:COMMAND (last); joined by +
-  std::filesystem::path model;     ///< ONNX file of the yolo kind
+  std::filesystem::path model;     ///< ONNX file of the yolo kind; empty = that of $DKB_SLAM_MODEL
   std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
   std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds

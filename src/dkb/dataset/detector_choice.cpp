@@ -54,7 +54,6 @@ std::filesystem::path model_of(const DetectorChoice& choice) {
 }
 
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
-  choice.model = model_of(choice);
   if (options.dynamics.filter != FilterKind::none) return choice;
   const bool asked_for = ("," + disabled + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
   if (asked_for) choice.masks.clear();
@@ -66,15 +65,15 @@ DetectorChoice choice_beside(const Options& options, const std::string& disabled
 Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   Detectors made;
   const Inference inference = inference_named(choice.inference);
-  const std::vector<std::string> kinds = detector_kinds(choice.kinds, !choice.model.empty());
+  const std::filesystem::path model = model_of(choice);
+  const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model.empty());
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
   if (has("yolo")) {
-    if (choice.model.empty())
+    if (model.empty())
       throw InputError(
           "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
     auto detector = std::make_shared<OnnxDetector>(
-        OnnxOptions{.model = choice.model, .labels = choice.labels, .inference = inference}, camera.width,
-        camera.height);
+        OnnxOptions{.model = model, .labels = choice.labels, .inference = inference}, camera.width, camera.height);
     const int frames = detector->frames_per_detection(camera.fps > 0 ? camera.fps : 30);
     made.schedule.every = choice.every > 0 ? choice.every : frames;
     made.schedule.latency = choice.latency > 0 ? choice.latency : frames;
