@@ -6,12 +6,16 @@
 
 #include <cerrno>
 #include <cstring>
+#include <system_error>
 
 #include "dkb/util/errors.h"
 
 namespace dkb {
 
 OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(path, unknown))
+    throw InputError(path.string() + ": is a folder; a recording needs the name of a file");
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   temporary_ = folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()));
   fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -52,8 +56,12 @@ void OutputFile::cut(uint64_t size) {
   size_ = size;
 }
 
-void OutputFile::commit() {
+void OutputFile::sync() {
   if (::fsync(fd_) != 0 && errno != EINVAL && errno != EROFS) fail("fsync");
+}
+
+void OutputFile::commit() {
+  sync();
   if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail("rename");
   ::close(fd_);
   fd_ = -1;

@@ -14,6 +14,7 @@ namespace dkb {
 // A file that grows under a name of its own and takes its place when it is whole. Throws OutputError.
 class OutputFile {
  public:
+  // Throws InputError when a folder has this name.
   explicit OutputFile(const std::filesystem::path& path);
   ~OutputFile();  // without commit() nothing is left behind
   OutputFile(const OutputFile&) = delete;
@@ -23,6 +24,7 @@ class OutputFile {
   void overwrite(uint64_t at, std::string_view bytes);
   void cut(uint64_t size);  // leaves the first bytes
   uint64_t size() const { return size_; }
+  void sync();  // what was written is on the disk
   void commit();
 
  private:
@@ -45,10 +47,12 @@ void commit_whole_chunks(OutputFile& file, std::vector<Chunk>& chunks, uint64_t 
     file.cut(end);
     try {
       write_index();
-      return file.commit();
+      file.sync();
     } catch (const OutputError&) {  // the room that the last chunk takes is needed for the index
       end = chunks.back().at;
+      continue;
     }
+    return file.commit();  // fewer chunks would not help where this fails
   }
   throw OutputError("no message of the recording could be kept; make room on the disk");
 }

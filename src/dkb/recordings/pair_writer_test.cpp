@@ -10,6 +10,7 @@
 #include "dkb/recordings/recorded_source.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 #include "dkb/util/test_folder.h"
 
 namespace dkb::test {
@@ -111,6 +112,33 @@ TEST(PairWriter, TheLastChunkGivesItsRoomToTheIndex) {
     const int frames = frames_in(source);
     EXPECT_GE(frames, 3);
     EXPECT_LT(frames, 6);
+  }
+}
+
+TEST(PairWriter, ARecordingIsNotShortenedWhereOnlyItsNameCannotBeTaken) {
+  for (const char* name : {"a.bag", "a.mcap"}) {
+    SCOPED_TRACE(name);
+    const TempFolder temp;
+    {
+      const auto writer = write_pairs(temp / name, camera(), camera().to_yaml());
+      for (int n = 0; n < 6; ++n) add(*writer, n);
+      fs::create_directory(temp / name);  // somebody takes the name meanwhile
+      EXPECT_THROW(writer->close(), OutputError);
+      EXPECT_THROW(writer->salvage(), OutputError);
+      fs::remove(temp / name);
+      writer->salvage();
+    }
+    RecordedSource source(temp / name, SourceOptions{});
+    EXPECT_EQ(frames_in(source), 6);
+  }
+}
+
+TEST(PairWriter, AFolderInThePlaceOfARecordingIsFoundOutAtOnce) {
+  const TempFolder temp;
+  for (const char* name : {"a.bag", "a.mcap"}) {
+    fs::create_directory(temp / name);
+    EXPECT_NE(input_error_of([&] { write_pairs(temp / name, camera(), camera().to_yaml()); }).find("is a folder"),
+              std::string::npos);
   }
 }
 
