@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dkb/dataset/detector_choice.h"
+#include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
 #include "run_session.h"
 
@@ -33,6 +34,10 @@ void check_arguments(const RunArguments& args, const Options& options) {
     throw InputError("--preset " + args.preset + ": the settings say `preset: " + options.preset() +
                      "`; leave one of them out");
   check_detector(args.detection);
+  if (!args.prior_file.empty() && args.prior != "auto" && args.prior != "none")
+    throw InputError("--prior " + args.prior + ": --prior-file takes its place; leave one of them out");
+  if (args.cv_orb && is_live(args.source))
+    throw InputError("--cv-orb: reads the images again, which a camera does not give twice; leave it out");
   if (!args.viewer.on && args.viewer.exit) throw InputError("--viewer-exit: there is no page; add --viewer");
   if (!args.viewer.on && args.viewer.has_host) throw InputError("--viewer-host: there is no page; add --viewer");
 }

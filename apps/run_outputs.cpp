@@ -123,6 +123,9 @@ void write_outputs(const std::filesystem::path& folder, const Slam& slam, const 
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
   if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
+}
+
+void write_statistics(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
   write_file_atomically(folder / "stats.json", stats_json(statistics_with(slam, facts), facts));
 }
 

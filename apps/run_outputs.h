@@ -34,10 +34,13 @@ double seconds_since_process_start();
 // The system's statistics, with the stages that it does not have.
 Statistics statistics_with(const Slam& slam, const RunFacts& facts);
 
-// Writes every result of the contract into `folder`, each file atomically; `trajectories` are Slam's by map, which
-// takes a moment to smooth. Throws OutputError.
+// Writes every result of the contract but stats.json into `folder`, each file atomically; `trajectories` are Slam's by
+// map, which takes a moment to smooth. Throws OutputError.
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
                    const RunFacts& facts);
+
+// stats.json. Throws OutputError.
+void write_statistics(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
 
 // Removes what an earlier run left in `folder` and this one does not have: of the files that not every run writes,
 // those that are neither among `facts` nor in `written`.

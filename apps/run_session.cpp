@@ -237,20 +237,21 @@ int RunSession::run() {
   progress_.emplace(recording_->size(), args_.quiet);
   warn_of_source();
   const Stopwatch wall;
-  try {
-    track();
-  } catch (...) {
-    failure_ = std::current_exception();
-  }
-  try {
-    slam_->finish();
-  } catch (...) {
-    if (!failure_) failure_ = std::current_exception();
-  }
-  if (failure_ && slam_->statistics().tracked == 0) std::rethrow_exception(failure_);
+  const auto attempt = [&](const auto& step) {
+    try {
+      step();
+    } catch (...) {
+      if (!failure_) failure_ = std::current_exception();
+    }
+  };
+  attempt([&] { track(); });
+  // Asked once: Ctrl-C while the results of a whole run are written does not make it one that was cut short.
+  if (Interrupt::happened()) interrupted_ = fmt::format("interrupted after {} frames; ", facts_.offered);
+  attempt([&] { slam_->finish(); });
+  const double seconds = wall.ms() / 1000;
   progress_->finish();
   source_->stop();
-  write(wall.ms() / 1000);
+  if (!failure_ || slam_->statistics().tracked > 0) attempt([&] { write(seconds); });
   warn_of_unused();
   warnings_.finish();
   if (failure_) std::rethrow_exception(failure_);
@@ -306,10 +307,8 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
 }
 
 void RunSession::write(double seconds) {
-  if (Interrupt::happened()) {
-    interrupted_ = fmt::format("interrupted after {} frames; ", facts_.offered);
+  if (!interrupted_.empty())
     facts_.offered = std::max(facts_.offered, static_cast<int>(recording_->size().value_or(0)));
-  }
   if (paced_ || live_) {
     facts_.dropped = static_cast<int>(source_->counts().dropped);
     facts_.skipped += *facts_.dropped;
@@ -320,22 +319,29 @@ void RunSession::write(double seconds) {
   facts_.config_yaml = options_.to_yaml();
   if (reader_ != nullptr) facts_.times = reader_->times();
   std::set<std::string> written;  // of what not every run writes
-  if (args_.dense && !failure_) {
-    const Stopwatch building;
-    const DenseMap map = slam_->dense_map();
-    facts_.times.add("dense_build", building.ms());
-    const std::string line = write_dense_map(out_, map, building.ms() / 1000);
-    if (!args_.quiet) tell(stdout, "{}\n", line);
-    written.insert("dense.ply");
-    if (map.grid) written.insert({"occupancy.pgm", "occupancy.yaml"});
-  }
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
   write_outputs(out_, *slam_, trajectories, facts_);
+  std::exception_ptr no_dense_map;
+  if (args_.dense && !failure_) {
+    try {
+      write_dense(written);
+    } catch (...) {
+      no_dense_map = std::current_exception();
+      written.insert({"dense.ply", "occupancy.pgm", "occupancy.yaml"});  // the error says that earlier ones are kept
+    }
+  }
+  write_statistics(out_, *slam_, facts_);  // with the time that the dense map took
   const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
   report::Truth truth = report::evaluated_by_truth(args_.source, reported.trajectory);
   write_file_atomically(out_ / "report.html", report_html(*log_, reported, truth));
   if (args_.cv_orb && interrupted_.empty()) {
-    write_cv_orb(out_, cv_orb_of(args_, opened_, facts_.offered));
+    std::optional<double> ms;
+    try {
+      ms = cv_orb_of(args_, opened_, facts_.offered);
+    } catch (const std::exception& e) {  // the run itself went well
+      warnings_.warn("--cv-orb", std::string("--cv-orb: not measured: ") + e.what());
+    }
+    write_cv_orb(out_, ms);
     written.insert("cv_orb.json");
   }
   if (viewer_ && args_.viewer.record) written.insert("session.dkbs");
@@ -345,6 +351,17 @@ void RunSession::write(double seconds) {
   if (!truth.note.empty() && !reported.trajectory.empty())
     warnings_.warn("ground truth", truth.note + "; the run is not judged by it");
   if (truth.evaluation) ape_ = truth.evaluation->ape.translation;
+  if (no_dense_map) std::rethrow_exception(no_dense_map);
+}
+
+void RunSession::write_dense(std::set<std::string>& written) {
+  const Stopwatch building;
+  const DenseMap map = slam_->dense_map();
+  facts_.times.add("dense_build", building.ms());
+  const std::string line = write_dense_map(out_, map, building.ms() / 1000);
+  if (!args_.quiet) tell(stdout, "{}\n", line);
+  written.insert("dense.ply");
+  if (map.grid) written.insert({"occupancy.pgm", "occupancy.yaml"});
 }
 
 void RunSession::warn_of_viewer() {
@@ -365,10 +382,9 @@ int RunSession::tell_the_end() {
     tell(stdout, "{}\n", line);
   if (const SourceCounts lost = recording_->counts(); !live_ && !args_.quiet && lost.unpaired + lost.late > 0)
     tell(stdout, "{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
-  const bool cut_short = Interrupt::happened();
   if (viewer_) viewer_->serve_on(*slam_, args_.quiet);
   warn_of_viewer();
-  if (cut_short) return 130;
+  if (!interrupted_.empty()) return 130;
   if (s.tracked > 0) return 0;
   if (args_.localize)
     tell(stderr, "error: the camera was never found in {}\n", args_.load_map);
@@ -383,8 +399,7 @@ int RunSession::tell_the_end() {
 // No frame is lost in silence.
 void RunSession::warn_of_dropped(size_t next_index) {
   const std::string why = "the machine is too slow for this pace";
-  const auto* paced = dynamic_cast<const PacedSource*>(source_);
-  for (; paced != nullptr && dropped_ < paced->dropped(); ++dropped_)
+  for (const int64_t dropped = source_->counts().dropped; dropped_ < dropped; ++dropped_)
     warnings_.warn("frame dropped, " + why, fmt::format("frame {}: one before it was dropped, {}", next_index, why));
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,7 @@ class RunSession {
   void track();
   void show(const SourceFrame& next, FrameResult result);
   void write(double seconds);
+  void write_dense(std::set<std::string>& written);
   int tell_the_end();
   void warn_of_source();
   void warn_of_viewer();
@@ -81,7 +83,7 @@ class RunSession {
   std::filesystem::path out_;
   std::optional<PacedSource> paced_;  // in real time
   Source* source_ = nullptr;          // that frames are taken from
-  int dropped_ = 0;                   // frames of it that were told
+  int64_t dropped_ = 0;               // frames of it that were told
   std::unique_ptr<RunViewer> viewer_;
 
   RunFacts facts_;

@@ -46,6 +46,16 @@ TEST(RunDense, WritesAMeshAndAGridThatFitTogether) {
   EXPECT_NE(read_text(temp / "out" / "occupancy.yaml").find("image: occupancy.pgm\n"), std::string::npos);
 }
 
+TEST(RunDense, ADenseMapThatCannotBeWrittenLosesNoOtherResult) {
+  const TempFolder temp;
+  std::filesystem::create_directories(temp / "out" / "dense.ply");  // no file takes the place of a folder
+  const Finished run = run_dense(temp / "out");
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_NE(run.err.find("dense.ply: cannot be written"), std::string::npos) << run.err;
+  for (const char* name : {"trajectory.txt", "map.dkb", "stats.json", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(temp / "out" / name)) << name;
+}
+
 TEST(RunDense, OneThreadGivesTheSameBytesAndTheRunIsTheSameAsWithout) {
   const TempFolder temp;
   ASSERT_EQ(run_dense(temp / "a").exit_code, 0);
