@@ -38,7 +38,7 @@ PairWriterOptions quick_options(const std::string& out) {
 }
 
 int record(const RecordArguments& args) {
-  WarningLog warnings([](const std::string& line) { tell(stderr, "warning: {}\n", line); });
+  WarningLog warnings([](const std::string& line) { tell(stderr, "{}\n", line); });
   SourceOptions reading = args.reading;
   reading.depth_limits = false;  // those are for whoever reads the recording
   const std::unique_ptr<Source> source = open_source(args.source, reading);
