@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dkb/map/map_file.h"
 #include "dkb/map/point_cloud.h"
@@ -78,6 +79,8 @@ void export_model(const MapExportArguments& arguments) {
   const std::filesystem::path out = arguments.out;
   const Interrupt interrupt([] {});
   NewFolder folder(out);
+  std::vector<KeyframeId> keyframes = keyframes_of_first_map(file.map);
+  const size_t all = keyframes.size();
   std::string pictures = "no images: --images SOURCE adds them, with masks of what moves";
   if (!arguments.images.empty()) {
     SourceOptions reading;
@@ -89,20 +92,39 @@ void export_model(const MapExportArguments& arguments) {
     Slam slam(source->camera(), options, make_detectors(arguments.detection, source->camera()));
     slam.load_map(arguments.file);
     slam.localize_only(true);
-    const int written =
+    keyframes =
         write_keyframe_pictures(file, *source, slam, colmap ? MaskNames::with_ending : MaskNames::as_picture, out);
-    pictures = std::to_string(written) + " images with masks";
+    pictures = std::to_string(keyframes.size()) + " images with masks";
+    if (keyframes.size() < all)
+      tell(stderr, "warning: {}: holds {} of the map's {} keyframes; the model has these alone\n", arguments.images,
+           keyframes.size(), all);
   }
   if (colmap)
-    write_colmap(file, out);
+    write_colmap(file, keyframes, out);
   else
-    write_nerfstudio(file, !arguments.images.empty(), out);
+    write_nerfstudio(file, keyframes, !arguments.images.empty(), out);
   folder.keep();
-  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes_of_first_map(file.map).size(),
-       file.map.point_count(), pictures);
+  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes.size(), file.map.point_count(), pictures);
+}
+
+void check_arguments(const MapExportArguments& arguments) {
+  const bool model = arguments.format == "colmap" || arguments.format == "nerfstudio";
+  if (!model && !arguments.images.empty())
+    throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
+  if (!arguments.images.empty()) return;
+  const DetectorChoice& d = arguments.detection;
+  const DetectorChoice by_default;
+  const std::string unused = d.kinds != by_default.kinds           ? "--detector"
+                             : !d.model.empty()                    ? "--model"
+                             : d.inference != by_default.inference ? "--inference"
+                                                                   : "";
+  if (!unused.empty())
+    throw InputError(unused + ": is for the masks of pictures, and there are none; leave it out" +
+                     (model ? ", or add --images" : ""));
 }
 
 void export_map(const MapExportArguments& arguments) {
+  check_arguments(arguments);
   if (arguments.format == "colmap" || arguments.format == "nerfstudio") return export_model(arguments);
   const MapFile file = load_map(arguments.file);
   const std::string cloud = arguments.format == "ply"   ? point_cloud_ply(file.map)

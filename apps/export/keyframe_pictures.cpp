@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "export/keyframe_pictures.h"
 
+#include <algorithm>
 #include <map>
+#include <string>
 
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/dynamics/mover_mask.h"
@@ -30,32 +32,33 @@ GreyImage still_world(const FrameResult& result, const DepthImage& depth, const 
 
 }  // namespace
 
-int write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, MaskNames names,
-                            const std::filesystem::path& folder) {
-  std::map<int64_t, std::string> wanted;  // [us]
+std::vector<KeyframeId> write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, MaskNames names,
+                                                const std::filesystem::path& folder) {
+  std::map<int64_t, KeyframeId> wanted;  // by stamp [us]
   for (KeyframeId id : keyframes_of_first_map(file.map)) {
-    const Keyframe& k = *file.map.keyframe(id);
-    wanted.emplace(ns_from_seconds(k.timestamp) / 1000, picture_name(k));
+    wanted.emplace(ns_from_seconds(file.map.keyframe(id)->timestamp) / 1000, id);
   }
   make_output_folder(folder / "images");
   make_output_folder(folder / "masks");
-  int written = 0;
+  std::vector<KeyframeId> written;
   for (SourceFrame next = source.next(); next.state != SourceState::ended; next = source.next()) {
     Interrupt::check();
     if (next.state != SourceState::frame) continue;
     const FrameResult result = slam.process(next.frame);
-    const auto picture = wanted.find(ns_from_seconds(seconds_from_ns(next.frame.stamp_ns())) / 1000);
-    if (picture == wanted.end()) continue;
+    const auto keyframe = wanted.find(ns_from_seconds(seconds_from_ns(next.frame.stamp_ns())) / 1000);
+    if (keyframe == wanted.end()) continue;
+    const std::string picture = picture_name(*file.map.keyframe(keyframe->second));
     const RgbdImage& image = *next.frame.image();
-    write_image_file(folder / "images" / picture->second,
+    write_image_file(folder / "images" / picture,
                      image.colour.empty() ? encode_png(image.grey) : encode_png(image.colour));
-    const std::string mask = picture->second + (names == MaskNames::with_ending ? ".png" : "");
+    const std::string mask = picture + (names == MaskNames::with_ending ? ".png" : "");
     write_image_file(folder / "masks" / mask, encode_png(still_world(result, image.depth, slam.camera())));
-    ++written;
+    written.push_back(keyframe->second);
   }
-  if (written == 0)
+  if (written.empty())
     throw InputError(source.description() + ": holds no frame of the map's " + std::to_string(wanted.size()) +
                      " keyframes; give the recording that the map was made from");
+  std::sort(written.begin(), written.end());
   return written;
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "dkb/map/point_cloud.h"
 #include "dkb/util/files.h"
@@ -49,10 +50,10 @@ std::vector<KeyframeId> keyframes_of_first_map(const Map& map) {
   return keyframes;
 }
 
-void write_colmap(const MapFile& file, const std::filesystem::path& folder) {
+void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes, const std::filesystem::path& folder) {
   const Map& map = file.map;
   const Camera& camera = file.context.camera;
-  const std::vector<KeyframeId> keyframes = keyframes_of_first_map(map);
+  const std::set<KeyframeId> written(keyframes.begin(), keyframes.end());
   std::string images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then X Y POINT3D_ID of each feature\n";
   std::map<PointId, int64_t> number;  // of the points, from 1
   for (PointId id : map.points_of(keyframes)) number.emplace(id, static_cast<int64_t>(number.size()) + 1);
@@ -75,7 +76,9 @@ void write_colmap(const MapFile& file, const std::filesystem::path& folder) {
     const MapPoint& p = *map.point(id);
     points += fmt::format("{} {:.6f} {:.6f} {:.6f} {} {} {} {:.3f}", n, p.position.x(), p.position.y(), p.position.z(),
                           p.colour.r, p.colour.g, p.colour.b, reprojection_error(map, p, camera));
-    for (const Observation& o : p.observations) points += fmt::format(" {} {}", o.keyframe + 1, o.feature);
+    for (const Observation& o : p.observations) {
+      if (written.contains(o.keyframe)) points += fmt::format(" {} {}", o.keyframe + 1, o.feature);
+    }
     points += '\n';
   }
   const std::filesystem::path sparse = folder / "sparse" / "0";
@@ -85,7 +88,8 @@ void write_colmap(const MapFile& file, const std::filesystem::path& folder) {
   write_file_atomically(sparse / "images.txt", images);
 }
 
-void write_nerfstudio(const MapFile& file, bool has_masks, const std::filesystem::path& folder) {
+void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyframes, bool has_masks,
+                      const std::filesystem::path& folder) {
   const Camera& c = file.context.camera;
   nlohmann::ordered_json model;
   model["camera_model"] = "OPENCV";
@@ -95,7 +99,7 @@ void write_nerfstudio(const MapFile& file, bool has_masks, const std::filesystem
   model["k1"] = c.k1, model["k2"] = c.k2, model["p1"] = c.p1, model["p2"] = c.p2, model["k3"] = c.k3;
   model["ply_file_path"] = "sparse_pc.ply";
   model["frames"] = nlohmann::ordered_json::array();
-  for (KeyframeId id : keyframes_of_first_map(file.map)) {
+  for (KeyframeId id : keyframes) {
     const Keyframe& k = *file.map.keyframe(id);
     const Rigid3 world_from_cam = k.cam_from_world.inverse();
     Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();

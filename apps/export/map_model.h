@@ -18,12 +18,13 @@ std::string picture_name(const Keyframe& keyframe);
 // The live keyframes of the first map, increasing.
 std::vector<KeyframeId> keyframes_of_first_map(const Map& map);
 
-// COLMAP's text model: sparse/0/cameras.txt, images.txt and points3D.txt with their tracks, below `folder`. Pixels have
-// their origin at the corner of the top-left pixel there.
-void write_colmap(const MapFile& file, const std::filesystem::path& folder);
+// COLMAP's text model of some of these keyframes: sparse/0/cameras.txt, images.txt and points3D.txt with their tracks,
+// below `folder`. Pixels have their origin at the corner of the top-left pixel there.
+void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes, const std::filesystem::path& folder);
 
-// nerfstudio's transforms.json and sparse_pc.ply below `folder`. Poses are world_from_cam with the axes of OpenGL: x
-// right, y up, z backward. `has_masks`: masks/STAMP.png lie beside the pictures.
-void write_nerfstudio(const MapFile& file, bool has_masks, const std::filesystem::path& folder);
+// nerfstudio's transforms.json of them and sparse_pc.ply below `folder`. Poses are world_from_cam with the axes of
+// OpenGL: x right, y up, z backward. `has_masks`: masks/STAMP.png lie beside the pictures.
+void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyframes, bool has_masks,
+                      const std::filesystem::path& folder);
 
 }  // namespace dkb

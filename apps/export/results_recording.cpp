@@ -19,6 +19,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
 #include "dkb/util/text_rows.h"
+#include "interrupt.h"
 
 namespace dkb {
 namespace {
@@ -148,7 +149,9 @@ size_t write_results_recording(const std::filesystem::path& results, Source* pic
   path.header = header_at(stamp_of(trajectory.front()), kMapFrame);
   for (const StampedPose& p : trajectory) {
     const int64_t stamp = stamp_of(p);
+    Interrupt::check();
     while (waiting.state == SourceState::frame && waiting.frame.stamp_ns() <= stamp) {
+      Interrupt::check();
       write_picture(waiting);
       next_picture();
     }
