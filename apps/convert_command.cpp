@@ -2,11 +2,14 @@
 #include "convert_command.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "dkb/recordings/convert.h"
+#include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/util/errors.h"
 #include "interrupt.h"
@@ -31,7 +34,29 @@ Compression default_compression(const std::filesystem::path& out) {
   return Compression::none;
 }
 
+// Refuses what has no say in turning this kind of input into this kind of output.
+void check_arguments(const ConvertArguments& arguments) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (!fs::exists(arguments.in, error)) return;  // convert() says so
+  const bool from_folder = fs::is_directory(arguments.in, error) && !is_rosbag2(arguments.in);
+  const bool to_folder = !is_recording_name(arguments.out);
+  const auto refuse = [&](const char* option, bool given, const char* of) {
+    if (given)
+      throw InputError(std::string(option) + ": does nothing when a " + (from_folder ? "folder" : "recording") +
+                       " becomes a " + (to_folder ? "folder" : "recording") + ", only for " + of + "; leave it out");
+  };
+  const SourceOptions& source = arguments.options.source;
+  if (to_folder) refuse("--compression", !arguments.compression.empty(), "a recording that is written");
+  if (!from_folder) refuse("--raw", arguments.options.raw, "a folder that is read");
+  if (!from_folder && to_folder) return;
+  refuse("--colour-topic", !source.colour_topic.empty(), "a recording that becomes a folder");
+  refuse("--depth-topic", !source.depth_topic.empty(), "a recording that becomes a folder");
+  refuse("--info-topic", !source.info_topic.empty(), "a recording that becomes a folder");
+}
+
 void run_convert(const ConvertArguments& arguments) {
+  check_arguments(arguments);
   ConvertOptions options = arguments.options;
   options.warn = [](const std::string& line) { std::fprintf(stderr, "warning: %s\n", line.c_str()); };
   try {

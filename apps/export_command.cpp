@@ -12,6 +12,7 @@
 #include "dkb/util/files.h"
 #include "dkb_slam/source.h"
 #include "export/results_recording.h"
+#include "interrupt.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -30,10 +31,15 @@ void run_export(const ExportArguments& arguments) {
     throw InputError(arguments.out + ": " +
                      (recording ? "a recording has no --format; leave it out"
                                 : "give --format tum, kitti or euroc, or a name that ends in .mcap or .bag"));
+  if (!recording && !arguments.images.empty())
+    throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
+  if (arguments.images.empty() && !arguments.source.camera.empty())
+    throw InputError("--camera: is that of --images; add them, or leave it out");
   if (recording) {
     if (!fs::is_directory(results))
       throw InputError(arguments.results + ": is no folder; give the folder that `dkb-slam run --out` wrote");
     const auto pictures = arguments.images.empty() ? nullptr : open_source(arguments.images, arguments.source);
+    const Interrupt interrupt([] {});  // else it would leave half a file
     const size_t poses = write_results_recording(results, pictures.get(), out);
     tell(stdout, "{}: {} poses\n", arguments.out, poses);
     return;

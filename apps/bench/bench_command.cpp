@@ -25,8 +25,8 @@ namespace {
 struct BenchArguments {
   std::string suite, out, shard, merge;
   std::vector<std::string> sequences, variants;
-  int seeds = 0;
-  int64_t max_frames = 0;
+  int seeds = 0;           // 0 = as the suite says
+  int64_t max_frames = 0;  // likewise
   RunnerOptions runner;
   ReportOptions report;
   bool no_times = false;
@@ -122,8 +122,6 @@ int bench_main(BenchArguments& args) {
   args.report.times = !args.no_times;
   if (args.suite.empty() == args.merge.empty())
     throw InputError("bench: give either a suite (YAML) or --merge FOLDER; see dkb-slam bench --help");
-  if (args.seeds < 0 || args.seeds > 1000) throw InvalidOption("--seeds", std::to_string(args.seeds), "from 1 to 1000");
-  if (args.max_frames < 0) throw InvalidOption("--max-frames", std::to_string(args.max_frames), "at least 1");
   return args.merge.empty() ? measure(args) : merge(args);
 }
 
@@ -145,8 +143,10 @@ void register_bench(CLI::App& app, int& exit_code) {
   command->add_option("--data", args->runner.data, "Folder of the sequences, instead of the suite's root");
   command->add_option("--sequence", args->sequences, "Only this sequence; may be repeated")->allow_extra_args(false);
   command->add_option("--variant", args->variants, "Only this variant; may be repeated")->allow_extra_args(false);
-  command->add_option("--seeds", args->seeds, "Runs per sequence and variant, instead of the suite's");
-  command->add_option("--max-frames", args->max_frames, "Pairs per run at most, instead of the suite's");
+  command->add_option("--seeds", args->seeds, "Runs per sequence and variant, instead of the suite's")
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--max-frames", args->max_frames, "Pairs per run at most, instead of the suite's")
+      ->check(CLI::Range(1, 1000000000));
   command->add_option("--program", args->runner.program, "Another build of dkb-slam to run");
   command->add_flag("--retry", args->runner.retry, "Repeat runs that failed");
   command->add_flag("--no-times", args->no_times, "Leave times and memory out of the report, so that reports compare");
