@@ -193,6 +193,8 @@ TEST_F(Bench, BadInputIsOneLineAndExitCodeTwo) {
       {{good, "--out", out(), "--shard", "3/2"}, "out of range"},
       {{good, "--out", out(), "--shard", "0/2"}, "out of range"},
       {{good, "--out", out(), "--jobs", "0"}, "jobs"},
+      {{good, "--out", out(), "--seeds", "0"}, "--seeds"},
+      {{good, "--out", out(), "--max-frames", "0"}, "--max-frames"},
       {{good, "--out", out(), "--program", "/nowhere/dkb-slam"}, "/nowhere/dkb-slam"},
       {{good, "--merge", out()}, "either"},
       {{"--merge", out(), "--seeds", "3"}, "--seeds"},

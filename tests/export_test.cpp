@@ -131,6 +131,64 @@ TEST_F(Export, AModelWithoutPicturesSaysSoAndAForeignRecordingIsRefused) {
       << foreign.err;
 }
 
+TEST_F(Export, AModelListsOnlyTheKeyframesWhosePicturesWereWritten) {
+  const TempFolder part;
+  copy_sequence(part.path(), 5, false);
+  const Finished nerfstudio = export_map("nerfstudio", {"--images", part.path().string(), "--detector", "none"});
+  ASSERT_EQ(nerfstudio.exit_code, 0) << nerfstudio.err;
+  EXPECT_NE(nerfstudio.err.find(" of the map's " + run.stats["keyframes"].dump() + " keyframes"), std::string::npos)
+      << nerfstudio.err;
+  const auto frames = nlohmann::json::parse(read_text(folder / "nerfstudio" / "transforms.json"))["frames"];
+  ASSERT_GE(frames.size(), 1U);
+  EXPECT_LT(frames.size(), run.stats["keyframes"].get<size_t>());
+  for (const auto& frame : frames)
+    EXPECT_TRUE(fs::exists(folder / "nerfstudio" / frame["file_path"].get<std::string>()));
+
+  ASSERT_EQ(export_map("colmap", {"--images", part.path().string(), "--detector", "none"}).exit_code, 0);
+  const fs::path sparse = folder / "colmap" / "sparse" / "0";
+  const auto images = lines_of(sparse / "images.txt");
+  ASSERT_EQ(images.size(), 2 * frames.size());
+  std::set<std::string> ids;
+  for (size_t i = 0; i < images.size(); i += 2) ids.insert(images[i].substr(0, images[i].find(' ')));
+  for (const auto& row : rows_of(sparse / "points3D.txt")) {
+    EXPECT_GT(row.size(), 8U) << "a point that no image sees";
+    for (size_t i = 8; i + 1 < row.size(); i += 2) EXPECT_TRUE(ids.contains(row[i])) << row[i];
+  }
+}
+
+TEST_F(Export, TheModelOfTheMasksMayStandInTheEnvironment) {
+  const std::string map = (run.out / "map.dkb").string(), out = (folder / "model").string();
+  const Finished done = run_program(
+      {"map", "export", map, "--format", "colmap", "--out", out, "--images", sequence().string(), "--detector", "yolo"},
+      -1, {"DKB_SLAM_MODEL=/nowhere/model.onnx"});
+  EXPECT_EQ(done.exit_code, 2);
+  EXPECT_NE(done.err.find("/nowhere/model.onnx"), std::string::npos) << done.err;
+}
+
+TEST_F(Export, OptionsThatDoNothingAreRefused) {
+  const std::string images = sequence().string();
+  const std::vector<std::pair<std::string, std::vector<std::string>>> maps = {{"ply", {"--images", images}},
+                                                                              {"pcd", {"--detector", "motion"}},
+                                                                              {"json", {"--model", "x.onnx"}},
+                                                                              {"colmap", {"--inference", "opencv"}}};
+  for (const auto& [format, more] : maps) {
+    const Finished done = export_map(format, more);
+    EXPECT_EQ(done.exit_code, 2) << more[0];
+    EXPECT_NE(done.err.find("error: " + more[0] + ": "), std::string::npos) << done.err;
+  }
+  const std::string tum = (folder / "tum").string(), bag = (folder / "x.bag").string();
+  const std::vector<std::vector<std::string>> results = {{"--images", images, "--format", "tum", "--out", tum},
+                                                         {"--camera", "fr1", "--format", "tum", "--out", tum},
+                                                         {"--camera", "fr1", "--out", bag}};
+  for (const auto& more : results) {
+    std::vector<std::string> arguments = {"export", run.out.string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Finished done = run_program(arguments);
+    EXPECT_EQ(done.exit_code, 2) << more[0];
+    EXPECT_NE(done.err.find("error: " + more[0] + ": "), std::string::npos) << done.err;
+  }
+}
+
 TEST_F(Export, TrajectoriesHaveARowForEachPose) {
   const size_t poses = rows_of(run.out / "trajectory.txt").size();
   for (const char* format : {"tum", "kitti", "euroc"}) {

@@ -62,6 +62,41 @@ TEST(LiveCommand, WrongDevicesAreBadUsage) {
   }
 }
 
+TEST(LiveCommand, FramesThatAreDroppedAreToldOfWithAPriorFileToo) {
+  const TempFolder temp;
+  // The first frame waits for its detection; meanwhile more come than the queue holds.
+  const Finished finished =
+      run_program({"live", fake("speed=100"), "--detector", "exec:sleep 2", "--no-record", "--out",
+                   (temp / "out").string(), "--prior-file", (sequence() / "groundtruth.txt").string()});
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const auto stats = nlohmann::json::parse(read_text(temp / "out" / "stats.json"));
+  const bool dropped = stats["realtime"]["dropped"].get<int>() > 0;
+  EXPECT_EQ(dropped, contains(finished.err, "one before it was dropped")) << finished.err;
+}
+
+TEST(LiveCommand, TheUnitOfTimesIsRefusedSinceACameraGivesNoImageTwice) {
+  const TempFolder temp;
+  const Finished finished = run_program({"run", fake(), "--cv-orb", "--out", (temp / "out").string()});
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_TRUE(contains(finished.err, "error: --cv-orb: ")) << finished.err;
+}
+
+TEST(RecordCommand, ItsWarningsAreCalledSoOnce) {
+  const TempFolder temp;
+  const Finished finished = run_program({"record", fake("unplug=0.3,0.1&speed=0.5"), "--out", (temp / "out").string()});
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_TRUE(contains(finished.err, "warning: the camera is gone")) << finished.err;
+  EXPECT_FALSE(contains(finished.err, "warning: warning: ")) << finished.err;
+}
+
+TEST(RecordCommand, AFolderInThePlaceOfTheFileIsRefusedBeforeTheRecording) {
+  const TempFolder temp;
+  std::filesystem::create_directory(temp / "file.mcap");
+  const Finished finished = run_program({"record", fake(), "--out", (temp / "file.mcap").string()});
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_TRUE(contains(finished.err, "is a folder")) << finished.err;
+}
+
 TEST(RecordCommand, WhatWasRecordedReadsBackTheSame) {
   const TempFolder temp;
   const SlamRun original(sequence(), temp / "original");

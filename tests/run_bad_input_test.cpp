@@ -149,6 +149,10 @@ std::vector<Case> cases() {
        "o.txt: its times, 1.000 ... 2.000 s",
        [](const fs::path& d) { write_text(d / "o.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"); },
        {"--prior-file", "@/o.txt"}},
+      {"two priors",
+       "--prior odom",
+       [](const fs::path& d) { write_text(d / "o.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"); },
+       {"--prior", "odom", "--prior-file", "@/o.txt"}},
       {"classes of no network", "--labels", [](const fs::path&) {}, {"--detector", "motion", "--labels", "x"}},
       {"a model of no network", "--model", [](const fs::path&) {}, {"--detector", "motion", "--model", "x"}},
       {"detections of no network",
@@ -254,6 +258,27 @@ TEST(RunBadInput, NoCommandNoDatasetAndAMisspeltCommandAreRefused) {
     const Finished run = run_program(arguments);
     EXPECT_EQ(run.exit_code, 2);
     EXPECT_EQ(run.error_lines(), 1U) << run.err;
+  }
+}
+
+TEST(RunBadInput, OptionsThatDoNothingInAConversionAreRefused) {
+  const TempFolder temp;
+  const std::string folder = sequence().string(), bag = (temp / "a.bag").string(), out = (temp / "out").string();
+  copy_sequence(temp / "data", 5, false);
+  ASSERT_EQ(
+      run_program({"convert", (temp / "data").string(), "--out", bag, "--compression", "none", "--raw"}).exit_code, 0);
+  const std::vector<std::vector<std::string>> cases = {
+      {folder, out, "--compression", "none"},        {folder, out, "--colour-topic", "/a"},
+      {folder, out + ".bag", "--depth-topic", "/a"}, {bag, out, "--raw"},
+      {bag, out, "--compression", "none"},           {bag, out + ".mcap", "--raw"},
+      {bag, out + ".mcap", "--info-topic", "/a"}};
+  for (const auto& c : cases) {
+    std::vector<std::string> arguments = {"convert", c[0], "--out", c[1]};
+    arguments.insert(arguments.end(), c.begin() + 2, c.end());
+    const Finished run = run_program(arguments);
+    EXPECT_EQ(run.exit_code, 2) << c[2];
+    EXPECT_EQ(run.error_lines(), 1U) << run.err;
+    EXPECT_NE(run.err.find(c[2] + ": does nothing"), std::string::npos) << run.err;
   }
 }
 

@@ -2,6 +2,8 @@
 // How commands end: by signals, with outputs that cannot be written, and in a folder that has been used before.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -148,6 +150,67 @@ TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
   EXPECT_FALSE(fs::exists(out / "map.ply"));
 }
 
+TEST(RunEnding, APortThatIsTakenCostsNoEarlierRecording) {
+  const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof at;
+  ASSERT_EQ(bind(listener, reinterpret_cast<sockaddr*>(&at), size), 0);
+  ASSERT_EQ(listen(listener, 1), 0);
+  ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&at), &size), 0);
+
+  const TempFolder temp;
+  fs::create_directory(temp / "out");
+  write_text(temp / "out" / "session.dkbs", "earlier");
+  const Finished run = run_program({"run", sequence().string(), "--detector", "none", "--out", (temp / "out").string(),
+                                    "--record", "--viewer", std::to_string(ntohs(at.sin_port))});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(read_text(temp / "out" / "session.dkbs"), "earlier");
+  close(listener);
+}
+
+TEST(RunEnding, ASessionThatCannotBeWrittenIsAFailedRunAndNoBadInput) {
+  const TempFolder temp;
+  fs::create_directories(temp / "out" / "session.dkbs");
+  const Finished run =
+      run_program({"run", sequence().string(), "--detector", "none", "--out", (temp / "out").string(), "--record"});
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_EQ(run.error_lines(), 1U) << run.err;
+}
+
+TEST(RunEnding, WarningsOfTheEndAreToldEvenWhenResultsCannotBeWritten) {
+  const TempFolder temp;
+  fs::create_directories(temp / "out" / "trajectory.txt");
+  const double first = std::stod(rows_of(sequence() / "rgb.txt").at(0).at(0));
+  // Poses too far apart to tell of the motion between them.
+  write_text(temp / "wheels.txt",
+             std::to_string(first - 100) + " 0 0 0 0 0 0 1\n" + std::to_string(first + 100) + " 0 0 0 0 0 0 1\n");
+  const Finished run = run_program({"run", sequence().string(), "--detector", "none", "--max-frames", "12", "--out",
+                                    (temp / "out").string(), "--prior-file", (temp / "wheels.txt").string()});
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_NE(run.err.find("tells of no frame's motion"), std::string::npos) << run.err;
+}
+
+TEST(RunEnding, CtrlCWhileTheResultsOfAWholeRunAreWrittenIsNoInterruption) {
+  const TempFolder temp;
+  fs::create_directory(temp / "out");
+  Program program({"run", sequence().string(), "--detector", "none", "--out", (temp / "out").string()});
+  // The file that the report grows in is a pipe, which holds up the run until somebody reads it.
+  const fs::path pipe = temp / "out" / (".report.html.tmp" + std::to_string(program.pid()));
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  while (!fs::exists(temp / "out" / "stats.json") && !program.ended()) pause_ms(5);
+  ASSERT_FALSE(program.ended());
+  kill(program.pid(), SIGINT);
+  const int fd = open(pipe.c_str(), O_RDONLY);
+  char bytes[4096];
+  while (read(fd, bytes, sizeof bytes) > 0) continue;
+  close(fd);
+  const Finished run = program.wait();
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out.find("interrupted"), std::string::npos) << run.out;
+}
+
 TEST(RunEnding, TheLastLinesTellTheErrorAndTheReport) {
   const TempFolder temp;
   copy_sequence(temp / "data", 12, false);
@@ -166,7 +229,7 @@ TEST(RunEnding, TheLastLinesTellTheErrorAndTheReport) {
       << broken.err;
 }
 
-TEST(RunEnding, AnInterruptedConversionOrSimulationLeavesNothing) {
+TEST(RunEnding, AnInterruptedConversionExportOrSimulationLeavesNothing) {
   const TempFolder temp;
   const auto is_empty = [&] { return fs::is_empty(temp.path()); };
   Program simulating({"simulate", "--out", (temp / "made").string(), "--scene", "room"});
@@ -179,6 +242,15 @@ TEST(RunEnding, AnInterruptedConversionOrSimulationLeavesNothing) {
   while (is_empty() && !converting.ended()) pause_ms(1);
   kill(converting.pid(), SIGINT);
   EXPECT_EQ(converting.wait().exit_code, 130);
+  EXPECT_TRUE(is_empty());
+
+  const TempFolder results;
+  const SlamRun run(sequence(), results / "run");
+  Program exporting(
+      {"export", run.out.string(), "--out", (temp / "made.mcap").string(), "--images", sequence().string()});
+  while (is_empty() && !exporting.ended()) pause_ms(1);
+  kill(exporting.pid(), SIGINT);
+  EXPECT_EQ(exporting.wait().exit_code, 130);
   EXPECT_TRUE(is_empty());
 }
 
