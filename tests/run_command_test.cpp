@@ -45,7 +45,7 @@ TEST(RunCommand, EverySecondOrThirdFrameIsEnough) {
     const SlamRun run(folder.path(), folder / "out");
     ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
     EXPECT_EQ(run.stats["tracked"], (rows.size() + step - 1) / step) << step;
-    EXPECT_NE(read_file(run.out / "report.html").find("At " + std::to_string(30 / step) + " frames a second"),
+    EXPECT_NE(read_text(run.out / "report.html").find("At " + std::to_string(30 / step) + " frames a second"),
               std::string::npos);
     EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.005 * static_cast<double>(step)) << step;
   }

@@ -38,7 +38,7 @@ class DKB_SLAM_API Options {
   uint64_t seed = 1;  ///< of every source of randomness
 
   struct Features {
-    int count = 900;             ///< [features] wanted per image, 1 ... 100000
+    int count = 900;             ///< [features] wanted per image, 1 ... 8000
     int levels = 7;              ///< of the image pyramid, 1 ... 16
     double scale = 1.2;          ///< size of a level over the next smaller one, above 1, at most 4
     int fast_threshold = 20;     ///< [grey levels] contrast of a corner, fast_threshold_min ... 254

@@ -28,7 +28,8 @@ template <class Public, class Internal, class Visit>
 void each_setting(Public& p, Internal& o, const Visit& visit) {
   visit("seed", p.seed, o.seed, "of every source of randomness");
 
-  visit("features.count", p.features.count, o.features.count, "[features] wanted per image", Range{1, 100000});
+  // Fewer than a point's name has room for (kMaxFeaturesPerFrame), since an image may give a few more than are wanted.
+  visit("features.count", p.features.count, o.features.count, "[features] wanted per image", Range{1, 8000});
   visit("features.levels", p.features.levels, o.features.levels, "levels of the image pyramid", Range{1, 16});
   visit("features.scale", p.features.scale, o.features.scale, "size of a level over the next smaller one",
         Range{1, 4, true});

@@ -123,7 +123,7 @@ TEST(Options, ExperimentsAreWrittenOnlyWhenSet) {
 }
 
 TEST(Options, ErrorsNameTheWholeKey) {
-  EXPECT_EQ(refusal("features.count=-5"), "--set: features.count: -5 is out of range; it must be 1 ... 100000");
+  EXPECT_EQ(refusal("features.count=-5"), "--set: features.count: -5 is out of range; it must be 1 ... 8000");
   EXPECT_EQ(refusal("experiment.mapping.ba.edge_weight=20"),
             "--set: experiment.mapping.ba.edge_weight: 20 is out of range; it must be above 0, at most 10");
   EXPECT_EQ(refusal("dynamics.filter=paprr"),
