@@ -28,7 +28,6 @@
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
-#include "interrupt.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -223,17 +222,17 @@ RunSession::RunSession(const RunArguments& args)
   log_.emplace(recording_->size());
   if (args.realtime && !live_) paced_.emplace(*recording_);
   source_ = paced_ ? static_cast<Source*>(&*paced_) : recording_.get();
+  interrupt_.emplace([this] { source_->stop(); });  // before the page is there, on which somebody may have acted
   if (!args.viewer.on && !args.viewer.record) return;
   try {
     viewer_ = std::make_unique<RunViewer>(args.viewer, *recording_, args.source, options_, out_);
-  } catch (const InputError& e) {
+  } catch (const std::exception& e) {
     if (args.viewer.on || !args.live) throw;
     warnings_.warn("session", std::string("the session is not recorded: ") + e.what());
   }
 }
 
 int RunSession::run() {
-  const Interrupt interrupt([&] { source_->stop(); });
   progress_.emplace(recording_->size(), args_.quiet);
   warn_of_source();
   const Stopwatch wall;

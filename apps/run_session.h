@@ -17,6 +17,7 @@
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
+#include "interrupt.h"
 #include "live_report.h"
 #include "progress.h"
 #include "report/run_report.h"
@@ -83,7 +84,8 @@ class RunSession {
   std::filesystem::path out_;
   std::optional<PacedSource> paced_;  // in real time
   Source* source_ = nullptr;          // that frames are taken from
-  int64_t dropped_ = 0;               // frames of it that were told
+  std::optional<Interrupt> interrupt_;
+  int64_t dropped_ = 0;  // frames of it that were told
   std::unique_ptr<RunViewer> viewer_;
 
   RunFacts facts_;
