@@ -66,7 +66,7 @@ PoseEdge edge_of(int a, int b, const Rigid3& cam_from_plane, const PlanePatch& p
   PoseEdge edge;
   edge.a = a;
   edge.b = b;
-  edge.huber_chi2 = kChi2ThreeDof99;
+  edge.huber_chi2 = kChi2ThreeDof999;
   // The least motion that brings the plane to where it is seen.
   const Eigen::Vector3d n = patch.normal();
   const auto tilt = rotation_between(cam_from_plane.rotation * Eigen::Vector3d::UnitZ(), n);
