@@ -7,7 +7,7 @@ namespace dkb {
 
 Look ImageAppearance::look(const Eigen::Vector2d& pixel, double depth, int octave, const Descriptor& descriptor) {
   constexpr int kSameBits = 80, kOtherBits = 100;  // two random descriptors differ by 128
-  const Eigen::Vector2f at = undistort_.image_pixel(pixel);
+  const Eigen::Vector2f at = camera_.distort(pixel).cast<float>();
   const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
   if (!image_.depth.contains(x, y) || !(image_.depth(x, y) > 0)) return Look::unknown;
   const double seen = image_.depth(x, y);

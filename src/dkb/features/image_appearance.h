@@ -28,15 +28,15 @@ class PointAppearance {
 // By what a descriptor differs from the image where it should be found. Does nothing until it is asked.
 class ImageAppearance final : public PointAppearance {
  public:
-  // The image and the table must outlive it.
-  ImageAppearance(const RgbdImage& image, const UndistortionTable& undistort, const SensorNoise& noise,
+  // The image and the camera must outlive it.
+  ImageAppearance(const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
                   const ImagePyramidOptions& pyramid)
-      : image_(image), undistort_(undistort), noise_(noise), pyramid_(pyramid) {}
+      : image_(image), camera_(camera), noise_(noise), pyramid_(pyramid) {}
   Look look(const Eigen::Vector2d& pixel, double depth, int octave, const Descriptor& descriptor) override;
 
  private:
   const RgbdImage& image_;
-  const UndistortionTable& undistort_;
+  const CameraModel& camera_;
   SensorNoise noise_;
   ImagePyramidOptions pyramid_;
   std::optional<PatchDescriber> describer_;  // of the image, once it was asked for

@@ -34,8 +34,7 @@ class ImageAppearanceTest : public ::testing::Test {
     }
   }
   Look look_in(const RgbdImage& seen, double depth = 2) const {
-    const UndistortionTable undistort(camera);
-    ImageAppearance appearance(seen, undistort, {}, {});
+    ImageAppearance appearance(seen, camera, {}, {});
     return appearance.look({chosen->x, chosen->y}, depth, chosen->octave, descriptor);
   }
 
@@ -74,8 +73,7 @@ TEST_F(ImageAppearanceTest, WhatIsHiddenIsNotToldAndWhatIsSeenThroughIsGone) {
 }
 
 TEST_F(ImageAppearanceTest, PlacesOutsideTheImageAreNotTold) {
-  const UndistortionTable undistort(camera);
-  ImageAppearance appearance(image, undistort, {}, {});
+  ImageAppearance appearance(image, camera, {}, {});
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(-5, 100), {400, 100}, {100, -1}, {100, 300}, {1e12, -1e12}})
     EXPECT_EQ(appearance.look(pixel, 2, 0, {}), Look::unknown);
 }

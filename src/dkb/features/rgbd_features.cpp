@@ -105,7 +105,7 @@ CornerDepths::Depth CornerDepths::nearest_pixel(int cx, int cy, float limit) con
   return count >= kSurface ? found : Depth();
 }
 
-UndistortionTable::UndistortionTable(const CameraModel& camera) : camera_(camera) {
+UndistortionTable::UndistortionTable(const CameraModel& camera) {
   if (!camera.distorted()) return;
   identity_ = false;
   columns_ = (camera.width - 1) / kNodeSpacing + 2;

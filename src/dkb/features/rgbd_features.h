@@ -55,11 +55,8 @@ class UndistortionTable {
  public:
   explicit UndistortionTable(const CameraModel& camera);
   Eigen::Vector2f operator()(float x, float y) const;
-  // The way back.
-  Eigen::Vector2f image_pixel(const Eigen::Vector2d& ideal) const { return camera_.distort(ideal).cast<float>(); }
 
  private:
-  CameraModel camera_;
   int columns_ = 0, rows_ = 0;
   bool identity_ = true;
   std::vector<Eigen::Vector2f> offset_;  // ideal minus image pixel, per node

@@ -19,10 +19,11 @@ std::optional<CameraModel> builtin_camera(const std::string& name);
 // and so far aside that the distortion polynomial has turned back and would show it a second time.
 std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eigen::Vector3d& point);
 
-// Whether that is inside the image.
-inline bool shows(const CameraModel& camera, const Eigen::Vector3d& point) {
+// The same, and nothing outside the image.
+inline std::optional<Eigen::Vector2d> pixel_in_view(const CameraModel& camera, const Eigen::Vector3d& point) {
   const auto at = image_pixel(camera, point);
-  return at && at->x() >= 0 && at->y() >= 0 && at->x() < camera.width && at->y() < camera.height;
+  const bool inside = at && at->x() >= 0 && at->y() >= 0 && at->x() < camera.width && at->y() < camera.height;
+  return inside ? at : std::nullopt;
 }
 
 // [px per m, px per rad] How the image of `point` [m, in the camera] moves with a small motion [v, w] of the point

@@ -65,7 +65,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (p.z() < 0.05f) continue;
     const float inv_z = 1.0f / p.z();
     const float u = fx * p.x() * inv_z + cx, v = fy * p.y() * inv_z + cy;
-    if (distorted ? !shows(camera, p.cast<double>()) : !(u >= 0 && v >= 0 && u < width && v < height)) continue;
+    if (distorted ? !pixel_in_view(camera, p.cast<double>()) : !(u >= 0 && v >= 0 && u < width && v < height)) continue;
     const Eigen::Vector3f ray = centre - world;
     const float distance = ray.norm();
     const float scale = c.reference_scale * c.reference_distance / distance;

@@ -47,8 +47,8 @@ std::vector<PointInView> Tracker::points_in_view() const {
   in_view.reserve(candidates_.size() + provisional_.size());
   const auto offer = [&](PointId id, const Eigen::Vector3d& world) {
     const Eigen::Vector3d p = last_->cam_from_world * world;
-    if (p.z() < 0.1 || !shows(optics_.camera, p)) return;
-    in_view.push_back({id, *image_pixel(optics_.camera, p), p.z()});
+    if (p.z() < 0.1) return;
+    if (const auto at = pixel_in_view(optics_.camera, p)) in_view.push_back({id, *at, p.z()});
   };
   for (const Candidate& c : candidates_)
     if (!is_retracted(c.id)) offer(c.id, c.position);
