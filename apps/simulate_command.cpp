@@ -20,6 +20,7 @@ struct SimulateArguments {
   SimulatorOptions options;
   std::string out;
   std::vector<double> blackout;
+  std::vector<int> size;
 };
 
 void run_simulate(const SimulateArguments& arguments) {
@@ -59,6 +60,9 @@ void register_simulate(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--rate", o.rate, "frames a second, 1 ... 60; the motion is the same in seconds")
       ->capture_default_str();
+  command->add_option("--size", arguments->size, "WIDTHxHEIGHT of the images, 64x64 ... 4096x4096 (default: 640x480)")
+      ->delimiter('x')
+      ->expected(2);
   command->add_option("--dropouts", o.dropouts,
                       "share of the frames that is missing, 0 ... 0.9, singly and in bursts; never the first");
   command->add_flag("--flicker", o.flicker, "exposure jumps, and lamps flicker at 100 Hz");
@@ -78,6 +82,10 @@ void register_simulate(CLI::App& app, int& exit_code) {
     if (arguments->blackout.size() == 2) {
       arguments->options.blackout_start = arguments->blackout[0];
       arguments->options.blackout_seconds = arguments->blackout[1];
+    }
+    if (arguments->size.size() == 2) {
+      arguments->options.width = arguments->size[0];
+      arguments->options.height = arguments->size[1];
     }
     run_simulate(*arguments);
     exit_code = 0;

@@ -99,13 +99,15 @@ void MotionSegmenter::reset() {
   if (previous_) spare_.push_back(std::move(previous_));
   if (current_) spare_.push_back(std::move(current_));
   last_.reset();
+  guessing_ = false;
 }
 
-void MotionSegmenter::move_world(const Rigid3& new_from_old) {
+void MotionSegmenter::move_views(const Rigid3& new_from_old, double after) {
   const Rigid3 old_from_new = new_from_old.inverse();
-  for (auto& view : views_) view->cam_from_world = view->cam_from_world * old_from_new;
+  for (auto& view : views_)
+    if (view->time > after) view->cam_from_world = view->cam_from_world * old_from_new;
   for (MotionDepthGrid* grid : {previous_.get(), current_.get()})
-    if (grid != nullptr) grid->cam_from_world = grid->cam_from_world * old_from_new;
+    if (grid != nullptr && grid->time > after) grid->cam_from_world = grid->cam_from_world * old_from_new;
   if (last_) last_->cam_from_world = last_->cam_from_world * old_from_new;
 }
 
@@ -176,10 +178,12 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
 // Not all views speak in each frame: they take turns.
 void MotionSegmenter::choose_views() {
   const Rigid3 world_from_cam = current_->cam_from_world.inverse();
-  const size_t count = views_.size(), chosen = std::min(count, kViewsPerFrame);
+  const auto first =
+      std::find_if(views_.begin(), views_.end(), [&](const auto& view) { return !guessing_ || view->time > told_; });
+  const auto count = static_cast<size_t>(views_.end() - first), chosen = std::min(count, kViewsPerFrame);
   chosen_.clear();
   for (size_t i = 0; i < chosen; ++i) {
-    MotionView& view = *views_[(turn_ + i * count / chosen) % count];
+    MotionView& view = *first[static_cast<std::ptrdiff_t>((turn_ + i * count / chosen) % count)];
     const auto trust = static_cast<float>(std::clamp((current_->time - view.time) / kSettle, 0.0, 1.0));
     chosen_.push_back({&view, view.cam_from_world * world_from_cam, trust});
   }
@@ -400,7 +404,7 @@ void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   }
 }
 
-void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
+void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool guessed) {
   if (!current_) return;
   if (!cam_from_world) {
     reset();
@@ -408,6 +412,8 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world) {
   }
   current_->cam_from_world = depth_cam_from_cam(*cam_from_world) * *cam_from_world;
   last_ = Stamped{image_time_, *cam_from_world};
+  guessing_ = guessed;
+  if (!guessed) told_ = current_->time;
   if (previous_) {
     keep_as_view(*previous_);
     spare_.push_back(std::move(previous_));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -51,10 +52,13 @@ class MotionSegmenter {
   // The colour camera's motion since the frame committed last as depth shows it beside what was expected, of the image
   // last given; nothing when there was no view to hold it against.
   const std::optional<MotionPrior>& aligned_step() const { return aligned_step_; }
-  // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten.
-  void commit(const std::optional<Rigid3>& cam_from_world);
+  // Pose of the image last given; nothing when tracking is lost, upon which all views are forgotten. While poses are
+  // guesses, which drift, the views from before them say nothing: they would take the whole room for moved.
+  void commit(const std::optional<Rigid3>& cam_from_world, bool guessed = false);
   // After a correction of the world's frame, e.g. by a loop: later poses are given in the new one.
-  void move_world(const Rigid3& new_from_old);
+  void move_world(const Rigid3& new_from_old) { move_views(new_from_old, -std::numeric_limits<double>::infinity()); }
+  // What the poses committed as guesses were off by, those since the last one that images told.
+  void correct_guesses(const Rigid3& found_from_guessed) { move_views(found_from_guessed, told_); }
   void reset();
   // Per cell of the frame last segmented: from -1, surely still, to 3, surely moving; 0 = nothing known;
   // empty before the first frame and after reset().
@@ -72,6 +76,7 @@ class MotionSegmenter {
     float trust;
   };
 
+  void move_views(const Rigid3& new_from_old, double after);
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_pose(const Matrix6d& step_covariance);
   void choose_views();
@@ -98,6 +103,8 @@ class MotionSegmenter {
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
+  double told_ = 0;        // [s] depth stamp of the last image committed with a pose that images told
+  bool guessing_ = false;  // another one came after it
   std::optional<MotionPrior> aligned_step_;
   size_t turn_ = 0;
   MotionProjection projection_;

@@ -307,6 +307,26 @@ TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
   }
 }
 
+// Three frames by guesses that go astray, and then the images tell: views from before the guesses stay where they are.
+TEST(MotionSegmenter, CorrectsTheGuessesAlone) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {});
+  const Rigid3 found_from_guessed(rotation_from_vector({0.01, -0.02, 0.01}), {0.1, 0.1, 0.4});
+  for (int f = 0; f < 34; ++f) {
+    const Picture p = world.render(f, {box_at(-1.4 + 0.04 * f)});
+    const bool guess = f >= 27 && f < 30;
+    const Rigid3 truth = world.cam_from_world(f), guessed = truth * found_from_guessed;
+    const Rigid3& expected = f > 27 && f <= 30 ? guessed : truth;
+    const Figures figures = judge(segmenter.segment(p.image, expected, kStepCovariance), p.truth);
+    if (f >= 27) {
+      EXPECT_GT(figures.covered, 0.9) << f;
+      EXPECT_LT(figures.wrong, 0.01) << f;
+    }
+    if (f == 30) segmenter.correct_guesses(found_from_guessed);
+    segmenter.commit(guess ? guessed : truth, guess);
+  }
+}
+
 TEST(MotionSegmenter, GivesTheSameMasksAgain) {
   std::vector<Image<uint8_t>> first, second;
   for (auto* masks : {&first, &second})

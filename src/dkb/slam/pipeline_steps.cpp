@@ -378,6 +378,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
     outcome.cam_from_world = tracked.cam_from_world;
+    outcome.guessed = !tracked.tracked();
     // Where the images tell the pose again, the step is the prior's: what it was off by is the map's business.
     const bool seen_again = last_state_ == TrackingState::predicted && tracked.tracked();
     if (seen_again && tracked.predicted) {

@@ -61,8 +61,8 @@ void SceneStage::ask_slow_detector(FrameIndex index, const Frame& frame) {
 void SceneStage::learn(const FrameOutcome& before) {
   if (motion_) {
     motion_->move_world(before.new_world_from_old);
-    motion_->move_world(before.found_world_from_guessed);
-    motion_->commit(before.cam_from_world);
+    motion_->correct_guesses(before.found_world_from_guessed);
+    motion_->commit(before.cam_from_world, before.guessed);
   }
   if (before.keyframe && !past_.empty()) {
     past_.back().keyframe = true;

@@ -61,6 +61,7 @@ struct CarryTask {
 struct FrameOutcome {
   Rigid3 new_world_from_old;             // how the map was corrected after the stage looked at it
   std::optional<Rigid3> cam_from_world;  // in the new world; nothing when lost
+  bool guessed = false;                  // the pose is a prediction
   Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
 };
