@@ -71,16 +71,19 @@ TumDataset paired_by_number(const fs::path& folder, const std::string& layout, c
                             const NumberedImages& depth) {
   TumDataset dataset;
   dataset.folder = folder;
-  bool stamped = true;
+  // All by their names or all by their numbers: two scales of time must not mix.
+  const bool stamped = std::all_of(colour.begin(), colour.end(), [&](const auto& numbered) {
+    const auto other = depth.find(numbered.first);
+    return other == depth.end() || (numbered.second.stamp_ns && other->second.stamp_ns);
+  });
   for (const auto& [number, image] : colour) {
     const auto other = depth.find(number);
     if (other == depth.end()) continue;
-    stamped = stamped && image.stamp_ns && other->second.stamp_ns;
     DatasetPair pair;
-    pair.stamp_ns = image.stamp_ns.value_or(0), pair.depth_stamp_ns = other->second.stamp_ns.value_or(0);
+    pair.stamp_ns = stamped ? *image.stamp_ns : stamp_of_number(number);
+    pair.depth_stamp_ns = stamped ? *other->second.stamp_ns : pair.stamp_ns;
     pair.colour_path = image.path, pair.depth_path = other->second.path;
     dataset.pairs.push_back(std::move(pair));
-    if (!stamped) dataset.pairs.back().stamp_ns = dataset.pairs.back().depth_stamp_ns = stamp_of_number(number);
   }
   if (dataset.pairs.empty())
     throw InputError(folder.string() + ": looks like " + layout +

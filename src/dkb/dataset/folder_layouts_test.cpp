@@ -117,6 +117,16 @@ TEST_F(Layouts, RedwoodIsKnownByItsFoldersAndTakesStampsFromNames) {
   EXPECT_EQ(first_depth(640, 480), 2.0F);
 }
 
+TEST_F(Layouts, OneImageWithoutAStampLeavesAllToTheirNumbers) {
+  colour("image/0000001-000000900000.jpg"), colour("image/0000002-000000933369.jpg"), colour("image/0000060.jpg");
+  depth("depth/0000001-000000900010.png"), depth("depth/0000002-000000933379.png"), depth("depth/0000060.png");
+  const FolderLayout layout = open_folder_layout(folder);
+  EXPECT_EQ(layout.dataset.list, "the layout of Redwood, stamps by number at 30/s");
+  EXPECT_EQ(layout.dataset.pairs[0].stamp, "0.033333");
+  EXPECT_EQ(layout.dataset.pairs[1].depth_stamp, "0.066667");
+  EXPECT_EQ(layout.dataset.pairs[2].stamp, "2.000000");
+}
+
 TEST_F(Layouts, Open3dTellsItsCamera) {
   colour("color/000000.jpg"), depth("depth/000000.png");
   write("camera_intrinsic.json", kOpen3d);
