@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "dkb/dataset/image_codecs.h"
@@ -31,7 +32,33 @@ struct NumberedImage {
 };
 using NumberedImages = std::map<int64_t, NumberedImage>;
 
-// The images of a folder whose names are `before`, a number, and one of the endings; of equal numbers the first name's.
+// What a name tells that is `before`, a number, and one of the endings; nothing of other names.
+struct NumberedName {
+  int64_t number = 0;
+  std::optional<int64_t> stamp_ns;
+};
+std::optional<NumberedName> read_name(const std::string& name, const std::string& before,
+                                      const std::vector<std::string>& endings) {
+  const auto digits = [](const std::string& text, int64_t* value) {
+    return !text.empty() && text.size() <= 15 && text.find_first_not_of("0123456789") == std::string::npos &&
+           parse_number(text, value);
+  };
+  for (const std::string& ending : endings) {
+    if (!name.starts_with(before) || !name.ends_with(ending) || name.size() < before.size() + ending.size()) continue;
+    const std::string middle = name.substr(before.size(), name.size() - before.size() - ending.size());
+    const size_t dash = middle.find('-');
+    NumberedName read;
+    if (!digits(middle.substr(0, dash), &read.number) || read.number > 100'000'000) continue;
+    if (dash == std::string::npos) return read;
+    int64_t microseconds = 0;
+    if (!digits(middle.substr(dash + 1), &microseconds)) continue;
+    read.stamp_ns = microseconds * 1000;
+    return read;
+  }
+  return std::nullopt;
+}
+
+// The images of a folder with such names; of equal numbers the first name's.
 NumberedImages numbered_images(const fs::path& folder, const std::string& before,
                                const std::vector<std::string>& endings) {
   std::vector<fs::path> paths;
@@ -39,28 +66,22 @@ NumberedImages numbered_images(const fs::path& folder, const std::string& before
   for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) paths.push_back(it->path());
   std::sort(paths.begin(), paths.end());
   NumberedImages images;
-  for (const fs::path& path : paths) {
-    const std::string name = path.filename().string();
-    for (const std::string& ending : endings) {
-      if (!name.starts_with(before) || !name.ends_with(ending) || name.size() < before.size() + ending.size()) continue;
-      const std::string middle = name.substr(before.size(), name.size() - before.size() - ending.size());
-      const size_t dash = middle.find('-');
-      const auto digits = [](const std::string& text, int64_t* value) {
-        return !text.empty() && text.size() <= 15 && text.find_first_not_of("0123456789") == std::string::npos &&
-               parse_number(text, value);
-      };
-      int64_t index = 0, microseconds = 0;
-      if (!digits(middle.substr(0, dash), &index) || index > 100'000'000) continue;
-      NumberedImage image{path, std::nullopt};
-      if (dash != std::string::npos) {
-        if (!digits(middle.substr(dash + 1), &microseconds)) continue;
-        image.stamp_ns = microseconds * 1000;
-      }
-      images.emplace(index, std::move(image));
-    }
-  }
+  for (const fs::path& path : paths)
+    if (const auto name = read_name(path.filename().string(), before, endings))
+      images.emplace(name->number, NumberedImage{path, name->stamp_ns});
   return images;
 }
+
+// Whether there is one at all; the first ends the search.
+bool holds_numbered(const fs::path& folder, const std::string& before, const std::vector<std::string>& endings) {
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec))
+    if (read_name(it->path().filename().string(), before, endings)) return true;
+  return false;
+}
+
+const std::vector<std::string> kPictures = {".jpg", ".jpeg", ".png"}, kPng = {".png"};
+const std::vector<std::string> kSevenScenesColour = {".color.png", ".color.jpg"}, kReplicaColour = {".jpg", ".png"};
 
 int64_t stamp_of_number(int64_t number) {
   return ns_from_seconds(static_cast<double>(number) / kRate);
@@ -153,7 +174,7 @@ FolderLayout open_openloris(const fs::path& folder) {
 FolderLayout open_replica(const fs::path& folder) {
   FolderLayout layout;
   const fs::path results = folder / "results";
-  layout.dataset = paired_by_number(folder, "Replica", numbered_images(results, "frame", {".jpg", ".png"}),
+  layout.dataset = paired_by_number(folder, "Replica", numbered_images(results, "frame", kReplicaColour),
                                     numbered_images(results, "depth", {".png"}));
   const fs::path above = fs::absolute(folder / "..").lexically_normal();
   if (const auto file = first_of({folder, results, above}, {"cam_params.json"}))
@@ -161,14 +182,10 @@ FolderLayout open_replica(const fs::path& folder) {
   return layout;
 }
 
-NumberedImages numbered_colour(const fs::path& folder) {
-  return numbered_images(folder, "", {".jpg", ".jpeg", ".png"});
-}
-
 FolderLayout open_redwood(const fs::path& folder, const std::string& colour) {
   FolderLayout layout;
-  layout.dataset = paired_by_number(folder, "Redwood", numbered_colour(folder / colour),
-                                    numbered_images(folder / "depth", "", {".png"}));
+  layout.dataset = paired_by_number(folder, "Redwood", numbered_images(folder / colour, "", kPictures),
+                                    numbered_images(folder / "depth", "", kPng));
   if (const auto file = first_of({folder}, {"camera_intrinsic.json", "intrinsic.json"}))
     layout.camera = {parse_open3d_camera(read_file(*file), file->string()), file->string()};
   else
@@ -210,23 +227,38 @@ FolderLayout open_scannet(const fs::path& folder) {
   return layout;
 }
 
-}  // namespace
+FolderLayout open_seven_scenes(const fs::path& folder) {
+  FolderLayout layout;
+  layout.dataset = paired_by_number(folder, "7-Scenes", numbered_images(folder, "frame-", kSevenScenesColour),
+                                    numbered_images(folder, "frame-", {".depth.png"}));
+  layout.camera = {kinect(585, 320, 240), "of 7-Scenes"};
+  return layout;
+}
 
-FolderLayout open_folder_layout(const fs::path& folder) {
-  if (has_tum_lists(folder)) return open_tum(folder);
-  if (there(folder / "color.txt") && there(folder / "aligned_depth.txt")) return open_openloris(folder);
-  if (const NumberedImages colour = numbered_images(folder, "frame-", {".color.png", ".color.jpg"}); !colour.empty()) {
-    FolderLayout layout;
-    layout.dataset = paired_by_number(folder, "7-Scenes", colour, numbered_images(folder, "frame-", {".depth.png"}));
-    layout.camera = {kinect(585, 320, 240), "of 7-Scenes"};
-    return layout;
-  }
-  if (there(folder / "results")) return open_replica(folder);
-  if (there(folder / "intrinsic" / "intrinsic_color.txt")) return open_scannet(folder);
+// Names that many folders have tell a layout only with its images in them.
+using Opener = std::function<FolderLayout(const fs::path&)>;
+Opener opener_of(const fs::path& folder) {
+  if (has_tum_lists(folder)) return open_tum;
+  if (there(folder / "color.txt") && there(folder / "aligned_depth.txt")) return open_openloris;
+  if (holds_numbered(folder, "frame-", kSevenScenesColour)) return open_seven_scenes;
+  if (holds_numbered(folder / "results", "frame", kReplicaColour)) return open_replica;
+  if (there(folder / "intrinsic" / "intrinsic_color.txt")) return open_scannet;
   if (there(folder / "depth"))
     for (const char* colour : {"color", "image", "rgb"})
-      if (!numbered_colour(folder / colour).empty()) return open_redwood(folder, colour);  // TUM's have stamps
-  return open_tum(folder);
+      if (holds_numbered(folder / colour, "", kPictures))  // TUM's have stamps
+        return [colour](const fs::path& of) { return open_redwood(of, colour); };
+  return nullptr;
+}
+
+}  // namespace
+
+bool has_folder_layout(const fs::path& folder) {
+  return opener_of(folder) != nullptr;
+}
+
+FolderLayout open_folder_layout(const fs::path& folder) {
+  const Opener open = opener_of(folder);
+  return open ? open(folder) : open_tum(folder);
 }
 
 }  // namespace dkb

@@ -27,4 +27,7 @@ struct FolderLayout {
 // fits what TUM's layout lacks.
 FolderLayout open_folder_layout(const std::filesystem::path& folder);
 
+// Whether one of these layouts lies there. A folder `results`, `depth` or `rgb` alone makes none.
+bool has_folder_layout(const std::filesystem::path& folder);
+
 }  // namespace dkb

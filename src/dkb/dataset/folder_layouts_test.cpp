@@ -92,6 +92,19 @@ TEST_F(Layouts, ReplicaTellsItsCameraBesideOrAbove) {
             (folder / "cam_params.json").string() + ": key \"w\" is missing; give --camera FILE or mend the file");
 }
 
+TEST_F(Layouts, AFolderOfResultsMakesNoReplica) {
+  const auto list = [&] { return open_folder_layout(folder).dataset.list; };
+  write("results/trajectory.txt", "");
+  EXPECT_FALSE(has_folder_layout(folder));
+  colour("color/0.jpg"), depth("depth/0.png");
+  EXPECT_EQ(list(), "the layout of Redwood, stamps by number at 30/s");
+  write("intrinsic/intrinsic_color.txt", "58 0 31.5 0\n0 58 23.5 0\n0 0 1 0\n0 0 0 1\n");
+  EXPECT_EQ(list(), "the layout of ScanNet, stamps by number at 30/s");
+  colour("results/frame000000.jpg"), depth("results/depth000000.png");
+  EXPECT_EQ(list(), "the layout of Replica, stamps by number at 30/s");
+  EXPECT_TRUE(has_folder_layout(folder));
+}
+
 TEST_F(Layouts, ScanNetsColourIsBroughtToTheSizeOfItsDepth) {
   colour("color/0.jpg", 130, 97), colour("color/10.jpg", 130, 97), colour("color/2.jpg", 130, 97);
   depth("depth/0.png"), depth("depth/2.png"), depth("depth/10.png");

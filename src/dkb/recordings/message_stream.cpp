@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "dkb/dataset/tum_dataset.h"
+#include "dkb/dataset/folder_layouts.h"
 #include "dkb/recordings/bag_stream.h"
 #include "dkb/recordings/mcap_stream.h"
 #include "dkb/recordings/recorded_topics.h"
@@ -150,11 +150,11 @@ class JoinedStream final : public MessageStream {
 
 bool is_rosbag2(const fs::path& folder) {
   std::error_code error;
-  if (!fs::is_directory(folder, error) || has_tum_lists(folder)) return false;
-  if (fs::exists(folder / "metadata.yaml", error)) return true;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-    if (is_recording(it->path())) return true;
-  return false;
+  if (!fs::is_directory(folder, error)) return false;
+  bool holds_files = fs::exists(folder / "metadata.yaml", error);
+  for (fs::directory_iterator it(folder, error), end; !holds_files && !error && it != end; it.increment(error))
+    holds_files = is_recording(it->path());
+  return holds_files && !has_folder_layout(folder);
 }
 
 std::unique_ptr<MessageStream> open_messages(const fs::path& path) {

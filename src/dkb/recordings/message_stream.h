@@ -47,7 +47,8 @@ class MessageStream {
   virtual std::vector<std::string> take_warnings() = 0;
 };
 
-// Whether a folder is a rosbag2's, by what lies in it.
+// Whether a folder is a rosbag2's, by what lies in it. A sequence in one of the layouts of folders that a recording is
+// kept beside stays that sequence.
 bool is_rosbag2(const std::filesystem::path& folder);
 
 // FILE.bag (ROS 1, version 2.0), FILE.mcap, FILE.db3 or the folder of a rosbag2, told apart by content. Throws

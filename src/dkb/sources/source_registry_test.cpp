@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <vector>
 
 #include "dkb/util/errors.h"
 
@@ -89,6 +90,28 @@ TEST(SourceRegistry, RecordingsAreToldByTheirEndingAndFoldersByWhatLiesInThem) {
   EXPECT_EQ(kind_of(kinds, folder).name, "db3");
   std::ofstream(folder / "rgb.txt") << "";
   EXPECT_EQ(kind_of(kinds, folder).name, "folder") << "a sequence that somebody keeps a recording in";
+  fs::remove_all(folder);
+}
+
+TEST(SourceRegistry, AFolderOfAKnownLayoutStaysOneWhateverLiesInIt) {
+  namespace fs = std::filesystem;
+  const std::vector<SourceKind> kinds = source_kinds();
+  const fs::path folder = fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_source_registry_layouts");
+  const auto is_folder_with = [&](const std::vector<const char*>& files) {
+    fs::remove_all(folder);
+    for (const char* file : files) {
+      fs::create_directories((folder / file).parent_path());
+      std::ofstream(folder / file) << "";
+    }
+    return kind_of(kinds, folder).name == "folder";
+  };
+  EXPECT_TRUE(is_folder_with({"color.txt", "aligned_depth.txt", "metadata.yaml"})) << "OpenLORIS";
+  EXPECT_TRUE(is_folder_with({"frame-000000.color.png", "frame-000000.depth.png", "a.mcap"})) << "7-Scenes";
+  EXPECT_TRUE(is_folder_with({"color/0.jpg", "depth/0.png", "intrinsic/intrinsic_color.txt", "a.db3"})) << "ScanNet";
+  EXPECT_TRUE(is_folder_with({"results/frame000000.jpg", "results/depth000000.png", "metadata.yaml"})) << "Replica";
+  EXPECT_TRUE(is_folder_with({"rgb/000000.jpg", "depth/000000.png", "a.mcap"})) << "Redwood";
+  EXPECT_FALSE(is_folder_with({"metadata.yaml", "x_0.mcap"}));
+  EXPECT_FALSE(is_folder_with({"metadata.yaml", "x_0.mcap", "results/report.html"})) << "a bag with a run's results";
   fs::remove_all(folder);
 }
 
