@@ -29,6 +29,9 @@ constexpr Encoding kEncodings[] = {
     {"rgba8", ImageContent::colour, PixelFormat::rgba8},
     {"bgra8", ImageContent::colour, PixelFormat::bgra8},
     {"mono8", ImageContent::colour, PixelFormat::grey8},
+    {"8UC1", ImageContent::colour, PixelFormat::grey8},
+    {"8UC3", ImageContent::colour, PixelFormat::bgr8},  // OpenCV's, whose order is blue first
+    {"8UC4", ImageContent::colour, PixelFormat::bgra8},
     {"bayer_rggb8", ImageContent::colour, PixelFormat::grey8},
     {"bayer_bggr8", ImageContent::colour, PixelFormat::grey8},
     {"bayer_gbrg8", ImageContent::colour, PixelFormat::grey8},

@@ -57,6 +57,7 @@ TEST(RecordedImage, ColourIsThatOfAFileInWhateverWayItIsStored) {
       {"rgb8", laid_out(image, 3, false, 0)},  {"bgr8", laid_out(image, 3, true, 0)},
       {"rgba8", laid_out(image, 4, false, 0)}, {"bgra8", laid_out(image, 4, true, 0)},
       {"rgb8", laid_out(image, 3, false, 11)}, {"bgra8", laid_out(image, 4, true, 3)},
+      {"8UC3", laid_out(image, 3, true, 0)},   {"8UC4", laid_out(image, 4, true, 0)},
   };
   for (const auto& [encoding, data] : stored) {
     const std::string bytes = raw(encoding, data);
@@ -74,10 +75,12 @@ TEST(RecordedImage, ColourIsThatOfAFileInWhateverWayItIsStored) {
 TEST(RecordedImage, GreyHasNoColour) {
   GreyImage grey(kWidth, kHeight);
   for (size_t i = 0; i < grey.size(); ++i) grey.data()[i] = static_cast<uint8_t>(i);
-  const std::string bytes = raw("mono8", {reinterpret_cast<const char*>(grey.data()), grey.size()});
-  const Picture picture = picture_of(read_raw(bytes));
-  EXPECT_EQ(picture.grey, grey);
-  EXPECT_TRUE(picture.colour.empty());
+  for (const char* encoding : {"mono8", "8UC1"}) {
+    const std::string bytes = raw(encoding, {reinterpret_cast<const char*>(grey.data()), grey.size()});
+    const Picture picture = picture_of(read_raw(bytes));
+    EXPECT_EQ(picture.grey, grey);
+    EXPECT_TRUE(picture.colour.empty());
+  }
 }
 
 TEST(RecordedImage, DepthIsThatOfAFileInWhateverWayItIsStored) {

@@ -55,6 +55,9 @@ class Chooser {
       all.push_back(&topic);
       if (topic.content == content && (picked.empty() || topic.name == picked)) fitting.push_back(&topic);
     }
+    // 8UC1 and the like do not say what they show, which may be infrared or a mask: only where nothing else is there.
+    const auto untold = [](const RecordedImageTopic* topic) { return topic->encoding.starts_with("8UC"); };
+    if (picked.empty() && !std::all_of(fitting.begin(), fitting.end(), untold)) std::erase_if(fitting, untold);
     const std::string there = all.empty() ? "no images at all" : "images on " + listed(all);
     if (!picked.empty() && fitting.empty())
       throw InputError(option + " " + picked + ": " + name_ + " has no " + kind + " images there; it has " + there);
