@@ -10,6 +10,7 @@
 #include <set>
 
 #include "dkb/map/point_cloud.h"
+#include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
 
@@ -22,7 +23,8 @@ std::string camera_line(const Camera& c) {
   const std::string start =
       fmt::format("{} {} {} {} {} {}", c.width, c.height, c.fx, c.fy, c.cx + kCorner, c.cy + kCorner);
   if (!c.distorted()) return "1 PINHOLE " + start + "\n";
-  return fmt::format("1 FULL_OPENCV {} {} {} {} {} {} 0 0 0\n", start, c.k1, c.k2, c.p1, c.p2, c.k3);
+  return fmt::format("1 FULL_OPENCV {} {} {} {} {} {} {} {} {}\n", start, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5,
+                     c.k6);
 }
 
 // [px] RMS of the distances between where the keyframes saw the point and where they should have.
@@ -91,6 +93,8 @@ void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes,
 void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyframes, bool has_masks,
                       const std::filesystem::path& folder) {
   const Camera& c = file.context.camera;
+  if (c.rational())
+    throw InputError("--format nerfstudio: has no cameras with rational distortion (k4, k5, k6); give --format colmap");
   nlohmann::ordered_json model;
   model["camera_model"] = "OPENCV";
   model["w"] = c.width, model["h"] = c.height;

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dkb_slam/version.h"
 
@@ -37,8 +38,9 @@ struct Rigid3 {
   }
 };
 
-/// Pinhole camera with Brown-Conrady distortion, and the depth format that comes with it. Camera axes: x right, y down,
-/// z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the colour camera.
+/// Pinhole camera with distortion (Brown-Conrady, or OpenCV's rational model), and the depth format that comes with it.
+/// Camera axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the
+/// colour camera.
 struct DKB_SLAM_API Camera {
   int width = 640;                           ///< [px] 16 ... 16384
   int height = 480;                          ///< [px] likewise
@@ -46,6 +48,7 @@ struct DKB_SLAM_API Camera {
   double cx = 319.5, cy = 239.5;             ///< [px]
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0;     ///< radial k, tangential p, in OpenCV's order k1 k2 p1 p2 k3
   double k3 = 0;                             ///< the third radial coefficient
+  double k4 = 0, k5 = 0, k6 = 0;             ///< of the rational model: the radial polynomial is divided by theirs
   double depth_factor = 5000.0;              ///< [units per metre] of integer depth images, > 0
   double fps = 0;                            ///< [1/s] nominal frame rate; 0 = as the first five stamps say
   double readout = 0.0;                      ///< [s] rolling shutter, first to last row's exposure; 0 = unknown or none
@@ -57,12 +60,18 @@ struct DKB_SLAM_API Camera {
   /// Reads a camera file: a YAML map of the fields above; fx, fy, cx, cy, width, height and depth_factor are required.
   /// Throws InputError with file and line.
   static Camera load(const std::filesystem::path& path);
-  /// The camera file's text, every field with its unit.
+  /// The camera file's text, every field with its unit; k4, k5, k6 where they are not all 0.
   std::string to_yaml() const;
   /// Throws InvalidOption naming the field.
   void check() const;
 
-  bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  /// Takes the distortion as a CameraInfo of ROS tells it: plumb_bob (k1 k2 p1 p2, and k3), which an empty name stands
+  /// for too, or rational_polynomial (k1 k2 p1 p2 k3 k4 k5 k6; zeros may follow). Without coefficients,
+  /// or with zeros alone, there is none, whatever the model. Set the other fields first. Throws InputError for other
+  /// models, and for a rational one that shows no ray in some part of the image; the camera is as it was then.
+  void set_distortion(const std::string& model, const std::vector<double>& coefficients);
+  bool rational() const { return k4 != 0 || k5 != 0 || k6 != 0; }  ///< more than Brown-Conrady
+  bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0 || rational(); }
   /// Ideal (undistorted) pixel of a point in front of the camera; point_in_cam.z() must not be 0.
   Eigen::Vector2d project(const Eigen::Vector3d& point_in_cam) const {
     return {fx * point_in_cam.x() / point_in_cam.z() + cx, fy * point_in_cam.y() / point_in_cam.z() + cy};

@@ -28,6 +28,9 @@ constexpr Field kFields[] = {
     {"p1", &Camera::p1, nullptr, false},
     {"p2", &Camera::p2, nullptr, false},
     {"k3", &Camera::k3, nullptr, false},
+    {"k4", &Camera::k4, nullptr, false},
+    {"k5", &Camera::k5, nullptr, false},
+    {"k6", &Camera::k6, nullptr, false},
     {"fps", &Camera::fps, nullptr, false},
     {"readout", &Camera::readout, nullptr, false},
     {"depth_min", &Camera::depth_min, nullptr, false},
@@ -77,12 +80,12 @@ std::string camera_repr(const Camera& camera) {
 void bind_camera(py::module_& module) {
   py::class_<Camera> camera(module, "Camera", R"(Camera(*, width, height, fx, fy, cx, cy, depth_factor, **optional)
 
-Pinhole camera with Brown-Conrady distortion, and the depth format that comes with it. Immutable.
+Pinhole camera with distortion (Brown-Conrady, or OpenCV's rational model), and the depth format that comes with it. Immutable.
 
 Axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the colour camera.
 
 width, height: [px]; fx, fy, cx, cy: [px]; depth_factor: [units per metre] of integer depth images.
-Optional: k1, k2, p1, p2, k3 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
+Optional: k1, k2, p1, p2, k3, k4, k5, k6 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
 readout [s] of a rolling shutter (0 = unknown or none), depth_min, depth_max [m] (depth outside is taken for missing).
 
 Raises InputError naming the field that is missing, unknown or out of range.)");

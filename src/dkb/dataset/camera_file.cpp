@@ -17,7 +17,8 @@ namespace {
 const std::vector<std::string> kRequired{"fx", "fy", "cx", "cy", "width", "height", "depth_factor"};
 const std::vector<std::string> kBuiltin{"fr1", "fr2", "fr3", "bonn"};
 
-void bind(Settings* settings, CameraModel* c) {
+// Files of other cameras than rational ones are as they were before there were these.
+void bind(Settings* settings, CameraModel* c, bool rational = true) {
   settings->bind("width", &c->width, "[px]");
   settings->bind("height", &c->height, "[px]");
   settings->bind("fx", &c->fx, "[px] focal lengths");
@@ -27,6 +28,11 @@ void bind(Settings* settings, CameraModel* c) {
   settings->bind("k1", &c->k1, "[1] radial distortion (Brown-Conrady)");
   settings->bind("k2", &c->k2, "[1]");
   settings->bind("k3", &c->k3, "[1]");
+  if (rational) {
+    settings->bind("k4", &c->k4, "[1] of the rational model: the radial polynomial is divided by 1 + k4 r^2 + ...");
+    settings->bind("k5", &c->k5, "[1]");
+    settings->bind("k6", &c->k6, "[1]");
+  }
   settings->bind("p1", &c->p1, "[1] tangential distortion");
   settings->bind("p2", &c->p2, "[1]");
   settings->bind("depth_factor", &c->depth_factor, "[units per metre] of integer depth images");
@@ -100,7 +106,7 @@ Camera Camera::load(const fs::path& path) {
 std::string Camera::to_yaml() const {
   Camera copy = *this;
   Settings settings;
-  bind(&settings, &copy);
+  bind(&settings, &copy, copy.rational());
   return settings.to_yaml();
 }
 

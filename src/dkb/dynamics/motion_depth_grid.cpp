@@ -64,6 +64,8 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
   fx_ = static_cast<float>(camera.fx) / scale, fy_ = static_cast<float>(camera.fy) / scale;
   cx_ = (static_cast<float>(camera.cx) + 0.5f) / scale, cy_ = (static_cast<float>(camera.cy) + 0.5f) / scale;
   k1_ = static_cast<float>(camera.k1), k2_ = static_cast<float>(camera.k2), k3_ = static_cast<float>(camera.k3);
+  k4_ = static_cast<float>(camera.k4), k5_ = static_cast<float>(camera.k5), k6_ = static_cast<float>(camera.k6);
+  rational_ = camera.rational();
   p1_ = static_cast<float>(camera.p1), p2_ = static_cast<float>(camera.p2);
   x_.reserve(static_cast<size_t>(width_) * static_cast<size_t>(height_));
   y_.reserve(x_.capacity());
@@ -79,10 +81,17 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
   r2_max_ *= 1.02f;  // far outside the image the distortion polynomial folds back
 }
 
-// By Brown's model, at depth 1; r2 = a^2 + b^2.
-DKB_KERNEL_BODY static inline void distort(float a, float b, float r2, float k1, float k2, float k3, float p1, float p2,
-                                           float* u, float* v) {
-  const float radial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
+// The factor that moves a point outwards by its squared distance from the axis.
+template <bool rational>
+DKB_KERNEL_BODY static inline float radial_of(float r2, float k1, float k2, float k3, float k4, float k5, float k6) {
+  const float polynomial = 1.0f + r2 * (k1 + r2 * (k2 + r2 * k3));
+  if constexpr (rational) return polynomial / (1.0f + r2 * (k4 + r2 * (k5 + r2 * k6)));
+  return polynomial;
+}
+
+// At depth 1; r2 = a^2 + b^2.
+DKB_KERNEL_BODY static inline void distort(float a, float b, float r2, float radial, float p1, float p2, float* u,
+                                           float* v) {
   *u = a * radial + 2.0f * p1 * a * b + p2 * (r2 + 2.0f * a * a);
   *v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
 }
@@ -92,7 +101,9 @@ bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
   const float a = point.x() / point.z(), b = point.y() / point.z(), r2 = a * a + b * b;
   if (!(r2 <= r2_max_)) return false;
   float u = 0, v = 0;
-  distort(a, b, r2, k1_, k2_, k3_, p1_, p2_, &u, &v);
+  const float radial = rational_ ? radial_of<true>(r2, k1_, k2_, k3_, k4_, k5_, k6_)
+                                 : radial_of<false>(r2, k1_, k2_, k3_, k4_, k5_, k6_);
+  distort(a, b, r2, radial, p1_, p2_, &u, &v);
   u = fx_ * u + cx_, v = fy_ * v + cy_;
   if (!(u >= 0 && v >= 0 && u < static_cast<float>(width_) && v < static_cast<float>(height_))) return false;
   *x = static_cast<int>(u), *y = static_cast<int>(v);
@@ -101,11 +112,19 @@ bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
 
 void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
                          MotionProjection& result, Simd simd) const {
+  rational_ ? project_by<true>(depth, missing, there_from_here, range, result, simd)
+            : project_by<false>(depth, missing, there_from_here, range, result, simd);
+}
+
+template <bool rational>
+void MotionRays::project_by(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
+                            MotionProjection& result, Simd simd) const {
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
   const float r20 = r(2, 0), r21 = r(2, 1), r22 = r(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
   const float fx = fx_, fy = fy_, cx = cx_ + 1.0f, cy = cy_ + 1.0f, k1 = k1_, k2 = k2_, k3 = k3_, p1 = p1_, p2 = p2_;
+  const float k4 = k4_, k5 = k5_, k6 = k6_;
   const float r2_max = r2_max_, right = static_cast<float>(width_) + 1.0f, bottom = static_cast<float>(height_) + 1.0f;
   const int32_t width = width_, height = height_;
   const size_t count = range.count;
@@ -125,7 +144,7 @@ void MotionRays::project(const Image<float>& depth, float missing, const Rigid3&
       const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
       const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
       float u, v;
-      distort(a, b, r2, k1, k2, k3, p1, p2, &u, &v);
+      distort(a, b, r2, radial_of<rational>(r2, k1, k2, k3, k4, k5, k6), p1, p2, &u, &v);
       const int32_t ix = static_cast<int32_t>(std::min(std::max(fx * u + cx, 0.0f), right)) - 1;
       const int32_t iy = static_cast<int32_t>(std::min(std::max(fy * v + cy, 0.0f), bottom)) - 1;
       const bool seen = (pz > kMinDepth) & (r2 <= r2_max) & (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height);

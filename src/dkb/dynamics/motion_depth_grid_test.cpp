@@ -21,8 +21,7 @@ TEST(MotionRays, ProjectEveryCellOntoItselfUnderNoMotion) {
   }
 }
 
-TEST(MotionRays, AgreeWithTheCameraModel) {
-  const CameraModel camera = *builtin_camera("fr1");
+void expect_agreement(const CameraModel& camera) {
   const MotionRays rays(camera, 4);
   const Rigid3 motion(rotation_from_vector({0.05, -0.1, 0.2}), {0.1, -0.05, -0.3});
   const Image<float> depth(rays.width(), rays.height(), 1.5f);
@@ -42,6 +41,14 @@ TEST(MotionRays, AgreeWithTheCameraModel) {
     }
   EXPECT_GT(seen, 10000);
   EXPECT_LT(different, 10);  // positions on the very edge between two cells
+}
+
+TEST(MotionRays, AgreeWithTheCameraModel) {
+  CameraModel rational;
+  rational.fx = rational.fy = 303;
+  rational.set_distortion("rational_polynomial", {0.5, -2.6, 0.0007, -0.0002, 1.5, 0.38, -2.45, 1.43});
+  expect_agreement(*builtin_camera("fr1"));
+  expect_agreement(rational);
 }
 
 TEST(MotionRays, SeeNothingBehindTheCamera) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/geometry/camera.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
@@ -27,6 +29,9 @@ void CameraModel::check() const {
   require_option(std::isfinite(p1), "p1", p1, "finite");
   require_option(std::isfinite(p2), "p2", p2, "finite");
   require_option(std::isfinite(k3), "k3", k3, "finite");
+  require_option(std::isfinite(k4), "k4", k4, "finite");
+  require_option(std::isfinite(k5), "k5", k5, "finite");
+  require_option(std::isfinite(k6), "k6", k6, "finite");
   require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
                  "greater than 0 units per metre");
   require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
@@ -38,14 +43,44 @@ void CameraModel::check() const {
 Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& ideal_pixel) const {
   const double x = (ideal_pixel.x() - cx) / fx, y = (ideal_pixel.y() - cy) / fy;
   const double r2 = x * x + y * y;
-  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  if (rational()) radial /= 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
   const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
   const double yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
   return {fx * xd + cx, fy * yd + cy};
 }
 
+namespace {
+
+// The rational model turned round by Newton's method: its factor is steep towards the corners of a wide lens, where the
+// iteration that serves Brown's model is slow. Nothing where that does not settle.
+std::optional<Eigen::Vector2d> rational_ideal(const CameraModel& c, const Eigen::Vector2d& image_pixel) {
+  Eigen::Vector2d at((image_pixel.x() - c.cx) / c.fx, (image_pixel.y() - c.cy) / c.fy);
+  const auto pixel_of = [&] { return Eigen::Vector2d(c.fx * at.x() + c.cx, c.fy * at.y() + c.cy); };
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector2d off = image_pixel - c.distort(pixel_of());  // [px]
+    if (off.norm() < 1e-9) return pixel_of();
+    const double x = at.x(), y = at.y(), r2 = at.squaredNorm();
+    const double above = 1 + r2 * (c.k1 + r2 * (c.k2 + r2 * c.k3)), below = 1 + r2 * (c.k4 + r2 * (c.k5 + r2 * c.k6));
+    const double above_slope = c.k1 + r2 * (2 * c.k2 + r2 * 3 * c.k3);
+    const double below_slope = c.k4 + r2 * (2 * c.k5 + r2 * 3 * c.k6);
+    const double radial = above / below, slope = (above_slope - radial * below_slope) / below;
+    Eigen::Matrix2d jacobian;
+    const double mixed = 2 * (slope * x * y + c.p1 * x + c.p2 * y);
+    jacobian << radial + 2 * slope * x * x + 2 * c.p1 * y + 6 * c.p2 * x, mixed, mixed,
+        radial + 2 * slope * y * y + 6 * c.p1 * y + 2 * c.p2 * x;
+    if (!(jacobian.determinant() > 1e-6)) return std::nullopt;
+    at += jacobian.inverse() * Eigen::Vector2d(off.x() / c.fx, off.y() / c.fy);
+  }
+  if (!((image_pixel - c.distort(pixel_of())).norm() < 1e-6)) return std::nullopt;
+  return pixel_of();
+}
+
+}  // namespace
+
 Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const {
   if (!distorted()) return image_pixel;
+  if (rational()) return rational_ideal(*this, image_pixel).value_or(image_pixel);
   const double xd = (image_pixel.x() - cx) / fx, yd = (image_pixel.y() - cy) / fy;
   double x = xd, y = yd;
   for (int i = 0; i < 20; ++i) {
@@ -64,9 +99,23 @@ Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const
 
 namespace {
 
+// The same of the rational model, whose slope is a ratio of longer polynomials: by steps, which no lens folds between.
+bool rational_unfolded(const CameraModel& c, double u) {
+  constexpr int kSteps = 24;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double at = u * i / kSteps;
+    const double above = 1 + at * (c.k1 + at * (c.k2 + at * c.k3)), below = 1 + at * (c.k4 + at * (c.k5 + at * c.k6));
+    const double above_slope = c.k1 + at * (2 * c.k2 + at * 3 * c.k3);
+    const double below_slope = c.k4 + at * (2 * c.k5 + at * 3 * c.k6);
+    if (!(below > 0 && above * below + 2 * at * (above_slope * below - above * below_slope) > 0)) return false;
+  }
+  return true;
+}
+
 // Whether the image moves outwards with a ray all the way from the axis to a squared tangent u of its angle: the slope
 // 1 + 3 k1 u + 5 k2 u^2 + 7 k3 u^3 of the radial polynomial is positive there and where it is least before.
 bool unfolded(const CameraModel& c, double u) {
+  if (c.rational()) return rational_unfolded(c, u);
   const auto slope = [&](double at) { return 1 + at * (3 * c.k1 + at * (5 * c.k2 + at * 7 * c.k3)); };
   if (!(slope(u) > 0)) return false;
   const double root = 25 * c.k2 * c.k2 - 63 * c.k1 * c.k3;  // of a quarter of the discriminant of its derivative
@@ -85,6 +134,37 @@ std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eige
   if (!camera.distorted()) return ideal;
   if (!unfolded(camera, (point.head<2>() / point.z()).squaredNorm())) return std::nullopt;
   return camera.distort(ideal);
+}
+
+void CameraModel::set_distortion(const std::string& model, const std::vector<double>& coefficients) {
+  CameraModel made = *this;
+  double* const fields[] = {&made.k1, &made.k2, &made.p1, &made.p2, &made.k3, &made.k4, &made.k5, &made.k6};
+  for (double* field : fields) *field = 0;
+  const auto all_zero = [&](size_t first) {
+    return std::all_of(coefficients.begin() + static_cast<std::ptrdiff_t>(std::min(first, coefficients.size())),
+                       coefficients.end(), [](double d) { return d == 0; });
+  };
+  if (!all_zero(0)) {
+    const bool rational_named = model == "rational_polynomial";
+    if (!rational_named && !model.empty() && model != "plumb_bob")
+      throw InputError("its distortion model " + model + " is none of ours (plumb_bob, rational_polynomial)");
+    const size_t most = rational_named ? 8 : 5;
+    if (coefficients.size() < 4 || !all_zero(most))
+      throw InputError(std::to_string(coefficients.size()) + " coefficients of distortion, 4 to " +
+                       std::to_string(most) + " expected");
+    for (size_t i = 0; i < std::min(most, coefficients.size()); ++i) *fields[i] = coefficients[i];
+    // A ratio has poles: a calibration that puts one into the image would show walls where there are none.
+    constexpr int kGrid = 16;
+    for (int i = 0; made.rational() && i <= kGrid * kGrid + 2 * kGrid; ++i) {
+      const Eigen::Vector2d pixel(i % (kGrid + 1) * (width - 1.0) / kGrid, i / (kGrid + 1) * (height - 1.0) / kGrid);
+      const std::optional<Eigen::Vector2d> ideal = rational_ideal(made, pixel);
+      if (!ideal || !unfolded(made, Eigen::Vector2d((ideal->x() - cx) / fx, (ideal->y() - cy) / fy).squaredNorm()))
+        throw InputError("its coefficients of distortion show no ray at pixel " +
+                         std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y())) +
+                         ", so they are of no lens");
+    }
+  }
+  *this = made;
 }
 
 std::optional<CameraModel> builtin_camera(const std::string& name) {

@@ -150,6 +150,87 @@ TEST(CameraModel, ImageGrowsOutwardsWhereASearchSaysSo) {
   EXPECT_LT(folded, 1800);
 }
 
+// As the driver of Azure Kinect tells its colour camera.
+CameraModel azure_kinect() {
+  CameraModel c;
+  c.width = 1280, c.height = 720, c.fx = c.fy = 606, c.cx = 639, c.cy = 365;
+  c.set_distortion("rational_polynomial", {0.5, -2.6, 0.0007, -0.0002, 1.5, 0.38, -2.45, 1.43});
+  return c;
+}
+
+TEST(RationalDistortion, DistortsByHandComputedNumbers) {
+  CameraModel c;
+  c.fx = c.fy = 100, c.cx = c.cy = 50, c.width = c.height = 100;
+  c.set_distortion("rational_polynomial", {0.5, 0, 0.01, 0.02, 0, 0.2, 0, 1, 0, 0, 0, 0});
+  // x = 0.5, y = 0.2, r2 = 0.29: 1.145 / (1 + 0.058 + 0.024389) = 1.0578451...
+  const double radial = 1.145 / 1.082389;
+  const Eigen::Vector2d d = c.distort({100, 70});
+  EXPECT_NEAR(d.x(), 50 + 100 * (0.5 * radial + 2 * 0.01 * 0.1 + 0.02 * (0.29 + 0.5)), 1e-9);
+  EXPECT_NEAR(d.y(), 50 + 100 * (0.2 * radial + 0.01 * (0.29 + 0.08) + 2 * 0.02 * 0.1), 1e-9);
+}
+
+TEST(RationalDistortion, UndistortInvertsItOverTheWholeImage) {
+  const CameraModel c = azure_kinect();
+  for (int y = 0; y < c.height; y += 9)
+    for (int x = 0; x < c.width; x += 9) {
+      const Eigen::Vector2d pixel(x, y), ideal = c.undistort(pixel);
+      EXPECT_NEAR((c.distort(ideal) - pixel).norm(), 0, 1e-6) << x << " " << y;
+      const auto seen = image_pixel(c, c.unproject(ideal, 2));
+      ASSERT_TRUE(seen) << x << " " << y;
+      EXPECT_NEAR((*seen - pixel).norm(), 0, 1e-6);
+    }
+}
+
+TEST(RationalDistortion, ImageGrowsOutwardsWhereASearchSaysSo) {
+  Random random(6);
+  int folded = 0, grown = 0;
+  for (int i = 0; i < 2000; ++i) {
+    CameraModel c;
+    for (double* k : {&c.k1, &c.k2, &c.k3, &c.k4, &c.k5, &c.k6}) *k = random.uniform(-0.5, 0.5);
+    const double tangent = random.uniform(0.1, 1.5);
+    const auto below = [&](double u) { return 1 + u * (c.k4 + u * (c.k5 + u * c.k6)); };
+    const auto radius = [&](double t) {
+      const double u = t * t;
+      return t * (1 + u * (c.k1 + u * (c.k2 + u * c.k3))) / below(u);
+    };
+    double least = 1;
+    for (int k = 0; k < 2000; ++k) {
+      const double t = tangent * k / 2000, next = tangent * (k + 1) / 2000;
+      least = std::min({least, (radius(next) - radius(t)) / (next - t), below(next * next)});
+    }
+    if (std::abs(least) < 0.03) continue;  // too near to tell by steps
+    (least < 0 ? folded : grown) += 1;
+    EXPECT_EQ(image_pixel(c, {0, tangent, 1}).has_value(), least > 0) << i;
+  }
+  EXPECT_GT(folded, 200);
+  EXPECT_GT(grown, 200);
+}
+
+TEST(RationalDistortion, WhatIsOfNoLensIsRefusedAndTheCameraIsAsItWas) {
+  CameraModel c = azure_kinect();
+  const auto refused = [&](const std::string& model, const std::vector<double>& coefficients) -> std::string {
+    try {
+      c.set_distortion(model, coefficients);
+    } catch (const InputError& e) {
+      EXPECT_EQ(c.k4, 0.38);
+      return e.what();
+    }
+    return "taken";
+  };
+  // The divisor is 0 at a tangent of 0.58, and so 350 px from the middle.
+  EXPECT_EQ(refused("rational_polynomial", {0, 0, 0, 0, 0, -3, 0, 0}),
+            "its coefficients of distortion show no ray at pixel 0 0, so they are of no lens");
+  EXPECT_EQ(refused("equidistant", {0.1, 0, 0, 0}),
+            "its distortion model equidistant is none of ours (plumb_bob, rational_polynomial)");
+  EXPECT_EQ(refused("plumb_bob", {0.1, 0, 0, 0, 0, 0.1}), "6 coefficients of distortion, 4 to 5 expected");
+  EXPECT_EQ(refused("rational_polynomial", {0.1}), "1 coefficients of distortion, 4 to 8 expected");
+  EXPECT_EQ(refused("", {0.1, 0.2, 0.3, 0.4}), "taken");
+  EXPECT_EQ(c.p2, 0.4);
+  EXPECT_FALSE(c.rational());
+  c.set_distortion("equidistant", {0, 0, 0, 0});
+  EXPECT_FALSE(c.distorted());
+}
+
 TEST(CameraModel, CheckNamesTheFieldThatIsWrong) {
   CameraModel c;
   c.fx = -1;

@@ -7,7 +7,7 @@
 //   section  tag (4 letters), length u64 of the content, CRC-32C u32 of tag, length and content, content
 //
 //   HEAD  camera: width, height u32; fx fy cx cy k1 k2 p1 p2 k3 depth_factor fps depth_min depth_max readout f64
-//         pyramid: scale_factor f64, levels u32
+//         pyramid: scale_factor f64, levels u32; of cameras with rational distortion then k4 k5 k6 f64
 //   KEYF  count varint, then per keyframe: culled u8, frame i32, timestamp f64, parent i32,
 //         cam_from_world 7 x f64 (quaternion x y z w, translation);
 //         culled: cam_from_parent 7 x f64;
@@ -147,7 +147,9 @@ MapFile load_map(const std::filesystem::path& path) {
 }
 
 void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
-  const auto numbers = [](const Camera& c) { return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3}; };
+  const auto numbers = [](const Camera& c) {
+    return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6};
+  };
   const auto text = [](const Camera& c) {
     return fmt::format("{}x{} fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
   };

@@ -164,6 +164,18 @@ TEST(MapFile, KeepsTheContext) {
   EXPECT_EQ(loaded.camera.width, 640);
 }
 
+TEST(MapFile, KeepsRationalDistortionWhereThereIsSome) {
+  MapFileContext context = fr1_context();
+  const size_t size = encode_map(Map(), context).size();
+  context.camera.k4 = 0.1, context.camera.k6 = 0.2;
+  const std::string bytes = encode_map(Map(), context);
+  EXPECT_EQ(bytes.size(), size + 3 * 8) << "others are as they were";
+  const MapFileContext loaded = decode_map(bytes, "a.dkb").context;
+  EXPECT_EQ(loaded.camera.k4, 0.1);
+  EXPECT_EQ(loaded.camera.k5, 0);
+  EXPECT_EQ(loaded.camera.k6, 0.2);
+}
+
 TEST(MapFile, TheEmptyMapIsAMap) {
   const MapFile loaded = decode_map(encode_map(Map(), fr1_context()), "a.dkb");
   EXPECT_EQ(loaded.map.keyframe_count(), 0);

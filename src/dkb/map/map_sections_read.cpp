@@ -83,6 +83,8 @@ MapFileContext read_head(std::string_view bytes) {
     *v = in.f64();
   context.scale_factor = in.f64();
   context.levels = narrow<int>(in, in.u32());
+  if (in.left() > 0)
+    for (double* v : {&c.k4, &c.k5, &c.k6}) *v = in.f64();
   in.expect_end();
   context.check();
   return context;

@@ -71,6 +71,8 @@ std::string head_section(const MapFileContext& context) {
     out.f64(v);
   out.f64(context.scale_factor);
   out.u32(static_cast<uint32_t>(context.levels));
+  if (c.rational())
+    for (double v : {c.k4, c.k5, c.k6}) out.f64(v);
   return out.bytes();
 }
 

@@ -192,8 +192,9 @@ class RecordingPairWriter final : public PairWriter {
     CameraInfoMessage info;
     info.header = header(stamp_ns);
     info.height = static_cast<uint32_t>(c.height), info.width = static_cast<uint32_t>(c.width);
-    info.distortion_model = "plumb_bob";
+    info.distortion_model = c.rational() ? "rational_polynomial" : "plumb_bob";
     info.d = {c.k1, c.k2, c.p1, c.p2, c.k3};
+    if (c.rational()) info.d.insert(info.d.end(), {c.k4, c.k5, c.k6});
     info.k = {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
     info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     info.p = {c.fx, 0, c.cx, 0, 0, c.fy, c.cy, 0, 0, 0, 1, 0};

@@ -8,8 +8,8 @@
 
 namespace dkb {
 
-// The camera that a CameraInfo describes: without distortion where the images are rectified. Distortion must be
-// plumb_bob, or a model that equals it with the numbers given. Throws InputError, which begins with `name` and tells
+// The camera that a CameraInfo describes: without distortion where the images are rectified. Of models of
+// distortion those of Camera::set_distortion() are known. Throws InputError, which begins with `name` and tells
 // the remedy, for other models and for cameras that were not calibrated.
 Camera camera_of(const CameraInfoMessage& info, bool rectified, const std::string& name);
 

@@ -127,13 +127,18 @@ TEST(RecordedCamera, OtherModelsOfDistortionAreRefusedByName) {
   CameraInfoMessage info = info_message(small_camera());
   info.distortion_model = "equidistant", info.d = {0.1, 0, 0, 0};
   EXPECT_EQ(input_error_of([&] { camera_of(info, false, "/info"); }),
-            "/info: its distortion model equidistant is none of ours (plumb_bob); give the camera with --camera FILE, "
+            "/info: its distortion model equidistant is none of ours (plumb_bob, rational_polynomial); give the camera "
+            "with --camera FILE, "
             "or rectified images");
   EXPECT_FALSE(camera_of(info, true, "/info").distorted()) << "rectified images have no distortion";
   info.distortion_model = "rational_polynomial", info.d = {0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0};
   EXPECT_EQ(camera_of(info, false, "/info").k3, 0.5);
-  info.d[6] = 0.1;
-  EXPECT_NE(input_error_of([&] { camera_of(info, false, "/info"); }).find("rational_polynomial is none"),
+  info.d = {0.5, -2.6, 0.0007, -0.0002, 1.5, 0.38, -2.45, 1.43};  // Azure Kinect's
+  EXPECT_EQ(camera_of(info, false, "/info").k6, 1.43);
+  info.d[5] = -20;
+  EXPECT_NE(input_error_of([&] {
+              camera_of(info, false, "/info");
+            }).find("/info: its coefficients of distortion show no ray at pixel 0 0, so they are of no lens; give"),
             std::string::npos);
   info.distortion_model = "";
   info.d = {0.1, 0.2, 0.3, 0.4};
