@@ -91,6 +91,9 @@ void DeviceSource::add(DeviceImage image, bool is_depth) {
   image.stamp_ns += shift_ns_;
   if (is_stamp(image.stamp_ns)) last_stamp_ = std::max(last_stamp_, image.stamp_ns);
   pairs_.add(image, is_depth);
+  if (!pairs_.behind()) return;
+  pairs_.restart();  // as when it was unplugged: the clock starts anew, and stamps go on rising
+  gone_since_ = std::chrono::steady_clock::now();
 }
 
 std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {

@@ -105,6 +105,34 @@ TEST(ImagePairs, StampsBeyondAllTimesAreLeftOut) {
   EXPECT_EQ(pairs.late(), 6);
 }
 
+TEST(ImagePairs, OneStampFarAheadCostsTenImages) {
+  for (const bool both : {false, true}) {
+    Steps steps;
+    for (int n = 0; n < 40; ++n) {
+      const int64_t stamp = 100 + 33 * n, wrong = 3'600'000;
+      add_pair(&steps, n == 5 ? wrong : stamp, n == 5 && both ? wrong : stamp);
+    }
+    DeviceSource source(std::make_unique<ScriptedDevice>(steps), small_camera(), {});
+    const Stamps stamps = stamps_of(source);
+    // The first colour image after them comes before the depth image that would be its partner counts.
+    ASSERT_EQ(stamps.size(), both ? 29U : 30U);
+    EXPECT_EQ(stamps[4], 100 + 33 * 4);
+    EXPECT_EQ(stamps[5], 100 + 33 * (both ? 16 : 15));
+    EXPECT_EQ(source.counts().late, both ? 18 : 9);
+  }
+}
+
+TEST(DeviceSource, GoesOnAfterAClockThatIsSetBack) {
+  Steps steps;
+  for (int n = 0; n < 20; ++n) add_pair(&steps, 100'000 + 33 * n, 100'000 + 33 * n);
+  for (int n = 0; n < 40; ++n) add_pair(&steps, 100 + 33 * n, 100 + 33 * n);
+  DeviceSource source(std::make_unique<ScriptedDevice>(steps), small_camera(), {});
+  const Stamps stamps = stamps_of(source);
+  ASSERT_GE(stamps.size(), 48U);
+  for (size_t i = 1; i < stamps.size(); ++i) EXPECT_GT(stamps[i], stamps[i - 1]);
+  EXPECT_EQ(stamps.back() - stamps[stamps.size() - 2], 33);
+}
+
 TEST(ImagePairs, RandomArrivalsGiveRisingPairsWithinTheLimit) {
   Random random(3);
   ImagePairs pairs;

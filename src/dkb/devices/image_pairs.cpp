@@ -12,6 +12,7 @@
 namespace dkb {
 namespace {
 
+constexpr int64_t kFarAhead = 2 * kNsPerSecond;
 constexpr size_t kMostWaiting = 8;  // images of a stream whose other stream is silent
 
 // [ns] between the images of a pair
@@ -32,12 +33,19 @@ KeptImage::KeptImage(const DeviceImage& image) : view(image.view), stamp_ns(imag
 
 void ImagePairs::add(const DeviceImage& image, bool is_depth) {
   Stream& stream = is_depth ? depth_ : colour_;
-  if (!is_stamp(image.stamp_ns) || (stream.last && image.stamp_ns <= *stream.last)) {
+  const std::optional<int64_t> before = stream.stamps.last();
+  const auto answer = is_stamp(image.stamp_ns) ? stream.stamps.take(image.stamp_ns) : RisingStamps::Answer::refused;
+  if (answer == RisingStamps::Answer::refused) {
     ++late_;
     return;
   }
-  if (stream.last) stream.interval = image.stamp_ns - *stream.last;
-  stream.last = image.stamp_ns;
+  if (answer == RisingStamps::Answer::set_back) {
+    for (std::deque<KeptImage>& waiting = stream.waiting; !waiting.empty() && waiting.back().stamp_ns >= image.stamp_ns;
+         waiting.pop_back())
+      ++unpaired_;
+  } else if (before) {
+    stream.interval = image.stamp_ns - *before;
+  }
   if (stream.waiting.size() >= kMostWaiting) drop_front(stream);
   stream.waiting.emplace_back(image);
 }
@@ -69,7 +77,10 @@ std::optional<ImagePair> ImagePairs::take() {
       continue;
     }
     if (!colour_settled) return std::nullopt;
+    if (!closed_ && taken_ && colours.size() == 1 && colour.stamp_ns - *taken_ > kFarAhead) return std::nullopt;
     ImagePair pair{std::move(colours.front()), std::move(depths.front())};
+    taken_ = pair.colour.stamp_ns;
+    colour_.stamps.hand_on(pair.colour.stamp_ns), depth_.stamps.hand_on(pair.depth.stamp_ns);
     colours.pop_front(), depths.pop_front();
     return pair;
   }
@@ -81,6 +92,7 @@ void ImagePairs::restart() {
     unpaired_ += static_cast<int64_t>(stream->waiting.size());
     *stream = {};
   }
+  taken_.reset();
 }
 
 }  // namespace dkb

@@ -198,6 +198,9 @@ class PairsToFolder {
     write();
   }
   size_t close() {
+    if (const int64_t unused = pairing_.behind(); unused > 0)
+      options_.warn("the clock of the images was set back: the last " + std::to_string(unused) +
+                    " of them have stamps before those of pairs that were written");
     pairing_.close();
     write();
     if (pairing_.unpaired() > 0)

@@ -124,7 +124,7 @@ void RecordedPairs::read_message() {
   const std::optional<RecordedMessage> message = filter_.done() ? std::nullopt : stream_->next();
   if (!message) {
     ended_ = true;
-    if (!filter_.done()) pairing_.close();
+    if (!filter_.done()) warn_of_clock(), pairing_.close();
   } else {
     const RecordedTopic& topic = stream_->topics()[message->topic];
     if (topic.name == decoder_->colour.topic.name)
@@ -225,6 +225,13 @@ StoredPair RecordedPairs::stored(StampPairing::Pair pair) {
   made.mismatch = [images, decoder = decoder_] { return decoder->mismatch(*images); };
   made.decode = [images, decoder = decoder_] { return decoder->decode(*images); };
   return made;
+}
+
+void RecordedPairs::warn_of_clock() {
+  if (const int64_t unused = pairing_.behind(); unused > 0)
+    warn_once("clock", name_ + ": the clock of its images was set back: the last " + std::to_string(unused) +
+                           " of them have stamps before those of pairs that were used, and are left out; split the "
+                           "recording there to use them");
 }
 
 void RecordedPairs::warn_once(const std::string& kind, const std::string& line) {

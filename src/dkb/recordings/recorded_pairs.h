@@ -54,6 +54,7 @@ class RecordedPairs {
   bool is_too_large(const Channel& channel, const RecordedMessage& message);
   bool motion_is_known(const StampPairing::Pair& pair) const;
   StoredPair stored(StampPairing::Pair pair);
+  void warn_of_clock();
   void warn_once(const std::string& kind, const std::string& line);
 
   const std::string name_;

@@ -373,5 +373,27 @@ TEST_F(RecordedSourceTest, SurvivesMutatedMessages) {
   }
 }
 
+TEST_F(RecordedSourceTest, OneStampFarAheadCostsTenFrames) {
+  MessageList list;
+  add_pairs(list, 0, 15), add_colour(list, 100'000), add_pairs(list, 15, 40);
+  const auto source = open(list);
+  EXPECT_EQ(frames_of(*source).size(), 46U);
+  EXPECT_EQ(source->counts().late, 9);
+}
+
+TEST_F(RecordedSourceTest, AClockThatIsSetBackIsToldAtTheEnd) {
+  MessageList list;
+  add_pairs(list, 1000, 20), add_pairs(list, 0, 30);
+  const auto source = open(list);
+  EXPECT_EQ(frames_of(*source).size(), 20U);
+  EXPECT_EQ(source->counts().late, 60);
+  const std::vector<std::string> warnings = source->take_warnings();
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(
+      warnings[1],
+      "r.bag: the clock of its images was set back: the last 60 of them have stamps before those of pairs that were "
+      "used, and are left out; split the recording there to use them");
+}
+
 }  // namespace
 }  // namespace dkb::test

@@ -22,14 +22,40 @@ StampPairing::StampPairing(const AssociationOptions& options) : limit_(options.m
 
 bool StampPairing::add(Kind kind, Stored image) {
   Side& side = sides_[kind];
-  if (side.last_ns && image.stamp_ns <= *side.last_ns) return false;
-  side.last_ns = image.stamp_ns, side.last = seconds_from_ns(image.stamp_ns);
+  const RisingStamps::Answer answer = side.stamps.take(image.stamp_ns);
+  if (answer == RisingStamps::Answer::refused) return false;
+  side.last = seconds_from_ns(image.stamp_ns);
   side.beyond = std::max(side.beyond, side.last);
+  if (answer == RisingStamps::Answer::set_back) {
+    forget_from(kind, image.stamp_ns);
+    side.beyond = side.last;
+  }
   bytes_ += image.bytes.size();
   side.images.push_back({side.last, State::waiting, std::move(image), {}});
   resolve();
   bound();
   return true;
+}
+
+void StampPairing::forget_from(Kind kind, int64_t stamp_ns) {
+  std::deque<Waiting>& images = sides_[kind].images;
+  for (; !images.empty() && images.back().image.stamp_ns >= stamp_ns; images.pop_back()) {
+    const Waiting& last = images.back();
+    if (last.state == State::waiting) ++unpaired_;
+    if (last.state == State::paired && kind == colour) unpaired_ += 2;
+    bytes_ -= last.image.bytes.size() + last.partner.bytes.size();
+  }
+}
+
+int64_t StampPairing::behind() const {
+  int64_t images = 0;
+  for (const Side& side : sides_)
+    if (side.stamps.behind()) images += side.stamps.refused();
+  return images;
+}
+
+bool StampPairing::far_ahead(const Waiting& colour_image) const {
+  return !closed_ && sides_[colour].images.size() == 1 && (!taken_ || colour_image.time - *taken_ > kPatience);
 }
 
 void StampPairing::close() {
@@ -40,10 +66,13 @@ void StampPairing::close() {
 std::optional<StampPairing::Pair> StampPairing::take() {
   std::deque<Waiting>& images = sides_[colour].images;
   while (!images.empty() && images.front().state != State::waiting) {
+    if (images.front().state == State::paired && far_ahead(images.front())) return std::nullopt;
     Waiting front = std::move(images.front());
     images.pop_front();
     if (front.state == State::left_over) continue;
     bytes_ -= front.image.bytes.size() + front.partner.bytes.size();
+    taken_ = front.time;
+    sides_[colour].stamps.hand_on(front.image.stamp_ns), sides_[depth].stamps.hand_on(front.partner.stamp_ns);
     return Pair{std::move(front.image), std::move(front.partner)};
   }
   return std::nullopt;

@@ -8,13 +8,15 @@
 #include <string>
 
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/util/rising_stamps.h"
 
 namespace dkb {
 
 // Pairs colour and depth images by their stamps while they arrive, as associate() does for whole lists: one to one,
 // nearest first, ties earlier. A pair is told as soon as no image that is known or may still come could be nearer to
 // either of the two. What waits is bounded: an image far behind the newest of its kind, and the oldest of too many or
-// too large ones, is taken with the nearest that is there, or left over.
+// too large ones, is taken with the nearest that is there, or left over. A pair far ahead of the one before waits for
+// the next colour image to say that time is there, since nothing before it could follow.
 class StampPairing {
  public:
   enum Kind { colour, depth };
@@ -32,7 +34,8 @@ class StampPairing {
 
   explicit StampPairing(const AssociationOptions& options = {});
 
-  // False, and nothing is added, when the stamp is not after that of the last image of this kind.
+  // False, and nothing is added, when the stamp is not after that of the last image of this kind. After ten of these in
+  // a row whose own stamps rise (RisingStamps) what waits with later stamps is left over, and theirs count.
   bool add(Kind kind, Stored image);
   // No more images will come.
   void close();
@@ -40,6 +43,8 @@ class StampPairing {
   std::optional<Pair> take();
   // Images that were left over so far.
   int64_t unpaired() const { return unpaired_; }
+  // Images refused in a row up to now, where a clock was set back to before the last pair taken.
+  int64_t behind() const;
 
  private:
   enum class State { waiting, paired, left_over };
@@ -51,8 +56,8 @@ class StampPairing {
   };
   struct Side {
     std::deque<Waiting> images;
-    std::optional<int64_t> last_ns;
-    double last = 0;         // [s] the same
+    RisingStamps stamps;
+    double last = 0;         // [s] of the last one
     double beyond = -1e300;  // [s] where those lie that are still to come
   };
 
@@ -61,11 +66,14 @@ class StampPairing {
   std::optional<size_t> nearest(Kind kind, const Waiting& image) const;
   bool could_still_be_nearer(Kind kind, const Waiting& image, double difference) const;
   bool could_still_pair(Kind kind, const Waiting& image) const;
+  void forget_from(Kind kind, int64_t stamp_ns);
+  bool far_ahead(const Waiting& colour_image) const;
   void join(size_t colour_index, size_t depth_index);
   void resolve();
   void bound();
 
   double limit_;
+  std::optional<double> taken_;  // [s] of the last pair's colour image
   std::array<Side, 2> sides_;
   size_t bytes_ = 0;
   int64_t unpaired_ = 0;

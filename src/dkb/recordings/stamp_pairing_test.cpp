@@ -113,6 +113,68 @@ TEST(StampPairing, StampsThatDoNotRiseAreRefused) {
   EXPECT_TRUE(pairing.add(StampPairing::colour, {4, ""}));
 }
 
+// What pairs of 100 images each at 30/s, with the stamps that `wrong` makes of the images' numbers.
+struct Outcome {
+  Stamps colours;
+  int64_t refused = 0, unpaired = 0, behind = 0;
+};
+template <class Wrong>
+Outcome with_stamps(const Wrong& wrong) {
+  StampPairing pairing;
+  Outcome outcome;
+  const auto take = [&] {
+    while (const auto pair = pairing.take()) outcome.colours.push_back(pair->colour.stamp_ns);
+  };
+  for (int64_t n = 0; n < 100; ++n)
+    for (const StampPairing::Kind kind : {StampPairing::colour, StampPairing::depth}) {
+      if (!pairing.add(kind, {wrong(kind, n), "image"})) ++outcome.refused;
+      take();
+    }
+  outcome.behind = pairing.behind();
+  pairing.close();
+  take();
+  outcome.unpaired = pairing.unpaired();
+  EXPECT_TRUE(std::is_sorted(outcome.colours.begin(), outcome.colours.end()));
+  EXPECT_EQ(2 * static_cast<int64_t>(outcome.colours.size()) + outcome.refused + outcome.unpaired, 200);
+  return outcome;
+}
+
+TEST(StampPairing, OneStampFarAheadCostsTenImages) {
+  constexpr int64_t kHour = 3600 * kNsPerSecond;
+  for (const int64_t at : {0, 20})
+    for (const auto& [of_colour, of_depth] : {std::pair{true, false}, {false, true}, {true, true}}) {
+      const Outcome outcome = with_stamps([&](StampPairing::Kind kind, int64_t n) {
+        const bool wrong = n == at && (kind == StampPairing::colour ? of_colour : of_depth);
+        return 33 * kMs * n + (wrong ? kHour : 0);
+      });
+      // A colour image that comes before the tenth depth image has no partner to wait for yet.
+      EXPECT_EQ(outcome.colours.size(), of_depth ? 89U : 90U) << at << of_colour << of_depth;
+      EXPECT_EQ(outcome.colours.back(), 33 * kMs * 99);
+      EXPECT_EQ(outcome.refused, of_colour && of_depth ? 18 : 9);
+      EXPECT_EQ(outcome.behind, 0);
+    }
+}
+
+TEST(StampPairing, StampsThatStandStillOrFallAreNoClock) {
+  const Outcome outcome = with_stamps([](StampPairing::Kind, int64_t n) {
+    if (n < 50) return 33 * kMs * n;
+    return n < 70 ? 33 * kMs : 33 * kMs * (1 - n);
+  });
+  EXPECT_EQ(outcome.colours.size(), 50U);
+  EXPECT_EQ(outcome.refused, 100);
+}
+
+TEST(StampPairing, AClockThatIsSetBackIsToldOfAndTakenWhereItComesPastTheLastPair) {
+  const auto set_back = [](int64_t by) {
+    return with_stamps([=](StampPairing::Kind, int64_t n) { return 33 * kMs * (n < 50 ? n : n - by); });
+  };
+  const Outcome far = set_back(1000), near = set_back(20);
+  EXPECT_EQ(far.colours.size(), 50U);
+  EXPECT_EQ(far.behind, 100);
+  EXPECT_EQ(near.colours.size(), 80U);
+  EXPECT_EQ(near.behind, 0);
+}
+
 TEST(StampPairing, WhatWaitsIsBoundedWhenOneSideFallsSilent) {
   Stamps colour, depth{0};
   for (int64_t i = 0; i < 3000; ++i) colour.push_back(i * 33 * kMs);
