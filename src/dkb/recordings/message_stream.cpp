@@ -30,7 +30,7 @@ std::unique_ptr<MessageStream> open_file(const fs::path& path) {
     throw InputError(file->name() + ": is compressed as a whole; `zstd -d` on it gives a recording that can be read");
   throw InputError(file->name() +
                    ": is no recording of a known kind (.bag of ROS 1, .mcap, .db3 of rosbag2); its "
-                   "content tells the kind, not its name");
+                   "content tells the kind, not its name; of images in a folder give the folder");
 }
 
 bool is_recording(const fs::path& path) {

@@ -31,6 +31,19 @@ SourceKind recording_kind(const std::string& name, const std::string& form) {
   return kind;
 }
 
+// Files of any name, too: a recorder that was killed leaves FILE.bag.active.
+SourceKind bag_kind() {
+  SourceKind kind = recording_kind("bag", "FILE.bag");
+  kind.fits = [](const std::string& where) {
+    std::error_code error;
+    const auto of_others = {".mcap", ".db3", ".oni"};
+    return where.ends_with(".bag") || (fs::is_regular_file(where, error) &&
+                                       std::none_of(of_others.begin(), of_others.end(),
+                                                    [&](const char* ending) { return where.ends_with(ending); }));
+  };
+  return kind;
+}
+
 SourceKind rosbag2_kind() {
   SourceKind kind = recording_kind("db3", "FILE.db3, or the folder of a rosbag2");
   kind.fits = [](const std::string& where) { return where.ends_with(".db3") || is_rosbag2(where); };
@@ -96,7 +109,7 @@ std::vector<SourceKind> source_kinds() {
           module_kind(openni2_module(), "[:URI]"),
           module_kind(realsense_module(), "[:SERIAL]"),
           module_kind(orbbec_module(), "[:SERIAL]"),
-          recording_kind("bag", "FILE.bag"),
+          bag_kind(),
           recording_kind("mcap", "FILE.mcap"),
           rosbag2_kind(),
           oni_kind(),

@@ -90,6 +90,11 @@ TEST(SourceRegistry, RecordingsAreToldByTheirEndingAndFoldersByWhatLiesInThem) {
   EXPECT_EQ(kind_of(kinds, folder).name, "db3");
   std::ofstream(folder / "rgb.txt") << "";
   EXPECT_EQ(kind_of(kinds, folder).name, "folder") << "a sequence that somebody keeps a recording in";
+  std::ofstream(folder / "x.bag.active") << "";
+  std::ofstream(folder / "x.oni") << "";
+  EXPECT_EQ(kind_of(kinds, folder / "x.bag.active").name, "bag") << "of a recorder that was killed";
+  EXPECT_EQ(kind_of(kinds, folder / "x.oni").name, "oni");
+  EXPECT_EQ(kind_of(kinds, folder / "x_0.mcap").name, "mcap");
   fs::remove_all(folder);
 }
 
