@@ -36,7 +36,8 @@ namespace {
 
 std::string source_name(const fs::path& source) {
   if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
-  const fs::path name = source.filename().empty() ? source.parent_path().filename() : source.filename();
+  const fs::path whole = fs::absolute(source).lexically_normal();  // "." and ".." are no names
+  const fs::path name = whole.filename().empty() ? whole.parent_path().filename() : whole.filename();
   return (fs::is_regular_file(source) ? name.stem() : name).string();
 }
 

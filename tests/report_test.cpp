@@ -88,6 +88,14 @@ TEST(Report, SameRunGivesTheSamePageButForTimes) {
   EXPECT_TRUE(without_times(read_text(a.out / "report.html")) == without_times(read_text(b.out / "report.html")));
 }
 
+TEST(Report, IsNamedByTheFolderAlsoWhereThatIsGivenAsADot) {
+  const TempFolder temp;
+  const SlamRun run(sequence() / ".", temp / "out", {"--max-frames", "3"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  const std::string html = read_text(run.out / "report.html");
+  EXPECT_NE(html.find(sequence().filename().string() + "</title>"), std::string::npos);
+}
+
 TEST(Report, NamesWhyAStretchIsLost) {
   const TempFolder temp;
   ASSERT_EQ(run_program({"simulate", "--out", (temp / "dark").string(), "--scene", "room", "--people", "0", "--frames",
