@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "inputs.h"
 
-#include <algorithm>
 #include <bit>
 #include <map>
 
@@ -40,15 +39,15 @@ dkb::Camera camera_of(const CameraInfoMessage& info, bool rectified) {
     camera.fx = info.p[0], camera.fy = info.p[5], camera.cx = info.p[2], camera.cy = info.p[6];
   } else {
     camera.fx = info.k[0], camera.fy = info.k[4], camera.cx = info.k[2], camera.cy = info.k[5];
-    const bool distorted = std::any_of(info.d.begin(), info.d.end(), [](double d) { return d != 0; });
-    if (distorted && (info.distortion_model != "plumb_bob" || info.d.size() > 5))
-      throw dkb::InputError("rgb/camera_info: distortion model \"" + info.distortion_model +
-                            "\" is not known, plumb_bob is; publish rectified images and set `rectified`");
-    double* const fields[] = {&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
-    for (size_t i = 0; distorted && i < info.d.size(); ++i) *fields[i] = info.d[i];
   }
   if (!(camera.fx > 0 && camera.fy > 0))
     throw dkb::InputError("rgb/camera_info: it holds no calibration (focal length 0); calibrate, or set `camera`");
+  try {
+    if (!rectified) camera.set_distortion(info.distortion_model, {info.d.begin(), info.d.end()});
+  } catch (const dkb::InputError& e) {
+    throw dkb::InputError(std::string("rgb/camera_info: ") + e.what() +
+                          "; publish rectified images and set `rectified`, or set `camera`");
+  }
   return camera;
 }
 
