@@ -7,7 +7,10 @@
 #include <csignal>
 
 #include "dkb/dataset/folder_source.h"
+#include "dkb/recordings/message_stream.h"
+#include "dkb/recordings/recorded_camera.h"
 #include "dkb/recordings/recorded_source.h"
+#include "dkb/recordings/ros_messages.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 #include "dkb/util/test_errors.h"
@@ -70,6 +73,23 @@ int frames_in(Source& source) {
 
 size_t entries_of(const fs::path& folder) {
   return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(PairWriter, CameraInfoTellsRationalDistortion) {
+  const TempFolder scratch;
+  Camera written = camera();
+  written.set_distortion("rational_polynomial", {0.5, -2.6, 0.0007, -0.0002, 1.5, 0.38, -2.45, 1.43});
+  const auto writer = write_pairs(scratch / "a.bag", written, written.to_yaml());
+  add(*writer, 0);
+  writer->close();
+  const auto stream = open_messages(scratch / "a.bag");
+  stream->select({"/camera/rgb/camera_info"});
+  const auto message = stream->next();
+  ASSERT_TRUE(message);
+  const Camera read = camera_of(decode_camera_info(message->bytes, MessageEncoding::ros1), false, "info");
+  EXPECT_EQ(read.p2, -0.0002);
+  EXPECT_EQ(read.k6, 1.43);
+  EXPECT_EQ(RecordedSource(scratch / "a.bag", {}).camera().k5, -2.45);
 }
 
 TEST(PairWriter, OfARecordingThatFillsTheDiskTheWholeChunksAreKept) {
