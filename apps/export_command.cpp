@@ -13,6 +13,7 @@
 #include "dkb_slam/source.h"
 #include "export/results_recording.h"
 #include "interrupt.h"
+#include "source_options.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -33,8 +34,8 @@ void run_export(const ExportArguments& arguments) {
                                 : "give --format tum, kitti or euroc, or a name that ends in .mcap or .bag"));
   if (!recording && !arguments.images.empty())
     throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
-  if (arguments.images.empty() && !arguments.source.camera.empty())
-    throw InputError("--camera: is that of --images; add them, or leave it out");
+  if (const std::string option = source_option_given(arguments.source); arguments.images.empty() && !option.empty())
+    throw InputError(option + ": is that of --images; add them, or leave it out");
   if (recording) {
     if (!fs::is_directory(results))
       throw InputError(arguments.results + ": is no folder; give the folder that `dkb-slam run --out` wrote");
@@ -55,6 +56,7 @@ void run_export(const ExportArguments& arguments) {
 
 void register_export(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<ExportArguments>();
+  arguments->source.prior = PriorKind::none;  // pictures are all that is read
   CLI::App* command = app.add_subcommand("export", "Write a run's results in the formats of other tools");
   command->add_option("results", arguments->results, "folder of a run, or a trajectory in TUM format")->required();
   command->add_option("--format", arguments->format, "of the trajectory: tum, kitti or euroc (csv)")
@@ -62,7 +64,7 @@ void register_export(CLI::App& app, int& exit_code) {
   command->add_option("--out", arguments->out, "file; .mcap or .bag: poses, path, cloud and images as a recording")
       ->required();
   command->add_option("--images", arguments->images, "source of the run: its pictures with features go along");
-  command->add_option("--camera", arguments->source.camera, "camera file or name of that source");
+  add_source_options(*command, arguments->source);
   command->callback([arguments, &exit_code] {
     run_export(*arguments);
     exit_code = 0;

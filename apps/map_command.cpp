@@ -21,6 +21,7 @@
 #include "export/keyframe_pictures.h"
 #include "export/map_model.h"
 #include "interrupt.h"
+#include "source_options.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -69,6 +70,7 @@ void print_info(const std::string& path) {
 
 struct MapExportArguments {
   std::string file, format, out, images;
+  SourceOptions reading;
   DetectorChoice detection;
 };
 
@@ -83,8 +85,9 @@ void export_model(const MapExportArguments& arguments) {
   const size_t all = keyframes.size();
   std::string pictures = "no images: --images SOURCE adds them, with masks of what moves";
   if (!arguments.images.empty()) {
-    SourceOptions reading;
+    SourceOptions reading = arguments.reading;
     reading.fallback_camera = file.context.camera;
+    reading.prior = PriorKind::none;
     const std::unique_ptr<Source> source = open_source(arguments.images, reading);
     Options options;
     options.set("features.scale", fmt::format("{}", file.context.scale_factor), "map");
@@ -112,6 +115,8 @@ void check_arguments(const MapExportArguments& arguments) {
   if (!model && !arguments.images.empty())
     throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
   if (!arguments.images.empty()) return;
+  if (const std::string option = source_option_given(arguments.reading); !option.empty())
+    throw InputError(option + ": is that of --images; add them, or leave it out");
   const DetectorChoice& d = arguments.detection;
   const DetectorChoice by_default;
   const std::string unused = d.kinds != by_default.kinds           ? "--detector"
@@ -182,6 +187,7 @@ void register_map(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"ply", "pcd", "json", "colmap", "nerfstudio"}));
   cloud->add_option("--out", arguments->out, "file to write; of a model the folder")->required();
   cloud->add_option("--images", arguments->images, "source of the map: keyframes' images and masks go into the model");
+  add_source_options(*cloud, arguments->reading);
   cloud->add_option("--detector", arguments->detection.kinds, "of the masks: auto, yolo, motion, none");
   cloud->add_option("--model", arguments->detection.model, "ONNX file of the yolo detector");
   cloud->add_option("--inference", arguments->detection.inference, "What computes it: auto, onnxruntime, opencv");

@@ -15,6 +15,7 @@
 #include "dkb/util/log.h"
 #include "interrupt.h"
 #include "live_report.h"
+#include "source_options.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -116,7 +117,7 @@ void register_record(CLI::App& app, int& exit_code) {
   command->add_option("source", args->source, "A camera, or any other source; `dkb-slam sources` lists them")
       ->required();
   command->add_option("--out", args->out, "New folder in TUM layout, FILE.mcap or FILE.bag")->required();
-  command->add_option("--camera", args->reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
+  add_source_options(*command, args->reading);
   command->add_option("--max-frames", args->reading.max_frames, "Frames at most");
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = record(*args); });

@@ -22,6 +22,7 @@ void check_detector(const DetectorChoice& choice) {
   };
   if (!choice.model.empty() && !yolo) refuse("--model", "network");
   if (!choice.labels.empty() && !yolo) refuse("--labels", "network");
+  if (!choice.classes.empty() && !yolo) refuse("--classes", "network");
   if (choice.every > 0 && !slow) refuse("--detect-every", "network or command");
   if (choice.latency > 0 && !slow) refuse("--detect-latency", "network or command");
 }

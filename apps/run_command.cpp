@@ -5,6 +5,7 @@
 
 #include "number_check.h"
 #include "run_session.h"
+#include "source_options.h"
 
 namespace dkb {
 namespace {
@@ -15,7 +16,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   const auto given = [args](bool RunArguments::*flag) {
     return [args, flag](const std::string&) { (*args).*flag = true; };
   };
-  command->add_option("--camera", reading.camera, "Camera file, or fr1, fr2, fr3, bonn");
+  add_source_options(*command, reading);
   command->add_option("--preset", args->preset, "Settings to start from: default, paper, orb")
       ->each(given(&RunArguments::has_preset));
   command->add_option("--config", args->config,
@@ -33,6 +34,8 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
                       "auto, yolo (network), motion, file, none, exec:COMMAND; several joined by +");
   command->add_option("--model", detection.model, "ONNX file of the yolo detector (else $DKB_SLAM_MODEL)");
   command->add_option("--labels", detection.labels, "Class names of that model, one per line (default: COCO's)");
+  command->add_option("--classes", detection.classes,
+                      "Those of them that may move, by comma (default: people, pets, and what people carry or ride)");
   command->add_option("--inference", detection.inference,
                       "What computes it: auto (ONNX Runtime where it is found, else OpenCV), onnxruntime, opencv");
   command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)")
@@ -53,10 +56,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
       ->add_option("--threads", args->threads, "1 = everything on one thread, else one for each part (the same bytes)")
       ->check(CLI::Range(0, 1024));
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
-  command->add_option("--colour-topic", reading.colour_topic, "Of a recording with several topics of colour images");
-  command->add_option("--depth-topic", reading.depth_topic, "Likewise of depth images");
-  command->add_option("--info-topic", reading.info_topic, "Likewise of CameraInfo: the one of the colour images");
-  command->add_option("--odom-topic", reading.odom_topic, "Likewise of odometry");
+  command->add_option("--odom-topic", reading.odom_topic, "Of a recording with several topics of odometry");
   command->add_option("--imu-topic", reading.imu_topic, "Likewise of an inertial unit");
   command->add_option("--prior", args->prior, "What of a recording guides tracking: none, odom, imu, auto");
   command->add_option("--prior-file", args->prior_file,

@@ -77,6 +77,7 @@ struct DetectorChoice {
   std::string kinds = "auto";      ///< auto, yolo (or network), motion, file, none, exec:COMMAND (last); joined by +
   std::filesystem::path model;     ///< ONNX file of the yolo kind; empty = that of $DKB_SLAM_MODEL
   std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
+  std::string classes;             ///< those of them that may move, by comma; default: people and what they handle
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
   std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
   std::vector<int64_t> stamps_ns;  ///< of the images to come, where known: the masks' are held against them

@@ -25,6 +25,8 @@ class Slam(_core.Slam):
         DetectorImage and returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or
         (list, mask). What it raises becomes a SlamWarning.
     model, labels: ONNX file of the yolo detector (None: $DKB_SLAM_MODEL) and its class names.
+    classes: those of them that may move, separated by commas or as a list (None: people, pets, and what people carry
+        or ride).
     inference: what computes it: "onnxruntime", "opencv", or "auto" (ONNX Runtime where it is found, else OpenCV).
     boxes, masks: of the file detector, `stamp class x y w h [score]` per line; folder of STAMP.png, 255 = mover.
     detect_every, detect_latency: [frames] from one image that the network is asked for to the next, and until its
@@ -46,7 +48,8 @@ class Slam(_core.Slam):
 
     def __init__(self, camera: _core.Camera, preset: str = "default", *,
                  detector: Union[Detector, Sequence[Detector]] = "auto", model: Optional[PathLike] = None,
-                 labels: Optional[PathLike] = None, boxes: Optional[PathLike] = None, masks: Optional[PathLike] = None,
+                 labels: Optional[PathLike] = None, classes: Union[str, Sequence[str], None] = None,
+                 boxes: Optional[PathLike] = None, masks: Optional[PathLike] = None,
                  inference: str = "auto", detect_every: int = 0, detect_latency: int = 0,
                  filter: Optional[str] = None, disable: str = "", settings: Optional[Mapping[str, Any]] = None,
                  config: Optional[PathLike] = None, seed: Optional[int] = None, threads: int = 0,
@@ -54,8 +57,10 @@ class Slam(_core.Slam):
                  base_from_cam: Any = None) -> None:
         if not isinstance(camera, _core.Camera):
             raise TypeError(f"camera: must be a dkb_slam.Camera, not {type(camera).__name__}")
-        super().__init__(camera, preset=preset, detector=detector, model=model, labels=labels, boxes=boxes,
-                         masks=masks, inference=inference, detect_every=detect_every, detect_latency=detect_latency,
+        if classes is not None and not isinstance(classes, str):
+            classes = ",".join(classes)
+        super().__init__(camera, preset=preset, detector=detector, model=model, labels=labels, classes=classes or "",
+                         boxes=boxes, masks=masks, inference=inference, detect_every=detect_every, detect_latency=detect_latency,
                          filter=filter, disable=disable, settings=None if settings is None else dict(settings),
                          config=config, seed=seed, threads=threads, realtime=realtime, dense=dense,
                          final_ba=final_ba, base_from_cam=base_from_cam)

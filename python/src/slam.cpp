@@ -72,6 +72,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   choice.kinds = kinds;
   choice.model = text_or_empty(a, "model");
   choice.labels = text_or_empty(a, "labels");
+  choice.classes = argument<std::string>(a["classes"], "classes", "a str");
   choice.inference = argument<std::string>(a["inference"], "inference", "a str");
   choice.boxes = text_or_empty(a, "boxes");
   choice.masks = text_or_empty(a, "masks");

@@ -29,6 +29,7 @@ std::vector<ParameterDescription> own_parameters() {
       {"detector", "auto", "what may move is found by: auto, yolo, motion, none, exec:COMMAND; several joined by +"},
       {"model", "", "ONNX file of the yolo detector"},
       {"labels", "", "class names of that model, one per line; empty = COCO's"},
+      {"classes", "", "those of them that may move, by comma; empty = people, pets, and what people carry or ride"},
       {"inference",
        "auto",
        "what computes it; auto = ONNX Runtime where it is found, else OpenCV",
@@ -240,6 +241,7 @@ Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& 
   p.detector.kinds = values.text("detector");
   p.detector.model = values.text("model");
   p.detector.labels = values.text("labels");
+  p.detector.classes = values.text("classes");
   p.detector.inference = values.text("inference");
   p.detector.every = values.number("detect_every");
   p.detector.latency = values.number("detect_latency");

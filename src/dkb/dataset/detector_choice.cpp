@@ -72,8 +72,9 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
     if (model.empty())
       throw InputError(
           "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
-    auto detector = std::make_shared<OnnxDetector>(
-        OnnxOptions{.model = model, .labels = choice.labels, .inference = inference}, camera.width, camera.height);
+    OnnxOptions options{.model = model, .labels = choice.labels, .inference = inference};
+    if (!choice.classes.empty()) options.classes = choice.classes;
+    auto detector = std::make_shared<OnnxDetector>(options, camera.width, camera.height);
     const int frames = detector->frames_per_detection(camera.fps > 0 ? camera.fps : 30);
     made.schedule.every = choice.every > 0 ? choice.every : frames;
     made.schedule.latency = choice.latency > 0 ? choice.latency : frames;

@@ -61,11 +61,11 @@ std::vector<bool> movable_classes(const OnnxOptions& options, const std::vector<
       movable[static_cast<size_t>(at - labels.begin())] = true;
     else if (options.classes != kMovableClasses)
       throw InputError(options.model.string() + ": has no class \"" + name + "\"" + did_you_mean(name, labels) +
-                       "; choose the classes that may move among its labels");
+                       "; choose the classes that may move (--classes) among its labels");
   }
   if (std::find(movable.begin(), movable.end(), true) == movable.end())
     throw InputError(options.model.string() + ": none of its classes is among those that may move (" +
-                     options.classes.substr(0, 80) + "); name some of its labels");
+                     options.classes.substr(0, 80) + "); name those that may, by comma: --classes");
   return movable;
 }
 
