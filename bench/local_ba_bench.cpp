@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "dkb/solver/absolute_pose.h"
+#include "dkb/solver/bundle_adjustment.h"
 #include "dkb/solver/ceres_test_oracle.h"
 #include "dkb/solver/geometric_weights.h"
-#include "dkb/solver/pose_graph.h"
 #include "dkb/solver/test_world.h"
 #include "dkb/util/timing.h"
 
@@ -83,7 +83,7 @@ void bench_weights(int repetitions) {
 }
 
 // Eight rounds of a circle, joined to the three keyframes before and at random to the round before.
-PoseGraph rounds_of_a_circle(int keyframes, int closures) {
+BaProblem rounds_of_a_circle(int keyframes, int closures) {
   constexpr int kRound = 250;
   Random random(3);
   const auto noise = [&](double sigma) {
@@ -96,10 +96,10 @@ PoseGraph rounds_of_a_circle(int keyframes, int closures) {
     const double a = 2 * M_PI * k / kRound;
     truth.push_back(Rigid3(rotation_from_vector({0, -a, 0}), {3 * std::sin(a), 0, 3 * std::cos(a)}).inverse());
   }
-  PoseGraph graph;
+  BaProblem graph;
   const auto join = [&](int a, int b) {
     const Rigid3 b_from_a = truth[b] * truth[a].inverse() * rigid3_from_tangent(noise(0.005));
-    graph.edges.push_back({a, b, b_from_a, 4e4 * Matrix6d::Identity(), false});
+    graph.motions.push_back({a, b, b_from_a, 4e4 * Matrix6d::Identity(), false});
   };
   graph.cam_from_world.push_back(truth[0]);
   for (int k = 1; k < keyframes; ++k) {
@@ -117,12 +117,13 @@ PoseGraph rounds_of_a_circle(int keyframes, int closures) {
 }
 
 void bench_pose_graph(int repetitions) {
-  const PoseGraph graph = rounds_of_a_circle(2000, 2000);
-  PoseGraphResult result;
-  const double ms = median_ms(graph, repetitions, [&](PoseGraph& copy) { result = optimise_pose_graph(copy); });
+  const BaProblem graph = rounds_of_a_circle(2000, 2000);
+  BaResult result;
+  const double ms =
+      median_ms(graph, repetitions, [&](BaProblem& copy) { result = bundle_adjust(copy, BaOptions::of_pose_graph()); });
   fmt::print("pose graph, {} keyframes, {} edges, {} iterations, cost {:.0f} to {:.0f}: {:.1f} ms\n",
-             graph.cam_from_world.size(), graph.edges.size(), result.iterations, result.initial_cost, result.final_cost,
-             ms);
+             graph.cam_from_world.size(), graph.motions.size(), result.iterations, result.initial_cost,
+             result.final_cost, ms);
 }
 
 }  // namespace

@@ -68,6 +68,10 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
   for (size_t c = 0; c < window.keyframes.size(); ++c)
     correction.poses.push_back(
         {window.keyframes[c], map.keyframe(window.keyframes[c])->cam_from_world, window.problem.cam_from_world[c]});
+  // What takes no part stays: it is not what hangs on those that do.
+  for (KeyframeId k : map.live_keyframes())
+    if (!std::binary_search(keyframes.begin(), keyframes.end(), k))
+      correction.poses.push_back({k, map.keyframe(k)->cam_from_world, map.keyframe(k)->cam_from_world});
   for (size_t p = 0; p < window.points.size(); ++p)
     correction.positions.push_back({window.points[p], map.point(window.points[p])->position, window.problem.points[p]});
   for (size_t o = 0; o < window.sources.size(); ++o)

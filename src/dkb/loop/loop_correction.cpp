@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "dkb/solver/pose_graph.h"
+#include "dkb/solver/bundle_adjustment.h"
 
 namespace dkb {
 namespace {
@@ -42,7 +42,7 @@ int shared_points(const Keyframe& k, KeyframeId other) {
 
 void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root,
                         MapCorrection& correction) {
-  PoseGraph graph;
+  BaProblem graph;
   std::vector<int> node(static_cast<size_t>(map.keyframe_count()), -1);
   std::vector<KeyframeId> keyframes;
   for (KeyframeId k : map.live_keyframes()) {
@@ -57,7 +57,7 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   };
   const auto add = [&](KeyframeId a, KeyframeId b, const Rigid3& b_from_a, int shared) {
     const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
-    if (from >= 0 && to >= 0) graph.edges.push_back(graph_edge(from, to, b_from_a, shared));
+    if (from >= 0 && to >= 0) graph.motions.push_back(graph_edge(from, to, b_from_a, shared));
   };
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
@@ -65,17 +65,23 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
     // Where no point ties two keyframes, what the camera did between them is all that does: their pose in the map holds
     // as firmly as that motion was known.
     if (previous >= 0)
-      graph.edges.push_back(
+      graph.motions.push_back(
           {node[static_cast<size_t>(id)], previous, relative(id, k.motion->previous), k.motion->information()});
     const int shared = k.parent != kNoKeyframe ? shared_points(k, k.parent) : 0;
-    if (k.parent != kNoKeyframe && (shared > 0 || previous < 0)) add(k.parent, id, relative(k.parent, id), shared);
+    // Parents are older but where two maps were joined: without the edge to a younger one the graph may fall apart.
+    if (k.parent != kNoKeyframe && (shared > 0 || previous < 0 || k.parent > id))
+      add(k.parent, id, relative(k.parent, id), shared);
     for (const Covisible& c : k.covisible)
       if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
           map.keyframe(c.keyframe)->parent != id)
         add(id, c.keyframe, relative(id, c.keyframe), c.shared_points);
   }
-  for (const LoopEdge& e : edges) add(e.a, e.b, e.b_from_a, e.shared_points);
-  optimise_pose_graph(graph);
+  for (const LoopEdge& e : edges) {
+    const Map::Ancestor a = map.live_ancestor(e.a), b = map.live_ancestor(e.b);
+    if (a.id != b.id)
+      add(a.id, b.id, b.cam_from_ancestor.inverse() * e.b_from_a * a.cam_from_ancestor, e.shared_points);
+  }
+  bundle_adjust(graph, BaOptions::of_pose_graph());
   for (size_t n = 0; n < keyframes.size(); ++n)
     correction.poses.push_back({keyframes[n], map.keyframe(keyframes[n])->cam_from_world, graph.cam_from_world[n]});
 }

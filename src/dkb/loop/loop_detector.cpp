@@ -2,7 +2,7 @@
 #include "dkb/loop/loop_detector.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 #include <queue>
 
 namespace dkb {
@@ -76,36 +76,49 @@ std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id) {
   return chosen;
 }
 
+// Null where nothing tells of the motion from one of them to the other.
+const KeyframeMotion* motion_between(const Map& map, KeyframeId a, KeyframeId b) {
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)})
+    if (const auto& motion = map.keyframe(to)->motion; motion && motion->previous == from) return motion.get();
+  return nullptr;
+}
+
 }  // namespace
 
-std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from) {
+std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
   const auto count = static_cast<size_t>(map.keyframe_count());
-  std::vector<double> length(count, std::numeric_limits<double>::infinity());
+  std::vector<PathThroughMap> paths(count);
   std::vector<std::vector<KeyframeId>> children(count);
   for (KeyframeId k : map.live_keyframes())
     if (map.keyframe(k)->parent != kNoKeyframe) children[static_cast<size_t>(map.keyframe(k)->parent)].push_back(k);
   using Entry = std::pair<double, KeyframeId>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  length[static_cast<size_t>(from)] = 0;
+  paths[static_cast<size_t>(from)].length = 0;
   open.emplace(0.0, from);
   while (!open.empty()) {
     const double path_length = open.top().first;
     const KeyframeId at = open.top().second;
     open.pop();
-    if (path_length > length[static_cast<size_t>(at)]) continue;
+    const PathThroughMap path = paths[static_cast<size_t>(at)];
+    if (path_length > path.length) continue;
     const Keyframe& k = *map.keyframe(at);
     const Eigen::Vector3d centre = centre_in_world(k.cam_from_world);
-    const auto go = [&](KeyframeId next) {
+    const auto go = [&](KeyframeId next, const KeyframeMotion* motion) {
       const double there = path_length + (centre_in_world(map.keyframe(next)->cam_from_world) - centre).norm();
-      if (there >= length[static_cast<size_t>(next)]) return;
-      length[static_cast<size_t>(next)] = there;
+      PathThroughMap& longer = paths[static_cast<size_t>(next)];
+      if (there >= longer.length) return;
+      longer = {there, path.position_variance, path.rotation_variance};
+      if (motion != nullptr) {
+        longer.position_variance += motion->since.covariance.topLeftCorner<3, 3>().trace();
+        longer.rotation_variance += motion->since.covariance.bottomRightCorner<3, 3>().trace();
+      }
       open.emplace(there, next);
     };
-    for (const Covisible& c : k.covisible) go(c.keyframe);
-    for (KeyframeId child : children[static_cast<size_t>(at)]) go(child);
-    if (k.parent != kNoKeyframe) go(k.parent);
+    for (const Covisible& c : k.covisible) go(c.keyframe, nullptr);
+    for (KeyframeId child : children[static_cast<size_t>(at)]) go(child, motion_between(map, child, at));
+    if (k.parent != kNoKeyframe) go(k.parent, motion_between(map, k.parent, at));
   }
-  return length;
+  return paths;
 }
 
 std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps) {
@@ -153,7 +166,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
       covered[static_cast<size_t>(covisible[i].keyframe)] = 1;
   }
 
-  std::vector<double> path_lengths;
+  std::vector<PathThroughMap> paths;
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
@@ -163,14 +176,16 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
                            {.min_inliers = kMinPlaceMatches, .seed = seed + static_cast<uint64_t>(id)});
     if (!located) continue;
     if (!merge) {
-      if (path_lengths.empty()) path_lengths = path_lengths_through_map(map, id);
-      const double path_length = path_lengths[static_cast<size_t>(far)];
+      if (paths.empty()) paths = paths_through_map(map, id);
+      const PathThroughMap& path = paths[static_cast<size_t>(far)];
+      const double turned_sd = std::sqrt(path.rotation_variance);
+      const double moved_sd = std::hypot(std::sqrt(path.position_variance), turned_sd * path.length);
       const double shift = (centre_in_world(located->cam_from_world) - centre_in_world(newest->cam_from_world)).norm();
       const double rotation =
           kDegrees *
           vector_from_rotation(located->cam_from_world.rotation.conjugate() * newest->cam_from_world.rotation).norm();
-      if (shift > options.drift_translation_base + kDriftTranslationShare * path_length ||
-          rotation > kDriftRotationBase + kDriftRotationPerMetre * path_length)
+      if (shift > options.drift_translation_base + kDriftTranslationShare * path.length + 3 * moved_sd ||
+          rotation > kDriftRotationBase + kDriftRotationPerMetre * path.length + kDegrees * 3 * turned_sd)
         continue;
     }
     const auto fit = fit_by_projection(area.points, *newest->features, optics, located->cam_from_world, kSearchRadii);

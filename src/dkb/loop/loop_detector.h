@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -21,9 +22,14 @@ struct LoopFinding {
   bool merge = false;                // the two belong to maps that are not joined
 };
 
-// Length [m] of the shortest path from `from` to every keyframe, along covisibility and the spanning tree; infinite
-// where there is none.
-std::vector<double> path_lengths_through_map(const Map& map, KeyframeId from);
+// The shortest path from one keyframe to another, along covisibility and the spanning tree.
+struct PathThroughMap {
+  double length = std::numeric_limits<double>::infinity();  // [m]; infinite where there is none
+  // [m^2, rad^2] in all axes together, of the motions that it takes where no points tie keyframes together.
+  double position_variance = 0, rotation_variance = 0;
+};
+// From `from` to every keyframe.
+std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from);
 
 // Keyframes within so many steps along covisibility, `id` included; one flag per keyframe.
 std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps);

@@ -60,15 +60,21 @@ PointId Map::resolve(PointId id) const {
   return kNoPoint;
 }
 
-Rigid3 Map::cam_from_world(KeyframeId id) const {
+Map::Ancestor Map::live_ancestor(KeyframeId id) const {
   const Keyframe* k = keyframe(id);
   if (k == nullptr) throw std::logic_error("map: no keyframe " + std::to_string(id));
-  Rigid3 cam_from_ancestor;
+  Ancestor found;
   while (k->culled) {
-    cam_from_ancestor = cam_from_ancestor * k->cam_from_parent;
+    found.cam_from_ancestor = found.cam_from_ancestor * k->cam_from_parent;
     k = keyframe(k->parent);
   }
-  return cam_from_ancestor * k->cam_from_world;
+  found.id = k->id;
+  return found;
+}
+
+Rigid3 Map::cam_from_world(KeyframeId id) const {
+  const Ancestor riding_on = live_ancestor(id);
+  return riding_on.cam_from_ancestor * keyframe(riding_on.id)->cam_from_world;
 }
 
 KeyframeId Map::root(KeyframeId id) const {
@@ -296,7 +302,7 @@ void Map::date_back() {
 }
 
 void Map::set_parent(KeyframeId id, KeyframeId parent) {
-  while (keyframe(parent) != nullptr && keyframe(parent)->culled) parent = keyframe(parent)->parent;
+  if (parent != kNoKeyframe) parent = live_ancestor(parent).id;
   for (const Keyframe* k = keyframe(parent); k != nullptr; k = keyframe(k->parent))
     if (k->id == id)
       throw std::logic_error("map: keyframe " + std::to_string(id) + " cannot hang on its own descendant");

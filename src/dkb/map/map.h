@@ -94,6 +94,12 @@ class Map {
   PointId resolve(PointId id) const;
   // Pose of any keyframe ever made; culled ones ride on their parents.
   Rigid3 cam_from_world(KeyframeId id) const;
+  // The keyframe itself while it lives, else the living one that it rides on.
+  struct Ancestor {
+    KeyframeId id = kNoKeyframe;
+    Rigid3 cam_from_ancestor;
+  };
+  Ancestor live_ancestor(KeyframeId id) const;
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id

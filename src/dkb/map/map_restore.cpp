@@ -21,7 +21,9 @@ std::string point_name(PointId id) {
   return "point " + std::to_string(id);
 }
 
-void check_parts(const Keyframe& k, KeyframeId expected, KeyframeId count) {
+void check_parts(const std::vector<Keyframe>& keyframes, KeyframeId expected) {
+  const Keyframe& k = keyframes[static_cast<size_t>(expected)];
+  const auto count = static_cast<KeyframeId>(keyframes.size());
   if (k.id != expected) contradiction(keyframe_name(k.id) + " stands where " + keyframe_name(expected) + " should");
   if (k.parent < kNoKeyframe || k.parent >= count || k.parent == k.id)
     contradiction(keyframe_name(k.id) + " has the impossible parent " + std::to_string(k.parent));
@@ -31,6 +33,8 @@ void check_parts(const Keyframe& k, KeyframeId expected, KeyframeId count) {
       contradiction(keyframe_name(k.id) + " is culled but has features");
     return;
   }
+  if (k.parent != kNoKeyframe && keyframes[static_cast<size_t>(k.parent)].culled)
+    contradiction(keyframe_name(k.id) + " hangs on culled keyframe " + std::to_string(k.parent));
   if (!k.features || k.features->descriptors.size() != k.features->size() || k.points.size() != k.features->size())
     contradiction(keyframe_name(k.id) + " has not as many points and descriptors as features");
   for (size_t i = 0; i < k.covisible.size(); ++i) {
@@ -70,7 +74,7 @@ void check_no_cycle(size_t count, const Next& next, const char* what) {
 Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, std::vector<RemovedPoint> removed) {
   Map map;
   const auto count = static_cast<KeyframeId>(keyframes.size());
-  for (KeyframeId id = 0; id < count; ++id) check_parts(keyframes[static_cast<size_t>(id)], id, count);
+  for (KeyframeId id = 0; id < count; ++id) check_parts(keyframes, id);
 
   const auto check_id = [count](PointId id, PointId before, bool first) {
     if (id == kNoPoint || birth_keyframe(id) >= count)

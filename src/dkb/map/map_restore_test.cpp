@@ -61,6 +61,16 @@ TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
   EXPECT_EQ(message([](Parts& p) { p.keyframes[0].parent = 2; }), "parents of keyframes run in a circle");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[0].culled = true; }), "keyframe 0 is culled but has no parent");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].culled = true; }), "keyframe 1 is culled but has features");
+  EXPECT_EQ(message([](Parts& p) {
+              Keyframe& culled = p.keyframes[1];
+              culled.culled = true;
+              culled.features.reset();
+              culled.points.clear();
+              culled.covisible.clear();
+              culled.parent = 0;
+              p.keyframes[2].parent = 1;
+            }),
+            "keyframe 2 hangs on culled keyframe 1");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].features.reset(); }),
             "keyframe 1 has not as many points and descriptors as features");
   EXPECT_EQ(message([](Parts& p) { p.keyframes[1].points.pop_back(); }),

@@ -18,6 +18,10 @@ Matrix6d common_error(const Map& map, const BaWindow& window, const BaResult& re
     const auto c = static_cast<size_t>(window.problem.observations[o].camera);
     observed[c] += window.problem.fixed[c] && !result.outlier[o];
   }
+  // The six numbers of a motion tell as much as three pixels.
+  for (const PoseEdge& motion : window.problem.motions)
+    for (const int end : {motion.a, motion.b})
+      if (const auto c = static_cast<size_t>(end); c < observed.size() && window.problem.fixed[c]) observed[c] += 3;
   Matrix6d sum = Matrix6d::Zero();
   int all = 0;
   for (size_t c = 0; c < window.keyframes.size(); ++c) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "dkb/geometry/motion_model.h"
 #include "dkb/mapping/test_map.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
@@ -75,6 +76,23 @@ TEST_F(LocalBa, APerturbedMapReturnsToTheTruth) {
   EXPECT_EQ(report.outliers, 0);
   EXPECT_EQ(report.cameras, 5);
   EXPECT_EQ(report.fixed, 1);
+}
+
+// In the dark only a motion joins it to the keyframe before, whose error it shares.
+TEST_F(LocalBa, AKeyframeHeldByAMotionAloneIsAsUncertainAsWhatItHangsOn) {
+  build(2, {}, 0, 0);
+  const Matrix6d before = axis_covariance(0.2, 0.02), joint = axis_covariance(0.03, 0.004);
+  map.set_covariance(1, before);
+  Keyframe dark;
+  dark.id = 2;
+  dark.features = std::make_shared<RgbdFeatures>();
+  dark.cam_from_world = map.keyframe(1)->cam_from_world;
+  dark.parent = 1;
+  dark.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{1, {Rigid3(), false, joint}});
+  map.add_keyframe(std::move(dark));
+  adjust(2);
+  const Matrix6d error = map.keyframe(2)->covariance - before - joint;
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-3 * before.cwiseAbs().maxCoeff());
 }
 
 TEST_F(LocalBa, NoiseIsAveragedOut) {

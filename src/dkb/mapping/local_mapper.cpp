@@ -125,7 +125,14 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   k.cam_from_world = packet.reference == kNoKeyframe
                          ? packet.cam_from_reference
                          : packet.cam_from_reference * map_.cam_from_world(packet.reference);
-  if (packet.motion && map_.live_keyframe(packet.motion->previous) != nullptr) k.motion = packet.motion;
+  // A motion ties nothing together where the map begins, and that from a keyframe culled since is that from what this
+  // rides on.
+  if (packet.motion && packet.reference != kNoKeyframe && map_.keyframe(packet.motion->previous) != nullptr) {
+    const Map::Ancestor from = map_.live_ancestor(packet.motion->previous);
+    MotionPrior since = packet.motion->since;
+    since.previous_from_current = from.cam_from_ancestor.inverse() * since.previous_from_current;
+    k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{from.id, since});
+  }
   k.planes = packet.planes;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();

@@ -15,11 +15,6 @@ void hang_tree(Map& map, KeyframeId joint, KeyframeId parent) {
   for (size_t i = 1; i < path.size(); ++i) map.set_parent(path[i], path[i - 1]);
 }
 
-KeyframeId live_ancestor(const Map& map, KeyframeId id) {
-  while (id != kNoKeyframe && map.keyframe(id) != nullptr && map.keyframe(id)->culled) id = map.keyframe(id)->parent;
-  return id;
-}
-
 }  // namespace
 
 void move_map(Map& map, const MapCorrection& correction) {
@@ -68,9 +63,11 @@ void move_map(Map& map, const MapCorrection& correction) {
   for (KeyframeId id : map.live_keyframes())
     if (motion[static_cast<size_t>(id)])
       map.set_pose(id, map.keyframe(id)->cam_from_world * motion[static_cast<size_t>(id)]->inverse());
-  for (const MapCorrection::Outlier& s : correction.outliers) map.forget(map.resolve(s.point), s.keyframe);
+  for (const MapCorrection::Outlier& s : correction.outliers)
+    if (map.point(s.point) != nullptr) map.forget(s.point, s.keyframe);  // what it was fused into may be right there
   if (correction.near_joint != kNoKeyframe) {
-    const KeyframeId near = live_ancestor(map, correction.near_joint), far = live_ancestor(map, correction.far_joint);
+    const KeyframeId near = map.live_ancestor(correction.near_joint).id,
+                     far = map.live_ancestor(correction.far_joint).id;
     if (map.root(near) != map.root(far)) hang_tree(map, near, far);
   }
 }

@@ -41,14 +41,19 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
 
 void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip) {
   const int keyframes = view->live_keyframe_count();
-  for (; next_ < view->keyframe_count(); ++next_) {
-    if (!options_.loop.enabled || view->live_keyframe(next_) == nullptr) continue;
-    if (may_skip && search_.outstanding() >= kMaxLate) continue;
+  // An adjustment that a loop overtook is not made anew in vain: the searches wait for it.
+  while (!adjustment_overtaken_ && next_ < view->keyframe_count()) {
+    const KeyframeId keyframe = next_++;
+    if (!options_.loop.enabled || view->live_keyframe(keyframe) == nullptr) continue;
+    // The newest ones are searched: what they show is where the camera is.
+    const auto left = static_cast<size_t>(view->keyframe_count() - keyframe);
+    if (may_skip && search_.outstanding() + left > kMaxLate) continue;
     // Never before the search before it, however many keyframes were culled meanwhile.
     search_due_ = std::max(search_due_, now + rate.frames(options_.loop_latency(keyframes)));
-    search_.push({view, next_, generation_}, search_due_);
+    search_.push({view, keyframe, generation_}, search_due_);
   }
-  if (adjustment_wanted_ && adjustment_.outstanding() == 0) {
+  const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
+  if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
     adjustment_.push({view, kNoKeyframe, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
     adjustment_wanted_ = false;
   }
@@ -65,7 +70,8 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
   }
   while (auto adjusted = adjustment_.take_due(now, wait)) {
     times_.add("global_ba", adjusted->ms);
-    if (adjusted->generation == generation_) corrections.push_back(std::move(adjusted->correction));
+    adjustment_overtaken_ = adjusted->generation != generation_;
+    if (!adjustment_overtaken_) corrections.push_back(std::move(adjusted->correction));
   }
   return corrections;
 }

@@ -85,6 +85,37 @@ TEST(LoopStage, ThreadsDoNotChangeABit) {
   }
 }
 
+// In real time the search may be too late for all of them: the newest show where the camera is, back at the start.
+TEST(LoopStage, OfKeyframesThatWaitedTheNewestAreSearched) {
+  test::RoundTrip world;
+  world.go(test::RoundTrip::kRound + 2);
+  LoopStage stage(world.optics(), prompt(), {}, 1, false);
+  stage.offer(world.map.snapshot(), 0, FrameRate(30), true);
+  EXPECT_EQ(stage.take_due(100, true).size(), 1U);
+}
+
+// A loop that is closed while the map is being adjusted makes the adjustment of no use. The next one must not be
+// overtaken as well, however many loops there are.
+TEST(LoopStage, AnAdjustmentIsOvertakenOnce) {
+  test::RoundTrip world;
+  world.go(test::RoundTrip::kRound + 2);
+  LoopStage stage(world.optics(), prompt(), {}, 1, false);
+  stage.want_adjustment();
+  stage.offer(world.map.snapshot(), 0, FrameRate(30), true);
+  auto first = stage.take_due(1000, true);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(first[0]->kind, MapCorrection::Kind::loop);
+  move_map(world.map, *first[0]);
+  world.go(1);
+  stage.offer(world.map.snapshot(), 1001, FrameRate(30), true);
+  auto second = stage.take_due(2000, true);
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(second[0]->kind, MapCorrection::Kind::adjustment) << "the new keyframe waits";
+  EXPECT_TRUE(stage.idle());
+  stage.offer(world.map.snapshot(), 2001, FrameRate(30), true);
+  EXPECT_FALSE(stage.idle()) << "its search";
+}
+
 TEST(LoopStage, EndsWithWorkOutstanding) {
   test::RoundTrip world;
   world.go(10);

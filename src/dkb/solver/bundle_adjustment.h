@@ -43,6 +43,13 @@ struct BaOptions {
   double initial_damping = 1e-5;        // Marquardt's factor on the diagonal at the start, > 0
   double relative_tolerance = 1e-5;     // a step that lowers the cost by less than this part ends the round, >= 0
 
+  // For poses and motions alone, a pose graph: it starts far from where it ends, and there is nothing to tell apart.
+  static BaOptions of_pose_graph() {
+    BaOptions options;
+    options.rounds = {20};
+    options.initial_damping = options.relative_tolerance = 1e-6;
+    return options;
+  }
   void check() const;  // throws InvalidOption
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dkb/solver/pose_graph.h"
-
+// Bundle adjustment of poses and motions alone.
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>
 
 #include <array>
 
 #include "dkb/geometry/decompositions.h"
+#include "dkb/solver/bundle_adjustment.h"
 #include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
@@ -23,7 +23,7 @@ Vector6d noise(Random& random, double sigma) {
 // A round trip with odometry edges, some closures, and a start that has drifted.
 struct Circle {
   std::vector<Rigid3> truth;
-  PoseGraph graph;
+  BaProblem graph;
 
   Circle(int n, double sigma, uint64_t seed) {
     Random random(seed);
@@ -41,7 +41,7 @@ struct Circle {
       e.information = weight.asDiagonal();
       e.information(0, 4) = e.information(4, 0) = 0.5;
       e.information /= std::max(sigma * sigma, 1e-6);
-      graph.edges.push_back(e);
+      graph.motions.push_back(e);
     };
     for (int k = 0; k + 1 < n; ++k) join(k, k + 1);
     for (int k = 0; k + 3 < n; k += 2) join(k + 3, k);  // backward edges too
@@ -56,6 +56,10 @@ struct Circle {
     graph.fixed[0] = 1;
   }
 };
+
+BaResult optimise(BaProblem& graph) {
+  return bundle_adjust(graph, BaOptions::of_pose_graph());
+}
 
 double max_difference(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
   double largest = 0;
@@ -92,7 +96,7 @@ struct CeresEdge {
   }
 };
 
-double ceres_pose_graph(PoseGraph& graph) {
+double ceres_pose_graph(BaProblem& graph) {
   std::vector<std::array<double, 7>> poses(graph.cam_from_world.size());
   ceres::Problem problem;
   auto* manifold = new ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>();
@@ -102,7 +106,7 @@ double ceres_pose_graph(PoseGraph& graph) {
     problem.AddParameterBlock(poses[k].data(), 7, manifold);
     if (graph.fixed[k]) problem.SetParameterBlockConstant(poses[k].data());
   }
-  for (const PoseEdge& e : graph.edges) {
+  for (const PoseEdge& e : graph.motions) {
     const Matrix6d root = cholesky_root(e.information).transpose();
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<CeresEdge, 6, 7, 7>(new CeresEdge{e, root}),
                              std::isfinite(e.huber_chi2) ? new ceres::HuberLoss(std::sqrt(e.huber_chi2)) : nullptr,
@@ -124,7 +128,7 @@ double ceres_pose_graph(PoseGraph& graph) {
 
 TEST(PoseGraph, ClosesTheLoopExactlyWithoutNoise) {
   Circle circle(100, 0, 1);
-  const PoseGraphResult result = optimise_pose_graph(circle.graph);
+  const BaResult result = optimise(circle.graph);
   EXPECT_LT(result.final_cost, 1e-6 * result.initial_cost);
   EXPECT_LT(max_difference(circle.graph.cam_from_world, circle.truth), 1e-5);
 }
@@ -133,17 +137,17 @@ TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
   for (const bool robust : {false, true}) {
     Circle circle(80, 0.01, 2);
     if (robust) {
-      for (PoseEdge& e : circle.graph.edges)
+      for (PoseEdge& e : circle.graph.motions)
         if (std::abs(e.a - e.b) > 3) e.huber_chi2 = kChi2SixDof99;
-      PoseEdge wrong = circle.graph.edges.back();
+      PoseEdge wrong = circle.graph.motions.back();
       wrong.a = 20, wrong.b = 60, wrong.huber_chi2 = kChi2SixDof99;
-      circle.graph.edges.push_back(wrong);
+      circle.graph.motions.push_back(wrong);
     }
-    PoseGraph theirs = circle.graph;
-    PoseGraphOptions options;
-    options.iterations = 100;
+    BaProblem theirs = circle.graph;
+    BaOptions options = BaOptions::of_pose_graph();
+    options.rounds = {100};
     options.relative_tolerance = 1e-13;
-    const PoseGraphResult result = optimise_pose_graph(circle.graph, options);
+    const BaResult result = bundle_adjust(circle.graph, options);
     const double cost = ceres_pose_graph(theirs);
     EXPECT_NEAR(result.final_cost, cost, 1e-6 * cost) << robust;
     EXPECT_LT(max_difference(circle.graph.cam_from_world, theirs.cam_from_world), 1e-4) << robust;
@@ -152,42 +156,43 @@ TEST(PoseGraph, ReachesTheMinimumThatCeresReaches) {
 
 TEST(PoseGraph, AWrongRobustEdgeBendsLittle) {
   Circle circle(80, 0.002, 3);
-  PoseEdge wrong = circle.graph.edges.back();
+  PoseEdge wrong = circle.graph.motions.back();
   wrong.a = 20, wrong.b = 60;
-  PoseGraph plain = circle.graph, robust = circle.graph;
-  plain.edges.push_back(wrong);
+  BaProblem plain = circle.graph, robust = circle.graph;
+  plain.motions.push_back(wrong);
   wrong.huber_chi2 = kChi2SixDof99;
-  robust.edges.push_back(wrong);
-  PoseGraphOptions options;
-  options.iterations = 100;
-  optimise_pose_graph(plain, options);
-  optimise_pose_graph(robust, options);
+  robust.motions.push_back(wrong);
+  BaOptions options = BaOptions::of_pose_graph();
+  options.rounds = {100};
+  bundle_adjust(plain, options);
+  bundle_adjust(robust, options);
   EXPECT_LT(max_difference(robust.cam_from_world, circle.truth),
             0.2 * max_difference(plain.cam_from_world, circle.truth));
 }
 
 TEST(PoseGraph, DegenerateGraphsStayFinite) {
-  PoseGraph empty;
-  EXPECT_EQ(optimise_pose_graph(empty).final_cost, 0);
+  BaProblem empty;
+  EXPECT_EQ(optimise(empty).final_cost, 0);
   Circle circle(10, 0.01, 1);
-  PoseGraph free = circle.graph;
+  BaProblem free = circle.graph;
   free.fixed.assign(10, 0);  // nothing holds it
   free.cam_from_world.push_back(Rigid3());
   free.fixed.push_back(0);  // and one pose without edges
-  const PoseGraphResult result = optimise_pose_graph(free);
+  const BaResult result = optimise(free);
   EXPECT_LE(result.final_cost, result.initial_cost);
   for (const Rigid3& pose : free.cam_from_world) {
     EXPECT_TRUE(pose.translation.allFinite() && pose.rotation.coeffs().allFinite());
   }
-  PoseGraph held = circle.graph;
+  BaProblem held = circle.graph;
   held.fixed.assign(10, 1);
-  EXPECT_EQ(optimise_pose_graph(held).iterations, 0);
+  const BaResult unmoved = optimise(held);
+  EXPECT_EQ(unmoved.final_cost, unmoved.initial_cost);
 }
 
 TEST(PoseGraph, TheSameInputGivesTheSameBits) {
   Circle a(60, 0.01, 5), b(60, 0.01, 5);
-  optimise_pose_graph(a.graph);
-  optimise_pose_graph(b.graph);
+  optimise(a.graph);
+  optimise(b.graph);
   for (size_t k = 0; k < a.truth.size(); ++k) {
     EXPECT_EQ(a.graph.cam_from_world[k].translation, b.graph.cam_from_world[k].translation);
     EXPECT_EQ(a.graph.cam_from_world[k].rotation.coeffs(), b.graph.cam_from_world[k].rotation.coeffs());
@@ -196,10 +201,10 @@ TEST(PoseGraph, TheSameInputGivesTheSameBits) {
 
 TEST(PoseGraph, RefusesEdgesThatDoNotFit) {
   Circle circle(5, 0.01, 1);
-  circle.graph.edges[0].a = 5;
-  EXPECT_THROW(optimise_pose_graph(circle.graph), InputError);
-  circle.graph.edges[0].a = circle.graph.edges[0].b;
-  EXPECT_THROW(optimise_pose_graph(circle.graph), InputError);
+  circle.graph.motions[0].a = 5;
+  EXPECT_THROW(optimise(circle.graph), InputError);
+  circle.graph.motions[0].a = circle.graph.motions[0].b;
+  EXPECT_THROW(optimise(circle.graph), InputError);
 }
 
 }  // namespace
