@@ -111,14 +111,21 @@ void MotionSegmenter::move_views(const Rigid3& new_from_old, double after) {
   if (last_) last_->cam_from_world = last_->cam_from_world * old_from_new;
 }
 
-// Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time.
-Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
+// Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time. The
+// interval since the colour image last committed, as a share of that to this depth image, while motion is even.
+std::optional<double> MotionSegmenter::colour_share() const {
   constexpr double kMaxGap = 0.2;  // [s] over which motion is taken to be even
-  if (!last_) return {};
-  const double interval = image_time_ - last_->time, offset = current_->time - image_time_;
-  if (!(interval > 0) || interval > kMaxGap || std::abs(offset) > interval) return {};
+  if (!last_) return std::nullopt;
+  const double interval = image_time_ - last_->time, to_depth = current_->time - last_->time;
+  if (!(interval > 0) || interval > kMaxGap || to_depth < interval / 4 || to_depth > 2 * interval) return std::nullopt;
+  return interval / to_depth;
+}
+
+Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
+  const auto share = colour_share();
+  if (!share) return {};
   const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
-  return rigid3_from_tangent(offset / interval * tangent_from_rigid3(step));
+  return rigid3_from_tangent((1 / *share - 1) * tangent_from_rigid3(step));
 }
 
 void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
@@ -171,8 +178,10 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
                        {previous_->cam_from_world * current_->cam_from_world.inverse(), false, step_covariance});
   if (!aligned_step_) return;
   current_->cam_from_world = aligned_step_->previous_from_current.inverse() * previous_->cam_from_world;
-  const Rigid3 cam_from_world = depth_from_colour_.inverse() * current_->cam_from_world;
-  aligned_step_->previous_from_current = last_->cam_from_world * cam_from_world.inverse();
+  const Rigid3 to_depth = current_->cam_from_world * last_->cam_from_world.inverse();
+  if (const auto share = colour_share())
+    depth_from_colour_ = to_depth * rigid3_from_tangent(*share * tangent_from_rigid3(to_depth)).inverse();
+  aligned_step_->previous_from_current = to_depth.inverse() * depth_from_colour_;
 }
 
 // Not all views speak in each frame: they take turns.

@@ -77,6 +77,7 @@ class MotionSegmenter {
   };
 
   void move_views(const Rigid3& new_from_old, double after);
+  std::optional<double> colour_share() const;
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_pose(const Matrix6d& step_covariance);
   void choose_views();

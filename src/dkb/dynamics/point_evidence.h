@@ -11,6 +11,12 @@ namespace dkb {
 // What the frames say of each map point over time: is it on a mover, or does it fit the still world? Deterministic.
 class PointEvidence {
  public:
+  bool suspects() const { return !suspects_.empty(); }
+  // Points that are no more are no suspects.
+  template <class Lives>
+  void keep(const Lives& lives) {
+    std::erase_if(suspects_, [&](const Suspect& s) { return !lives(s.point); });
+  }
   // Points that were found still, by increasing id, and points that stand on a mover, in the frame of `timestamp` [s].
   // Returns those with enough against them by now, increasing; each once.
   std::vector<PointId> weigh(double timestamp, const std::vector<PointId>& still,

@@ -33,6 +33,17 @@ TEST(PointEvidence, WhatIsFoundStillIsClearedTwiceAsFast) {
   EXPECT_EQ(until_9, 2);
 }
 
+TEST(PointEvidence, PointsThatAreNoMoreAreNoSuspects) {
+  PointEvidence evidence;
+  EXPECT_FALSE(evidence.suspects());
+  evidence.weigh(0, {}, {});
+  for (int i = 1; i < 9; ++i) evidence.weigh(i * kFrame, {}, {4, 9});
+  evidence.keep([](PointId p) { return p != 4; });
+  EXPECT_TRUE(evidence.suspects());
+  evidence.keep([](PointId) { return false; });
+  EXPECT_FALSE(evidence.suspects());
+}
+
 TEST(PointEvidence, AGapCountsAsOneLook) {
   PointEvidence evidence;
   int looks = 0;

@@ -18,7 +18,7 @@ FrameResult Pipeline::process(const Frame& frame) {
   std::vector<DueDetections> detections = scenes_.take_due(index, frame);
   result.waiting_ms = whole.ms();
   const Expectation expected = expect(frame);
-  scenes_.begin(index, frame, std::move(detections), expected, std::exchange(outcome_, std::nullopt));
+  scenes_.begin(index, frame, std::move(detections), expected);
   const Scene scene = scenes_.look(extract(frame), undistort_, expected);  // DKB 3.1
   result.waiting_ms += take_due_map(!options_.pipeline.realtime);  // as late as it may come: nothing before needs it
   follow_motion(scene);

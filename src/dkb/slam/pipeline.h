@@ -57,8 +57,8 @@ class Pipeline {
   void localize_only(bool on) { localize_only_ = on; }
   void suggest_pose(const PosePrediction& pose) {
     tracker_.suggest(pose);
-    if (outcome_) outcome_->cam_from_world.reset();  // nor where the frame before was
-    odometry_.lost();                                // how the camera came there is not known
+    scenes_.forget_views();
+    odometry_.lost();  // how the camera came there is not known
   }
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
   const TrackingMap& map() const { return tracker_.map(); }
@@ -118,8 +118,6 @@ class Pipeline {
   Camera camera_at_readout_;  // as calibrated by now
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
-  std::optional<FrameOutcome> outcome_;
-  Rigid3 new_world_from_old_;  // how the map was corrected after the scene was looked at
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {
     Scene scene;

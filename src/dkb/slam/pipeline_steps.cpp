@@ -113,7 +113,7 @@ void Pipeline::take_view(const MapView& view) {
   const Rigid3 moved = tracker_.take_view(view);
   odometry_.move_world(moved);
   movers_.rebase(moved);
-  new_world_from_old_ = moved * new_world_from_old_;
+  scenes_.move_world(moved);
   record_.set_map(tracker_.map());
 }
 
@@ -234,7 +234,8 @@ void Pipeline::follow_motion(const Scene& scene) {
 
 // Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
 void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
-  if (!tracked.tracked() || scene.mask.empty()) return;
+  // A map that must not change keeps its points: nothing would come in their place.
+  if (!tracked.tracked() || localize_only_ || (scene.mask.empty() && !evidence_.suspects())) return;
   std::vector<PointId> matched, on_mover;
   matched.reserve(tracked.points.size());
   for (PointId p : tracked.points)
@@ -250,6 +251,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
         !std::binary_search(matched.begin(), matched.end(), point.id))
       on_mover.push_back(point.id);
   }
+  evidence_.keep([this](PointId id) { return tracker_.position(id).has_value(); });
   tracker_.retract(evidence_.weigh(tracked.timestamp, matched, on_mover));
 }
 
@@ -280,13 +282,15 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     for (size_t f = 0; f < tracked.points.size(); ++f) {
       const float z = tracked.features->keypoints[f].depth;
       if (!(z > 0) || z > options_.tracking.close_depth) continue;
-      ++(tracked.points[f] != kNoPoint ? tracked_close : creatable_close);
+      if (tracked.points[f] != kNoPoint)
+        ++tracked_close;
+      else if (!tracked.outlier[f])
+        ++creatable_close;
     }
     c.tracked_points = as_usual(tracked.inliers, wanted);
     c.tracked_close_points = as_usual(tracked_close, wanted);
     c.creatable_close_points = as_usual(creatable_close, wanted);
-    c.reference_points = as_usual(tracker_.reference_point_count(tracked.reference, next_keyframe_ > 2 ? 2 : 1),
-                                  options_.features.count);
+    c.reference_points = as_usual(tracker_.reference_point_count(tracked.reference), options_.features.count);
     c.cam_from_world = tracked.cam_from_world;
     c.last_keyframe_cam_from_world = tracker_.map().cam_from_world(c.last_keyframe);
     c.points = &tracked.points;
@@ -374,7 +378,6 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.detections = scene.boxes;
   result.mask = scene.mask;
   FrameOutcome outcome;
-  outcome.new_world_from_old = std::exchange(new_world_from_old_, {});
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();
     outcome.cam_from_world = tracked.cam_from_world;
@@ -401,6 +404,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     if (explain_keyframes_) result.keyframe_explanation = explained(decision);
     if (options_.dynamics.filter == FilterKind::standard) result.movers = movers_.finish(scene, world_from_cam);
   } else if (tracked.state == TrackingState::lost) {
+    since_keyframe_.reset();  // what was told on the way here did not lead to where the camera will be found
     result.ambiguous = tracked.ambiguous;
     odometry_.lost();
   }
@@ -416,7 +420,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
   last_mask_ = scene.mask;
   outcome.keyframe = decision.insert;
-  outcome_ = outcome;
+  scenes_.learn(outcome);
   last_state_ = tracked.state;
   collect_times();
   ++next_frame_;

@@ -58,13 +58,12 @@ void SceneStage::ask_slow_detector(FrameIndex index, const Frame& frame) {
   if (slow_stage_) slow_stage_->offer(index, frame);
 }
 
-void SceneStage::learn(const FrameOutcome& before) {
+void SceneStage::learn(const FrameOutcome& outcome) {
   if (motion_) {
-    motion_->move_world(before.new_world_from_old);
-    motion_->correct_guesses(before.found_world_from_guessed);
-    motion_->commit(before.cam_from_world, before.guessed);
+    motion_->correct_guesses(outcome.found_world_from_guessed);
+    motion_->commit(outcome.cam_from_world, outcome.guessed);
   }
-  if (before.keyframe && !past_.empty()) {
+  if (outcome.keyframe && !past_.empty()) {
     past_.back().keyframe = true;
     if (motion_) past_.back().still = motion_->still();
   }
@@ -128,11 +127,10 @@ Carried SceneStage::carry(const CarryTask& task) {
 }
 
 void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDetections> due,
-                       const Expectation& expected, const std::optional<FrameOutcome>& before) {
+                       const Expectation& expected) {
   // What is left of a frame that failed in between belongs to nobody.
   for (auto* task : {&segmenting_, &carrying_})
     if (*task) (*task)->drop();
-  if (before) learn(*before);
   // Motion, which only supported the detector, is all that is left without it.
   if (slow_stage_ && slow_stage_->failed() && !rival_) segments_motion_ = true;
   if (segmenting_) {

@@ -57,10 +57,9 @@ struct CarryTask {
   std::vector<DueDetections> due;
 };
 
-// What became of the frame before: what the stage learns by it.
+// What became of a frame: what the stage learns by it.
 struct FrameOutcome {
-  Rigid3 new_world_from_old;             // how the map was corrected after the stage looked at it
-  std::optional<Rigid3> cam_from_world;  // in the new world; nothing when lost
+  std::optional<Rigid3> cam_from_world;  // nothing when lost
   bool guessed = false;                  // the pose is a prediction
   Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
@@ -84,10 +83,19 @@ class SceneStage {
     if (slow_stage_) slow_stage_->rest(on);
   }
   // Motion segmentation and flow need no corners: they start, each on a thread of its own, while these are extracted.
-  void begin(FrameIndex index, const Frame& frame, std::vector<DueDetections> due, const Expectation& expected,
-             const std::optional<FrameOutcome>& before);
+  void begin(FrameIndex index, const Frame& frame, std::vector<DueDetections> due, const Expectation& expected);
   // Of the frame that was begun.
   Scene look(ExtractedFrame frame, const UndistortionTable& undistort, const Expectation& expected);
+  // After that: what became of the frame.
+  void learn(const FrameOutcome& outcome);
+  // Not between begin() and look(): later poses are given in the new world.
+  void move_world(const Rigid3& new_from_old) {
+    if (motion_) motion_->move_world(new_from_old);
+  }
+  // Nor is it known where the camera was, or what earlier frames saw.
+  void forget_views() {
+    if (motion_) motion_->reset();
+  }
 
   // Depth is held against earlier depth in each frame, whatever detects movers.
   bool compares_depth() const { return motion_.has_value(); }
@@ -106,7 +114,6 @@ class SceneStage {
   StageTimes take_times();
 
  private:
-  void learn(const FrameOutcome& before);
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
   Segmentation segment_motion(const SegmentationTask& task);
   MoverMask take_motion(std::vector<Detection>& boxes);

@@ -87,15 +87,16 @@ std::vector<std::optional<Eigen::Vector3d>> Tracker::positions(const std::vector
   return result;
 }
 
-int Tracker::reference_point_count(KeyframeId reference, int observers) const {
+int Tracker::reference_point_count(KeyframeId reference) const {
   const Keyframe* k = map_.view().live_keyframe(reference);
   int count = 0;
   if (k == nullptr) {
     for (const auto& [id, p] : provisional_) count += p.keyframe == reference;
     return count;
   }
+  const size_t observers = k->covisible.size() < 2 ? 1 : 2;  // where a map begins, little is seen twice yet
   for (PointId id : k->points)
-    if (const MapPoint* p = map_.view().point(id)) count += static_cast<int>(p->observations.size()) >= observers;
+    if (const MapPoint* p = map_.view().point(id)) count += p->observations.size() >= observers;
   return count;
 }
 
@@ -339,7 +340,7 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
-  if (inliers < options_.min_inliers) return false;
+  if (inliers < std::min(options_.min_inliers, frame.inliers / 2)) return false;  // fewer vouch for expected poses
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -367,8 +368,10 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
   }
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;
-  return track_local_map(found->fit.cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->fit.points,
-                         frame);
+  const bool there =
+      track_local_map(found->fit.cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->fit.points, frame);
+  if (!there) candidates_made_.reset();  // those around the place that was no place
+  return there;
 }
 
 // The frame before was found in the map. It was seen without knowing how fast the camera moves, hence bent by the
@@ -415,7 +418,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
       frame.points.assign(frame.points.size(), kNoPoint);
       frame.outlier.assign(frame.outlier.size(), 0);
       frame.odometry.assign(frame.odometry.size(), std::nullopt);
-      odometry_.clear();  // they belong to the last frame, which the sighting will replace
+      odometry_.clear();         // they belong to the last frame, which the sighting will replace
+      candidates_made_.reset();  // and these to the sighting
       go_on_unseen(predicted, input.step, frame);
       return frame;
     }

@@ -71,8 +71,8 @@ class Tracker {
   std::vector<PointInView> points_in_view() const;
   const std::optional<TrackedFrame>& last_frame() const { return last_; }
 
-  // Points of the reference keyframe that at least `observers` keyframes see.
-  int reference_point_count(KeyframeId reference, int observers) const;
+  // Points of the reference keyframe that another keyframe sees as well; all of them where a map begins.
+  int reference_point_count(KeyframeId reference) const;
   // Position of a point that tracking may match, in the world; nothing when it is gone.
   std::optional<Eigen::Vector3d> position(PointId id) const;
   std::vector<std::optional<Eigen::Vector3d>> positions(const std::vector<PointId>& points) const;

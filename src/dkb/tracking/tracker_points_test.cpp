@@ -244,11 +244,10 @@ TEST_F(TrackerTest, AllCloseDepthsMakePoints) {
 TEST_F(TrackerTest, CountsTheReferencesPoints) {
   const KeyframePacket packet = start();
   const int points = static_cast<int>(packet.new_points.size());
-  EXPECT_EQ(tracker.reference_point_count(0, 1), points) << "provisional ones";
+  EXPECT_EQ(tracker.reference_point_count(0), points) << "provisional ones";
   publish(packet);
-  EXPECT_EQ(tracker.reference_point_count(0, 1), points);
-  EXPECT_EQ(tracker.reference_point_count(0, 2), 0) << "one keyframe sees them";
-  EXPECT_EQ(tracker.reference_point_count(7, 1), 0);
+  EXPECT_EQ(tracker.reference_point_count(0), points) << "one keyframe sees them, and it has no neighbours";
+  EXPECT_EQ(tracker.reference_point_count(7), 0);
 }
 
 TEST_F(TrackerTest, FusedPointsAreShownByOneFeature) {

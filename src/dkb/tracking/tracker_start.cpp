@@ -40,7 +40,7 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
     retract(made);
   }
   frame.inliers = with_depth;
-  frame.cam_from_world = last_ ? last_->cam_from_world : start_;
+  frame.cam_from_world = last_ ? last_->cam_from_world : suggested_ ? suggested_->cam_from_world : start_;
   frame.covariance = Matrix6d::Identity() * (kStartSd * kStartSd);
   if (expected != nullptr) {
     frame.cam_from_world = expected->cam_from_world;

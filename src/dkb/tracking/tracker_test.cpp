@@ -242,6 +242,21 @@ TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   EXPECT_LT(distance_between(o.cam_from_world, on_path(2)), 1e-4);
 }
 
+TEST_F(TrackerTest, ANewMapBeginsWhereTheCameraWasSuggestedToBe) {
+  TrackingOptions options;
+  options.new_map_after = 2.5 * kFrameTime;
+  tracker = Tracker(scene.optics(), options, 1);
+  publish(start(on_path(0)));
+  track(on_path(1));
+  const Rigid3 suggested = TestScene::camera_at({5, 0, -3}, {0, 1, 0});
+  tracker.suggest({suggested, Matrix6d::Identity()});
+  scene = TestScene(700, 99);
+  TrackedFrame o;
+  for (int f = 0; f < 4; ++f) o = track(Rigid3{});
+  ASSERT_TRUE(o.starts_map);
+  EXPECT_LT(distance_between(o.cam_from_world, suggested), 1e-12);
+}
+
 TEST_F(TrackerTest, AMapFromWhoseFirstFrameNothingFollowsBeginsAgain) {
   publish(start(on_path(0)));
   scene = TestScene(700, 99);
