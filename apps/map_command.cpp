@@ -121,6 +121,8 @@ void check_arguments(const MapExportArguments& arguments) {
   const DetectorChoice by_default;
   const std::string unused = d.kinds != by_default.kinds           ? "--detector"
                              : !d.model.empty()                    ? "--model"
+                             : !d.labels.empty()                   ? "--labels"
+                             : !d.classes.empty()                  ? "--classes"
                              : d.inference != by_default.inference ? "--inference"
                                                                    : "";
   if (!unused.empty())
@@ -190,6 +192,8 @@ void register_map(CLI::App& app, int& exit_code) {
   add_source_options(*cloud, arguments->reading);
   cloud->add_option("--detector", arguments->detection.kinds, "of the masks: auto, yolo, motion, none");
   cloud->add_option("--model", arguments->detection.model, "ONNX file of the yolo detector");
+  cloud->add_option("--labels", arguments->detection.labels, "Class names of that model, one per line");
+  cloud->add_option("--classes", arguments->detection.classes, "Those of them that may move, by comma");
   cloud->add_option("--inference", arguments->detection.inference, "What computes it: auto, onnxruntime, opencv");
   cloud->callback([arguments, &exit_code] {
     export_map(*arguments);

@@ -167,10 +167,9 @@ TEST_F(Export, TheModelOfTheMasksMayStandInTheEnvironment) {
 
 TEST_F(Export, OptionsThatDoNothingAreRefused) {
   const std::string images = sequence().string();
-  const std::vector<std::pair<std::string, std::vector<std::string>>> maps = {{"ply", {"--images", images}},
-                                                                              {"pcd", {"--detector", "motion"}},
-                                                                              {"json", {"--model", "x.onnx"}},
-                                                                              {"colmap", {"--inference", "opencv"}}};
+  const std::vector<std::pair<std::string, std::vector<std::string>>> maps = {
+      {"ply", {"--images", images}},   {"ply", {"--camera", "fr1"}},     {"pcd", {"--detector", "motion"}},
+      {"json", {"--model", "x.onnx"}}, {"pcd", {"--classes", "person"}}, {"colmap", {"--inference", "opencv"}}};
   for (const auto& [format, more] : maps) {
     const Finished done = export_map(format, more);
     EXPECT_EQ(done.exit_code, 2) << more[0];
@@ -179,7 +178,8 @@ TEST_F(Export, OptionsThatDoNothingAreRefused) {
   const std::string tum = (folder / "tum").string(), bag = (folder / "x.bag").string();
   const std::vector<std::vector<std::string>> results = {{"--images", images, "--format", "tum", "--out", tum},
                                                          {"--camera", "fr1", "--format", "tum", "--out", tum},
-                                                         {"--camera", "fr1", "--out", bag}};
+                                                         {"--camera", "fr1", "--out", bag},
+                                                         {"--depth-topic", "/d", "--out", bag}};
   for (const auto& more : results) {
     std::vector<std::string> arguments = {"export", run.out.string()};
     arguments.insert(arguments.end(), more.begin(), more.end());

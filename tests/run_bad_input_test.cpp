@@ -154,6 +154,7 @@ std::vector<Case> cases() {
        [](const fs::path& d) { write_text(d / "o.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"); },
        {"--prior", "odom", "--prior-file", "@/o.txt"}},
       {"classes of no network", "--labels", [](const fs::path&) {}, {"--detector", "motion", "--labels", "x"}},
+      {"what may move of no network", "--classes", [](const fs::path&) {}, {"--detector", "motion", "--classes", "x"}},
       {"a model of no network", "--model", [](const fs::path&) {}, {"--detector", "motion", "--model", "x"}},
       {"detections of no network",
        "--detect-every",

@@ -334,6 +334,7 @@ class Runner {
     add("--filter", v.filter);
     if (const auto model = model_.find(job.variant); model != model_.end()) add("--model", model->second.string());
     add("--labels", v.labels);
+    add("--classes", v.classes);
     add("--inference", v.inference);
     if (!v.boxes.empty()) add("--boxes", (data / v.boxes).string());
     if (!v.masks.empty()) add("--masks", (data / v.masks).string());

@@ -198,6 +198,7 @@ SuiteVariant read_variant(const std::string& name, const Reader& reader) {
                      {"filter", to_text(&v.filter)},
                      {"model", to_text(&v.model)},
                      {"labels", to_text(&v.labels)},
+                     {"classes", to_text(&v.classes)},
                      {"inference", to_text(&v.inference)},
                      {"boxes", to_text(&v.boxes)},
                      {"masks", to_text(&v.masks)},
@@ -386,6 +387,7 @@ std::string suite_hash(const Suite& suite) {
                              {"detector", v.detector},
                              {"filter", v.filter},
                              {"files", {v.model, v.labels, v.boxes, v.masks}},
+                             {"classes", v.classes},
                              {"inference", v.inference},
                              {"set", v.set}});
   uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a

@@ -30,7 +30,7 @@ struct SuiteVariant {
   std::string preset = "default";
   std::vector<std::string> disable;
   // Empty: as `run` chooses. model: may hold ${VARIABLE}s; boxes, masks: below the sequence's folder.
-  std::string detector, filter, model, labels, inference, boxes, masks;
+  std::string detector, filter, model, labels, classes, inference, boxes, masks;
   std::map<std::string, std::string> set;  // settings by key
   std::string get;        // how to get what it needs, e.g. a model; with it, what is missing is named and left out
   std::string published;  // its name in the table of published numbers; empty: its own name
