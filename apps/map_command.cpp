@@ -21,6 +21,7 @@
 #include "export/keyframe_pictures.h"
 #include "export/map_model.h"
 #include "interrupt.h"
+#include "run_session.h"
 #include "source_options.h"
 #include "terminal.h"
 
@@ -78,6 +79,8 @@ struct MapExportArguments {
 void export_model(const MapExportArguments& arguments) {
   const MapFile file = load_map(arguments.file);
   const bool colmap = arguments.format == "colmap";
+  if (!colmap && file.context.camera.rational())
+    throw InputError("--format nerfstudio: has no cameras with rational distortion (k4, k5, k6); give --format colmap");
   const std::filesystem::path out = arguments.out;
   const Interrupt interrupt([] {});
   NewFolder folder(out);
@@ -114,7 +117,7 @@ void check_arguments(const MapExportArguments& arguments) {
   const bool model = arguments.format == "colmap" || arguments.format == "nerfstudio";
   if (!model && !arguments.images.empty())
     throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
-  if (!arguments.images.empty()) return;
+  if (!arguments.images.empty()) return check_detector(arguments.detection);
   if (const std::string option = source_option_given(arguments.reading); !option.empty())
     throw InputError(option + ": is that of --images; add them, or leave it out");
   const DetectorChoice& d = arguments.detection;

@@ -8,7 +8,6 @@
 #include "run_session.h"
 
 namespace dkb {
-namespace {
 
 // That --filter none, --disable dr and --preset orb win over a detector is no contradiction: comparisons of filters run
 // with the same detector.
@@ -26,8 +25,6 @@ void check_detector(const DetectorChoice& choice) {
   if (choice.every > 0 && !slow) refuse("--detect-every", "network or command");
   if (choice.latency > 0 && !slow) refuse("--detect-latency", "network or command");
 }
-
-}  // namespace
 
 void check_arguments(const RunArguments& args, const Options& options) {
   if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");

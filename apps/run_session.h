@@ -50,6 +50,8 @@ struct RunArguments {
 
 // Refuses options that contradict each other. Throws InputError.
 void check_arguments(const RunArguments& args, const Options& options);
+// Throws InputError for an option that is for a detector which was not chosen.
+void check_detector(const DetectorChoice& choice);
 
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {

@@ -175,6 +175,9 @@ TEST_F(Export, OptionsThatDoNothingAreRefused) {
     EXPECT_EQ(done.exit_code, 2) << more[0];
     EXPECT_NE(done.err.find("error: " + more[0] + ": "), std::string::npos) << done.err;
   }
+  EXPECT_NE(
+      export_map("colmap", {"--images", images, "--detector", "motion", "--classes", "person"}).err.find("--classes: "),
+      std::string::npos);
   const std::string tum = (folder / "tum").string(), bag = (folder / "x.bag").string();
   const std::vector<std::vector<std::string>> results = {{"--images", images, "--format", "tum", "--out", tum},
                                                          {"--camera", "fr1", "--format", "tum", "--out", tum},

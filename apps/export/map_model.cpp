@@ -93,8 +93,6 @@ void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes,
 void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyframes, bool has_masks,
                       const std::filesystem::path& folder) {
   const Camera& c = file.context.camera;
-  if (c.rational())
-    throw InputError("--format nerfstudio: has no cameras with rational distortion (k4, k5, k6); give --format colmap");
   nlohmann::ordered_json model;
   model["camera_model"] = "OPENCV";
   model["w"] = c.width, model["h"] = c.height;

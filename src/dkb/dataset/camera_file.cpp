@@ -17,7 +17,7 @@ namespace {
 const std::vector<std::string> kRequired{"fx", "fy", "cx", "cy", "width", "height", "depth_factor"};
 const std::vector<std::string> kBuiltin{"fr1", "fr2", "fr3", "bonn"};
 
-// Files of other cameras than rational ones are as they were before there were these.
+// `rational`: with k4 to k6, which are written for rational cameras alone.
 void bind(Settings* settings, CameraModel* c, bool rational = true) {
   settings->bind("width", &c->width, "[px]");
   settings->bind("height", &c->height, "[px]");

@@ -89,7 +89,6 @@ void DeviceSource::add(DeviceImage image, bool is_depth) {
     gone_since_.reset();
   }
   image.stamp_ns += shift_ns_;
-  if (is_stamp(image.stamp_ns)) last_stamp_ = std::max(last_stamp_, image.stamp_ns);
   pairs_.add(image, is_depth);
   if (!pairs_.behind()) return;
   pairs_.restart();  // as when it was unplugged: the clock starts anew, and stamps go on rising
@@ -98,6 +97,7 @@ void DeviceSource::add(DeviceImage image, bool is_depth) {
 
 std::optional<SourceFrame> DeviceSource::frame_of(const ImagePair& pair) {
   const size_t index = seen_++;
+  last_stamp_ = std::max(pair.colour.stamp_ns, pair.depth.stamp_ns);
   if (!filter_.wants(seconds_from_ns(pair.colour.stamp_ns))) return std::nullopt;
   SourceFrame frame;
   frame.index = index;

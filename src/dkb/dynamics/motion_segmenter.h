@@ -105,7 +105,7 @@ class MotionSegmenter {
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
   double told_ = 0;        // [s] depth stamp of the last image committed with a pose that images told
-  bool guessing_ = false;  // another one came after it
+  bool guessing_ = false;  // the pose committed last was a guess
   std::optional<MotionPrior> aligned_step_;
   size_t turn_ = 0;
   MotionProjection projection_;

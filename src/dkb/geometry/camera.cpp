@@ -17,29 +17,6 @@ constexpr double kKinectReadout = 0.020;
 
 }  // namespace
 
-void CameraModel::check() const {
-  require_option(width >= 16 && width <= 16384, "width", width, "16 ... 16384 px");
-  require_option(height >= 16 && height <= 16384, "height", height, "16 ... 16384 px");
-  require_option(std::isfinite(fx) && fx > 0, "fx", fx, "greater than 0 px");
-  require_option(std::isfinite(fy) && fy > 0, "fy", fy, "greater than 0 px");
-  require_option(std::isfinite(cx) && cx > 0 && cx < width, "cx", cx, "inside the image (0 ... width)");
-  require_option(std::isfinite(cy) && cy > 0 && cy < height, "cy", cy, "inside the image (0 ... height)");
-  require_option(std::isfinite(k1), "k1", k1, "finite");
-  require_option(std::isfinite(k2), "k2", k2, "finite");
-  require_option(std::isfinite(p1), "p1", p1, "finite");
-  require_option(std::isfinite(p2), "p2", p2, "finite");
-  require_option(std::isfinite(k3), "k3", k3, "finite");
-  require_option(std::isfinite(k4), "k4", k4, "finite");
-  require_option(std::isfinite(k5), "k5", k5, "finite");
-  require_option(std::isfinite(k6), "k6", k6, "finite");
-  require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
-                 "greater than 0 units per metre");
-  require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
-  require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
-  require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");
-  require_option(std::isfinite(depth_max) && depth_max > depth_min, "depth_max", depth_max, "greater than depth_min");
-}
-
 Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& ideal_pixel) const {
   const double x = (ideal_pixel.x() - cx) / fx, y = (ideal_pixel.y() - cy) / fy;
   const double r2 = x * x + y * y;
@@ -99,7 +76,8 @@ Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const
 
 namespace {
 
-// The same of the rational model, whose slope is a ratio of longer polynomials: by steps, which no lens folds between.
+// unfolded() of the rational model, whose slope is a ratio of longer polynomials: asked at 24 radii. No lens folds and
+// unfolds between two of them.
 bool rational_unfolded(const CameraModel& c, double u) {
   constexpr int kSteps = 24;
   for (int i = 1; i <= kSteps; ++i) {
@@ -126,6 +104,18 @@ bool unfolded(const CameraModel& c, double u) {
   return true;
 }
 
+// A ratio has poles: a calibration that puts one into the image would show walls where there are none.
+std::optional<Eigen::Vector2d> pixel_without_ray(const CameraModel& c) {
+  constexpr int kGrid = 16;
+  for (int i = 0; i <= kGrid * kGrid + 2 * kGrid; ++i) {
+    const Eigen::Vector2d pixel(i % (kGrid + 1) * (c.width - 1.0) / kGrid, i / (kGrid + 1) * (c.height - 1.0) / kGrid);
+    const std::optional<Eigen::Vector2d> ideal = rational_ideal(c, pixel);
+    if (!ideal || !unfolded(c, Eigen::Vector2d((ideal->x() - c.cx) / c.fx, (ideal->y() - c.cy) / c.fy).squaredNorm()))
+      return pixel;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eigen::Vector3d& point) {
@@ -134,6 +124,31 @@ std::optional<Eigen::Vector2d> image_pixel(const CameraModel& camera, const Eige
   if (!camera.distorted()) return ideal;
   if (!unfolded(camera, (point.head<2>() / point.z()).squaredNorm())) return std::nullopt;
   return camera.distort(ideal);
+}
+
+void CameraModel::check() const {
+  require_option(width >= 16 && width <= 16384, "width", width, "16 ... 16384 px");
+  require_option(height >= 16 && height <= 16384, "height", height, "16 ... 16384 px");
+  require_option(std::isfinite(fx) && fx > 0, "fx", fx, "greater than 0 px");
+  require_option(std::isfinite(fy) && fy > 0, "fy", fy, "greater than 0 px");
+  require_option(std::isfinite(cx) && cx > 0 && cx < width, "cx", cx, "inside the image (0 ... width)");
+  require_option(std::isfinite(cy) && cy > 0 && cy < height, "cy", cy, "inside the image (0 ... height)");
+  require_option(std::isfinite(k1), "k1", k1, "finite");
+  require_option(std::isfinite(k2), "k2", k2, "finite");
+  require_option(std::isfinite(p1), "p1", p1, "finite");
+  require_option(std::isfinite(p2), "p2", p2, "finite");
+  require_option(std::isfinite(k3), "k3", k3, "finite");
+  require_option(std::isfinite(k4), "k4", k4, "finite");
+  require_option(std::isfinite(k5), "k5", k5, "finite");
+  require_option(std::isfinite(k6), "k6", k6, "finite");
+  require_option(!rational() || !pixel_without_ray(*this), "k4", k4,
+                 "such that with the other coefficients every pixel has a ray, as through a lens");
+  require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
+                 "greater than 0 units per metre");
+  require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
+  require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
+  require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");
+  require_option(std::isfinite(depth_max) && depth_max > depth_min, "depth_max", depth_max, "greater than depth_min");
 }
 
 void CameraModel::set_distortion(const std::string& model, const std::vector<double>& coefficients) {
@@ -153,16 +168,10 @@ void CameraModel::set_distortion(const std::string& model, const std::vector<dou
       throw InputError(std::to_string(coefficients.size()) + " coefficients of distortion, 4 to " +
                        std::to_string(most) + " expected");
     for (size_t i = 0; i < std::min(most, coefficients.size()); ++i) *fields[i] = coefficients[i];
-    // A ratio has poles: a calibration that puts one into the image would show walls where there are none.
-    constexpr int kGrid = 16;
-    for (int i = 0; made.rational() && i <= kGrid * kGrid + 2 * kGrid; ++i) {
-      const Eigen::Vector2d pixel(i % (kGrid + 1) * (width - 1.0) / kGrid, i / (kGrid + 1) * (height - 1.0) / kGrid);
-      const std::optional<Eigen::Vector2d> ideal = rational_ideal(made, pixel);
-      if (!ideal || !unfolded(made, Eigen::Vector2d((ideal->x() - cx) / fx, (ideal->y() - cy) / fy).squaredNorm()))
-        throw InputError("its coefficients of distortion show no ray at pixel " +
-                         std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y())) +
-                         ", so they are of no lens");
-    }
+    if (const auto pixel = made.rational() ? pixel_without_ray(made) : std::nullopt)
+      throw InputError("its coefficients of distortion give no ray at pixel (" +
+                       std::to_string(std::lround(pixel->x())) + ", " + std::to_string(std::lround(pixel->y())) +
+                       "), as no lens does");
   }
   *this = made;
 }

@@ -219,7 +219,11 @@ TEST(RationalDistortion, WhatIsOfNoLensIsRefusedAndTheCameraIsAsItWas) {
   };
   // The divisor is 0 at a tangent of 0.58, and so 350 px from the middle.
   EXPECT_EQ(refused("rational_polynomial", {0, 0, 0, 0, 0, -3, 0, 0}),
-            "its coefficients of distortion show no ray at pixel 0 0, so they are of no lens");
+            "its coefficients of distortion give no ray at pixel (0, 0), as no lens does");
+  CameraModel written_by_hand = c;
+  written_by_hand.k4 = -3;
+  EXPECT_THROW(written_by_hand.check(), InvalidOption);
+  EXPECT_NO_THROW(c.check());
   EXPECT_EQ(refused("equidistant", {0.1, 0, 0, 0}),
             "its distortion model equidistant is none of ours (plumb_bob, rational_polynomial)");
   EXPECT_EQ(refused("plumb_bob", {0.1, 0, 0, 0, 0, 0.1}), "6 coefficients of distortion, 4 to 5 expected");

@@ -138,7 +138,7 @@ TEST(RecordedCamera, OtherModelsOfDistortionAreRefusedByName) {
   info.d[5] = -20;
   EXPECT_NE(input_error_of([&] {
               camera_of(info, false, "/info");
-            }).find("/info: its coefficients of distortion show no ray at pixel 0 0, so they are of no lens; give"),
+            }).find("/info: its coefficients of distortion give no ray at pixel (0, 0), as no lens does; give"),
             std::string::npos);
   info.distortion_model = "";
   info.d = {0.1, 0.2, 0.3, 0.4};

@@ -142,7 +142,8 @@ Outcome with_stamps(const Wrong& wrong) {
 TEST(StampPairing, OneStampFarAheadCostsTenImages) {
   constexpr int64_t kHour = 3600 * kNsPerSecond;
   for (const int64_t at : {0, 20})
-    for (const auto& [of_colour, of_depth] : {std::pair{true, false}, {false, true}, {true, true}}) {
+    for (const auto& wrong_of : {std::pair{true, false}, {false, true}, {true, true}}) {
+      const bool of_colour = wrong_of.first, of_depth = wrong_of.second;
       const Outcome outcome = with_stamps([&](StampPairing::Kind kind, int64_t n) {
         const bool wrong = n == at && (kind == StampPairing::colour ? of_colour : of_depth);
         return 33 * kMs * n + (wrong ? kHour : 0);

@@ -388,6 +388,8 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
       odometry_.update(tracked.predicted->cam_from_world.inverse(), false);
       outcome.found_world_from_guessed = world_from_cam * tracked.predicted->cam_from_world;
     }
+    // How what was seen before the guesses lies to what is seen now is not known.
+    if (seen_again && (tracked.starts_map || !tracked.predicted)) scenes_.forget_views();
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();

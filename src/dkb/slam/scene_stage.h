@@ -92,7 +92,7 @@ class SceneStage {
   void move_world(const Rigid3& new_from_old) {
     if (motion_) motion_->move_world(new_from_old);
   }
-  // Nor is it known where the camera was, or what earlier frames saw.
+  // How the camera came to where it is now is not known: what earlier views saw cannot be put beside it.
   void forget_views() {
     if (motion_) motion_->reset();
   }

@@ -340,7 +340,8 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   const PoseEstimate pose = refine(frame.cam_from_world, pairs, *features, frame.predicted);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + in_map, uint8_t{1});
-  if (inliers < std::min(options_.min_inliers, frame.inliers / 2)) return false;  // fewer vouch for expected poses
+  // Half as many vouch for a pose that was expected (track_expected).
+  if (inliers < (frame.inliers < options_.min_inliers ? options_.min_inliers / 2 : options_.min_inliers)) return false;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (pose.inlier[i]) continue;
     const auto f = static_cast<size_t>(pairs[i].feature);

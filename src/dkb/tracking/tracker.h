@@ -80,7 +80,7 @@ class Tracker {
   void reset_motion();
   // Somebody says where the camera is: the next frames are sought there first, until one is found.
   void suggest(const PosePrediction& pose);
-  // Where the camera of the very first map stands; later ones start where the camera was seen last.
+  // Where the camera of the very first map stands; later ones start where it was seen last or suggested to be.
   void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
  private:
