@@ -99,7 +99,7 @@ BaProblem rounds_of_a_circle(int keyframes, int closures) {
   BaProblem graph;
   const auto join = [&](int a, int b) {
     const Rigid3 b_from_a = truth[b] * truth[a].inverse() * rigid3_from_tangent(noise(0.005));
-    graph.motions.push_back({a, b, b_from_a, 4e4 * Matrix6d::Identity(), false});
+    graph.motions.push_back({a, b, b_from_a, 4e4 * Matrix6d::Identity()});
   };
   graph.cam_from_world.push_back(truth[0]);
   for (int k = 1; k < keyframes; ++k) {
