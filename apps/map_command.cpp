@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -151,10 +150,7 @@ struct MergeArguments {
 void merge(const MergeArguments& arguments) {
   const MapFile first = load_map(arguments.first), second = load_map(arguments.second);
   const MapFileContext &a = first.context, &b = second.context;
-  const auto numbers = [](const CameraModel& m) {
-    return std::array{m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.p1, m.p2, m.k3, m.k4, m.k5, m.k6};
-  };
-  if (a.camera.width != b.camera.width || a.camera.height != b.camera.height || numbers(a.camera) != numbers(b.camera))
+  if (!same_optics(a.camera, b.camera))
     throw InputError(arguments.second + ": was made with another camera than " + arguments.first +
                      "; maps of one camera can be merged");
   if (a.levels != b.levels || a.scale_factor != b.scale_factor)

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "dkb/map/point_cloud.h"
-#include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
 

@@ -108,9 +108,9 @@ class DKB_SLAM_API Slam {
   void pause(bool on);
   /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
   void localize_only(bool on);
-  /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found
-  /// or a new map begins, which begins there. The pose
-  /// is in the world of the map, the covariance a right perturbation, [translation m, rotation rad], camera axes.
+  /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new
+  /// map begins, at that place. The pose is in the world of the map, the covariance a right perturbation,
+  /// [translation m, rotation rad], camera axes.
   /// Throws InputError when a number is not finite or the covariance is not positive.
   void suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance);
   /// Every frame's result then says which of the keyframe tests said what, with their numbers.

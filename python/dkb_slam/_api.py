@@ -60,7 +60,8 @@ class Slam(_core.Slam):
         if classes is not None and not isinstance(classes, str):
             classes = ",".join(classes)
         super().__init__(camera, preset=preset, detector=detector, model=model, labels=labels, classes=classes or "",
-                         boxes=boxes, masks=masks, inference=inference, detect_every=detect_every, detect_latency=detect_latency,
+                         boxes=boxes, masks=masks, inference=inference, detect_every=detect_every,
+                         detect_latency=detect_latency,
                          filter=filter, disable=disable, settings=None if settings is None else dict(settings),
                          config=config, seed=seed, threads=threads, realtime=realtime, dense=dense,
                          final_ba=final_ba, base_from_cam=base_from_cam)

@@ -80,7 +80,8 @@ std::string camera_repr(const Camera& camera) {
 void bind_camera(py::module_& module) {
   py::class_<Camera> camera(module, "Camera", R"(Camera(*, width, height, fx, fy, cx, cy, depth_factor, **optional)
 
-Pinhole camera with distortion (Brown-Conrady, or OpenCV's rational model), and the depth format that comes with it. Immutable.
+Pinhole camera with distortion (Brown-Conrady, or OpenCV's rational model), and the depth format that comes with it.
+Immutable.
 
 Axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the colour camera.
 

@@ -175,7 +175,7 @@ FolderLayout open_replica(const fs::path& folder) {
   FolderLayout layout;
   const fs::path results = folder / "results";
   layout.dataset = paired_by_number(folder, "Replica", numbered_images(results, "frame", kReplicaColour),
-                                    numbered_images(results, "depth", {".png"}));
+                                    numbered_images(results, "depth", kPng));
   const fs::path above = fs::absolute(folder / "..").lexically_normal();
   if (const auto file = first_of({folder, results, above}, {"cam_params.json"}))
     layout.camera = {parse_replica_camera(read_file(*file), file->string()), file->string()};

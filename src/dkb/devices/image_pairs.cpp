@@ -12,7 +12,6 @@
 namespace dkb {
 namespace {
 
-constexpr int64_t kFarAhead = 2 * kNsPerSecond;
 constexpr size_t kMostWaiting = 8;  // images of a stream whose other stream is silent
 
 // [ns] between the images of a pair
@@ -77,7 +76,9 @@ std::optional<ImagePair> ImagePairs::take() {
       continue;
     }
     if (!colour_settled) return std::nullopt;
-    if (!closed_ && taken_ && colours.size() == 1 && colour.stamp_ns - *taken_ > kFarAhead) return std::nullopt;
+    if (!closed_ && taken_ && colours.size() == 1 &&
+        seconds_from_ns(colour.stamp_ns - *taken_) > RisingStamps::kFarAhead)
+      return std::nullopt;
     ImagePair pair{std::move(colours.front()), std::move(depths.front())};
     taken_ = pair.colour.stamp_ns;
     colour_.stamps.hand_on(pair.colour.stamp_ns), depth_.stamps.hand_on(pair.depth.stamp_ns);

@@ -45,12 +45,13 @@ class MotionRays {
   CellRange all_cells() const { return {0, x_.size()}; }
 
  private:
-  int cell_, width_, height_;
-  float fx_, fy_, cx_, cy_;  // in cells
   // The rational model costs a division more for each cell.
   template <bool rational>
   void project_by(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
                   MotionProjection& result, Simd simd) const;
+
+  int cell_, width_, height_;
+  float fx_, fy_, cx_, cy_;  // in cells
   float k1_, k2_, k3_, k4_, k5_, k6_, p1_, p2_, r2_max_;
   bool rational_;
   std::vector<float> x_, y_;  // rays through the cells' middles, at depth 1

@@ -29,6 +29,16 @@ Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& ideal_pixel) const {
 
 namespace {
 
+// The rational model's factor is above / below, two polynomials in the squared tangent u of a ray's angle; their
+// slopes.
+struct RationalRadial {
+  double above, below, above_slope, below_slope;
+};
+RationalRadial rational_radial(const CameraModel& c, double u) {
+  return {1 + u * (c.k1 + u * (c.k2 + u * c.k3)), 1 + u * (c.k4 + u * (c.k5 + u * c.k6)),
+          c.k1 + u * (2 * c.k2 + u * 3 * c.k3), c.k4 + u * (2 * c.k5 + u * 3 * c.k6)};
+}
+
 // The rational model turned round by Newton's method: its factor is steep towards the corners of a wide lens, where the
 // iteration that serves Brown's model is slow. Nothing where that does not settle.
 std::optional<Eigen::Vector2d> rational_ideal(const CameraModel& c, const Eigen::Vector2d& image_pixel) {
@@ -37,11 +47,9 @@ std::optional<Eigen::Vector2d> rational_ideal(const CameraModel& c, const Eigen:
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector2d off = image_pixel - c.distort(pixel_of());  // [px]
     if (off.norm() < 1e-9) return pixel_of();
-    const double x = at.x(), y = at.y(), r2 = at.squaredNorm();
-    const double above = 1 + r2 * (c.k1 + r2 * (c.k2 + r2 * c.k3)), below = 1 + r2 * (c.k4 + r2 * (c.k5 + r2 * c.k6));
-    const double above_slope = c.k1 + r2 * (2 * c.k2 + r2 * 3 * c.k3);
-    const double below_slope = c.k4 + r2 * (2 * c.k5 + r2 * 3 * c.k6);
-    const double radial = above / below, slope = (above_slope - radial * below_slope) / below;
+    const double x = at.x(), y = at.y();
+    const RationalRadial r = rational_radial(c, at.squaredNorm());
+    const double radial = r.above / r.below, slope = (r.above_slope - radial * r.below_slope) / r.below;
     Eigen::Matrix2d jacobian;
     const double mixed = 2 * (slope * x * y + c.p1 * x + c.p2 * y);
     jacobian << radial + 2 * slope * x * x + 2 * c.p1 * y + 6 * c.p2 * x, mixed, mixed,
@@ -82,10 +90,9 @@ bool rational_unfolded(const CameraModel& c, double u) {
   constexpr int kSteps = 24;
   for (int i = 1; i <= kSteps; ++i) {
     const double at = u * i / kSteps;
-    const double above = 1 + at * (c.k1 + at * (c.k2 + at * c.k3)), below = 1 + at * (c.k4 + at * (c.k5 + at * c.k6));
-    const double above_slope = c.k1 + at * (2 * c.k2 + at * 3 * c.k3);
-    const double below_slope = c.k4 + at * (2 * c.k5 + at * 3 * c.k6);
-    if (!(below > 0 && above * below + 2 * at * (above_slope * below - above * below_slope) > 0)) return false;
+    const RationalRadial r = rational_radial(c, at);
+    if (!(r.below > 0 && r.above * r.below + 2 * at * (r.above_slope * r.below - r.above * r.below_slope) > 0))
+      return false;
   }
   return true;
 }
@@ -106,13 +113,13 @@ bool unfolded(const CameraModel& c, double u) {
 
 // A ratio has poles: a calibration that puts one into the image would show walls where there are none.
 std::optional<Eigen::Vector2d> pixel_without_ray(const CameraModel& c) {
-  constexpr int kGrid = 16;
-  for (int i = 0; i <= kGrid * kGrid + 2 * kGrid; ++i) {
-    const Eigen::Vector2d pixel(i % (kGrid + 1) * (c.width - 1.0) / kGrid, i / (kGrid + 1) * (c.height - 1.0) / kGrid);
-    const std::optional<Eigen::Vector2d> ideal = rational_ideal(c, pixel);
-    if (!ideal || !unfolded(c, Eigen::Vector2d((ideal->x() - c.cx) / c.fx, (ideal->y() - c.cy) / c.fy).squaredNorm()))
-      return pixel;
-  }
+  constexpr int kGrid = 16;  // each ray is asked from the axis outwards, so a coarse grid meets every pole
+  for (int row = 0; row <= kGrid; ++row)
+    for (int column = 0; column <= kGrid; ++column) {
+      const Eigen::Vector2d pixel(column * (c.width - 1.0) / kGrid, row * (c.height - 1.0) / kGrid);
+      const std::optional<Eigen::Vector2d> ideal = rational_ideal(c, pixel);
+      if (!ideal || !unfolded(c, c.unproject(*ideal, 1).head<2>().squaredNorm())) return pixel;
+    }
   return std::nullopt;
 }
 

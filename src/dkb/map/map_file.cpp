@@ -146,15 +146,19 @@ MapFile load_map(const std::filesystem::path& path) {
   return decode_map(read_file(path), path.string());
 }
 
-void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
-  const auto numbers = [](const Camera& c) {
+bool same_optics(const CameraModel& a, const CameraModel& b) {
+  const auto numbers = [](const CameraModel& c) {
     return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6};
   };
+  return a.width == b.width && a.height == b.height && numbers(a) == numbers(b);
+}
+
+void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
   const auto text = [](const Camera& c) {
     return fmt::format("{}x{} fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
   };
   const Camera &a = of_map.camera, &b = wanted.camera;
-  if (a.width != b.width || a.height != b.height || numbers(a) != numbers(b))
+  if (!same_optics(a, b))
     throw InputError(
         fmt::format("{}: was made with another camera ({}) than this one ({}); give a map of this camera, "
                     "or the camera of the map",

@@ -18,6 +18,8 @@ struct MapFileContext {
   void check() const;         // throws InvalidOption
 };
 
+// Whether points fall on the same pixels of images of the same size.
+bool same_optics(const CameraModel& a, const CameraModel& b);
 // Throws InputError, which opens with `name` and says what to set, unless maps of both can be one.
 void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name);
 

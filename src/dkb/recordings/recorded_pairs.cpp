@@ -124,7 +124,10 @@ void RecordedPairs::read_message() {
   const std::optional<RecordedMessage> message = filter_.done() ? std::nullopt : stream_->next();
   if (!message) {
     ended_ = true;
-    if (!filter_.done()) warn_of_clock(), pairing_.close();
+    if (!filter_.done()) {
+      warn_of_clock();
+      pairing_.close();
+    }
   } else {
     const RecordedTopic& topic = stream_->topics()[message->topic];
     if (topic.name == decoder_->colour.topic.name)

@@ -55,7 +55,7 @@ int64_t StampPairing::behind() const {
 }
 
 bool StampPairing::far_ahead(const Waiting& colour_image) const {
-  return !closed_ && sides_[colour].images.size() == 1 && (!taken_ || colour_image.time - *taken_ > kPatience);
+  return !closed_ && sides_[colour].images.size() == 1 && (!taken_ || colour_image.time - *taken_ > RisingStamps::kFarAhead);
 }
 
 void StampPairing::close() {

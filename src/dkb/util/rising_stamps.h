@@ -13,6 +13,7 @@ namespace dkb {
 class RisingStamps {
  public:
   static constexpr int kMostRefused = 10;
+  static constexpr double kFarAhead = 2;  // [s] after the pair before, a pair waits for another image to say so too
   enum class Answer {
     taken,
     refused,
