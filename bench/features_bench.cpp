@@ -20,7 +20,6 @@
 #include "dkb/features/optical_flow.h"
 #include "dkb/features/orb_extractor.h"
 #include "dkb/features/orientation.h"
-#include "dkb/features/patch_refine.h"
 #include "dkb/features/subpixel.h"
 #include "dkb/util/files.h"
 
@@ -149,7 +148,6 @@ int main(int argc, char** argv) try {
   const auto orb = cv::ORB::create(options.count);
   const OpticalFlowOptions flow_options;
   const OpticalFlow flow(flow_options);
-  const PatchRefiner refiner;
   ImagePyramid previous_pyramid(flow_options.pyramid()), next_pyramid(flow_options.pyramid());
   Samples samples;
   double coverage = 0, orb_coverage = 0, images = 0;
@@ -189,23 +187,14 @@ int main(int argc, char** argv) try {
         cv::calcOpticalFlowPyrLK(wrap(image), wrap(next), from, to, status, errors,
                                  {flow_options.window, flow_options.window}, flow_options.levels - 1);
       });
-      std::vector<ReferencePatch> patches(points.size());
-      samples.time("take patch", [&] {
-        for (size_t k = 0; k < points.size(); ++k)
-          refiner.take(image, points[k], Eigen::Matrix2f::Identity(), patches[k]);
-      });
-      samples.time("refine patch", [&] {
-        for (size_t k = 0; k < points.size(); ++k)
-          refiner.refine(patches[k], next, results[k].position + Eigen::Vector2f(0.5F, -0.5F));
-      });
     }
   }
   const double unit = samples.median("cv_orb");
   fmt::print("| stage | ms | cv_orb |\n|---|---|---|\n");
   for (const char* name : {"cv_orb", "extract", "pyramid", "fast", "spread", "blur", "orientation", "sub-pixel",
-                           "descriptors", "match", "flow pyramid", "flow", "cv flow", "take patch", "refine patch"})
+                           "descriptors", "match", "flow pyramid", "flow", "cv flow"})
     fmt::print("| {} | {:.3f} | {:.3f} |\n", name, samples.median(name), samples.median(name) / unit);
-  fmt::print("\nflow, patches: {} points; cells of 40 px with a corner: {:.1f} % (cv_orb {:.1f} %)\n", options.count,
+  fmt::print("\nflow: {} points; cells of 40 px with a corner: {:.1f} % (cv_orb {:.1f} %)\n", options.count,
              100 * coverage / images, 100 * orb_coverage / images);
   return 0;
 } catch (const std::exception& error) {

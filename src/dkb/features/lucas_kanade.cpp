@@ -54,9 +54,7 @@ LkSums sums_scalar(const LkTemplate& reference, const int16_t* samples) {
   for (int row = 0; row < reference.size; ++row)
     for (int i = row * kLkStride; i < row * kLkStride + reference.size; ++i) {
       const int d = samples[i] - reference.value[i];
-      sums.d += d;
       sums.absolute += std::abs(d);
-      sums.squared += d * d;
       sums.dx += d * reference.dx[i];
       sums.dy += d * reference.dy[i];
     }
@@ -106,7 +104,7 @@ DKB_TARGET_AVX2 inline int64_t sum_lanes(__m256i v) {
 DKB_TARGET_AVX2 LkSums sums_avx2(const LkTemplate& reference, const int16_t* samples) {
   const __m256i ones = _mm256_set1_epi16(1);
   const __m256i index = _mm256_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  __m256i sum = _mm256_setzero_si256(), absolute = sum, squared = sum, dx = sum, dy = sum;
+  __m256i absolute = _mm256_setzero_si256(), dx = absolute, dy = absolute;
   for (int column = 0; column < reference.size; column += 16) {
     const __m256i inside = _mm256_cmpgt_epi16(_mm256_set1_epi16(static_cast<int16_t>(reference.size - column)), index);
     for (int row = 0; row < reference.size; ++row) {
@@ -116,14 +114,12 @@ DKB_TARGET_AVX2 LkSums sums_avx2(const LkTemplate& reference, const int16_t* sam
       const __m256i d = _mm256_and_si256(_mm256_sub_epi16(sample, value), inside);
       const __m256i slope_x = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dx + at));
       const __m256i slope_y = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dy + at));
-      sum = _mm256_add_epi32(sum, _mm256_madd_epi16(d, ones));
       absolute = _mm256_add_epi32(absolute, _mm256_madd_epi16(_mm256_abs_epi16(d), ones));
-      squared = _mm256_add_epi32(squared, _mm256_madd_epi16(d, d));
       dx = _mm256_add_epi32(dx, _mm256_madd_epi16(d, slope_x));
       dy = _mm256_add_epi32(dy, _mm256_madd_epi16(d, slope_y));
     }
   }
-  return {sum_lanes(sum), sum_lanes(absolute), sum_lanes(squared), sum_lanes(dx), sum_lanes(dy)};
+  return {sum_lanes(absolute), sum_lanes(dx), sum_lanes(dy)};
 }
 #endif
 
@@ -148,7 +144,7 @@ void lk_sample(const GreyImage& image, double x, double y, int size, int16_t* sa
 
 void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& target) {
   target.size = size;
-  int64_t sum_dx = 0, sum_dy = 0, xx = 0, xy = 0, yy = 0;
+  int64_t xx = 0, xy = 0, yy = 0;
   for (int row = 0; row < size; ++row) {
     const int16_t* middle = samples_with_rim + (row + 1) * kLkStride + 1;
     const int16_t* above = middle - kLkStride;
@@ -156,13 +152,11 @@ void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& tar
     int16_t* value = target.value + row * kLkStride;
     int16_t* dx = target.dx + row * kLkStride;
     int16_t* dy = target.dy + row * kLkStride;
-    int32_t row_dx = 0, row_dy = 0, row_xx = 0, row_xy = 0, row_yy = 0;
+    int32_t row_xx = 0, row_xy = 0, row_yy = 0;
     for (int i = 0; i < size; ++i) {
       value[i] = middle[i];
       dx[i] = static_cast<int16_t>(middle[i + 1] - middle[i - 1]);
       dy[i] = static_cast<int16_t>(below[i] - above[i]);
-      row_dx += dx[i];
-      row_dy += dy[i];
       row_xx += dx[i] * dx[i];
       row_xy += dx[i] * dy[i];
       row_yy += dy[i] * dy[i];
@@ -171,14 +165,10 @@ void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& tar
     std::fill(value + size, value + kLkStride, int16_t{0});
     std::fill(dx + size, dx + kLkStride, int16_t{0});
     std::fill(dy + size, dy + kLkStride, int16_t{0});
-    sum_dx += row_dx;
-    sum_dy += row_dy;
     xx += row_xx;
     xy += row_xy;
     yy += row_yy;
   }
-  target.sum_dx = sum_dx;
-  target.sum_dy = sum_dy;
   target.sum_xx = xx;
   target.sum_xy = xy;
   target.sum_yy = yy;

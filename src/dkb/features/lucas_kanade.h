@@ -8,7 +8,7 @@
 
 namespace dkb {
 
-// Kernels of Lucas-Kanade alignment, shared by optical flow and patch alignment. Intensities are in 1/16 grey levels
+// Kernels of Lucas-Kanade alignment, of optical flow. Intensities are in 1/16 grey levels
 // and all sums are integers, so that every implementation gives the same bits.
 //
 // A window of `size` x `size` samples at (x, y) covers x - size / 2 + i, i = 0 ... size - 1 (integer division), so that
@@ -23,13 +23,12 @@ using LkSamples = int16_t[(kLkMaxSize + 2) * kLkStride];
 struct LkTemplate {
   int size = 0;
   alignas(32) LkSamples value, dx, dy;
-  int64_t sum_dx = 0, sum_dy = 0;              // of slopes
   int64_t sum_xx = 0, sum_xy = 0, sum_yy = 0;  // of products of slopes
 };
 
 // Sums over the window of d = image - template.
 struct LkSums {
-  int64_t d = 0, absolute = 0, squared = 0;
+  int64_t absolute = 0;
   int64_t dx = 0, dy = 0;  // times slope
   bool operator==(const LkSums&) const = default;
 };

@@ -41,35 +41,13 @@ TEST(Matching, HammingDistanceCountsDifferingBits) {
   }
 }
 
-TEST(Matching, BestTwoEqualsASearchByHandWithEveryKernel) {
-  const std::vector<Descriptor> set = random_descriptors(300, 2), queries = random_descriptors(20, 3);
-  std::vector<int32_t> candidates;
-  for (int32_t i = 299; i >= 0; i -= 3) candidates.push_back(i);
-  for (const Descriptor& query : queries) {
-    BestTwo expected;
-    for (const int32_t c : candidates) {
-      const int d = hamming_distance(query, set[static_cast<size_t>(c)]);
-      if (d < expected.distance) {
-        expected = {c, d, expected.distance};
-      } else {
-        expected.second = std::min(expected.second, d);
-      }
-    }
-    EXPECT_EQ(best_two(query, set, candidates), expected);
-    EXPECT_EQ(best_two(query, set, candidates, Simd::scalar), expected);
-    EXPECT_EQ(best_two(query, set), best_two(query, set, Simd::scalar));
-    std::vector<int32_t> distances(candidates.size());
-    hamming_distances(query, set, candidates, distances);
-    EXPECT_EQ(*std::min_element(distances.begin(), distances.end()), expected.distance);
-  }
-}
-
 TEST(Matching, TiesGoToTheFirstAndNothingMatchesNothing) {
-  const std::vector<Descriptor> set(3);
-  EXPECT_EQ(best_two(Descriptor{}, set), (BestTwo{0, 0, 0}));
-  const std::vector<int32_t> candidates = {2, 1};
-  EXPECT_EQ(best_two(Descriptor{}, set, candidates), (BestTwo{2, 0, 0}));
-  EXPECT_EQ(best_two(Descriptor{}, std::vector<Descriptor>{}), BestTwo{});
+  const std::vector<Descriptor> set = random_descriptors(3, 2);
+  const std::vector<Descriptor> b = {set[1], set[1], set[2]};
+  EXPECT_EQ(match_brute_force(set, b, {.max_distance = 0, .ratio = 1.0F}), (std::vector<DescriptorMatch>{{2, 2, 0}}))
+      << "two as near as each other are told apart by nothing";
+  const std::vector<Descriptor> twice = {set[1], set[1]}, once = {set[1]};
+  EXPECT_EQ(match_brute_force(twice, once), (std::vector<DescriptorMatch>{{0, 0, 0}}));
   EXPECT_TRUE(match_brute_force({}, set).empty());
   EXPECT_TRUE(match_brute_force(set, {}).empty());
 }
@@ -106,27 +84,6 @@ TEST(Matching, RatioAndMutualTestsRejectRepeatedStructure) {
 TEST(Matching, RefusesBadOptions) {
   EXPECT_THROW(match_brute_force({}, {}, {.max_distance = 257}), InvalidOption);
   EXPECT_THROW(match_brute_force({}, {}, {.ratio = 1.5F}), InvalidOption);
-}
-
-TEST(Matching, OrientationsThatDoNotTurnWithTheRestAreRejected) {
-  // All turn by 0.5 rad, wherever they point; every fifth one turns elsewhere.
-  std::vector<float> a, b;
-  Random random(9);
-  for (int i = 0; i < 100; ++i) {
-    const double angle = random.uniform(0, 6.28),
-                 turn = i % 5 == 0 ? random.uniform(1.2, 6.0) : 0.5 + random.uniform(-0.1, 0.1);
-    a.push_back(static_cast<float>(std::fmod(angle + turn, 6.2831853)));
-    b.push_back(static_cast<float>(angle));
-  }
-  const std::vector<bool> keep = consistent_orientations(a, b);
-  for (size_t i = 0; i < 100; ++i) EXPECT_EQ(keep[i], i % 5 != 0) << i;
-}
-
-TEST(Matching, NoTurnIsAPeakLikeAnyOther) {
-  // Differences just below and just above zero fall into the last and the first bin.
-  const std::vector<float> a = {1.00F, 2.00F, 3.00F, 4.00F, 0.01F, 1.0F}, b = {1.01F, 1.99F, 3.01F, 3.99F, 6.27F, 4.0F};
-  const std::vector<bool> keep = consistent_orientations(a, b);
-  EXPECT_EQ(keep, (std::vector<bool>{true, true, true, true, true, false}));
 }
 
 TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {

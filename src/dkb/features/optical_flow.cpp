@@ -48,7 +48,6 @@ FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyram
     const double xx = static_cast<double>(reference.sum_xx), xy = static_cast<double>(reference.sum_xy);
     const double yy = static_cast<double>(reference.sum_yy);
     const double smaller = 0.5 * (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy)) * scale;
-    if (level == 0) result.min_eigenvalue = static_cast<float>(smaller);
     const double determinant = xx * yy - xy * xy;
     if (smaller < options_.min_eigenvalue || determinant <= 0) continue;
 
@@ -95,16 +94,6 @@ std::vector<FlowResult> OpticalFlow::track(const ImagePyramid& previous, const I
   for (size_t i = 0; i < points.size(); ++i)
     results.push_back(track_one(previous, current, points[i], guesses.empty() ? points[i] : guesses[i]));
   return results;
-}
-
-void OpticalFlow::reject_inconsistent(const ImagePyramid& previous, const ImagePyramid& current,
-                                      std::span<const Eigen::Vector2f> points, double max_distance,
-                                      std::vector<FlowResult>& results) const {
-  for (size_t i = 0; i < results.size(); ++i) {
-    if (!results[i].found) continue;
-    const FlowResult back = track_one(current, previous, results[i].position, results[i].position);
-    results[i].found = back.found && (back.position - points[i]).norm() <= static_cast<float>(max_distance);
-  }
 }
 
 }  // namespace dkb

@@ -26,8 +26,7 @@ struct OpticalFlowOptions {
 struct FlowResult {
   Eigen::Vector2f position{0, 0};  // [px] in the current image; the last estimate when not found
   bool found = false;
-  float residual = 0;        // [grey levels] mean absolute difference of the windows at full resolution
-  float min_eigenvalue = 0;  // [(grey levels / px)^2] of the structure tensor at full resolution, mean over the window
+  float residual = 0;  // [grey levels] mean absolute difference of the windows at full resolution
 };
 
 // Sparse optical flow by pyramidal Lucas-Kanade (Lucas and Kanade, IJCAI 1981; Bouguet 2000): from the coarsest level
@@ -43,12 +42,6 @@ class OpticalFlow {
   std::vector<FlowResult> track(const ImagePyramid& previous, const ImagePyramid& current,
                                 std::span<const Eigen::Vector2f> points,
                                 std::span<const Eigen::Vector2f> guesses = {}) const;
-
-  // Follows found results back to the previous image and clears `found` of those that end more than `max_distance` [px]
-  // away from where they began.
-  void reject_inconsistent(const ImagePyramid& previous, const ImagePyramid& current,
-                           std::span<const Eigen::Vector2f> points, double max_distance,
-                           std::vector<FlowResult>& results) const;
 
  private:
   FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point,

@@ -133,7 +133,6 @@ TEST(OpticalFlow, VectorKernelsEqualScalarBitForBit) {
       EXPECT_EQ(fast[i].position, scalar[i].position);
       EXPECT_EQ(fast[i].found, scalar[i].found);
       EXPECT_EQ(fast[i].residual, scalar[i].residual);
-      EXPECT_EQ(fast[i].min_eigenvalue, scalar[i].min_eigenvalue);
     }
   }
 }
@@ -145,7 +144,7 @@ TEST(OpticalFlow, FlatWindowsAndPointsOutsideAreNotFound) {
   for (const FlowResult& result : OpticalFlow().track(flat, flat, points)) EXPECT_FALSE(result.found);
 }
 
-TEST(OpticalFlow, EdgesHaveASmallEigenvalueAndCornersALargeOne) {
+TEST(OpticalFlow, CornersAreFollowedAndEdgesAreNot) {
   GreyImage image(320, 240, 50);
   for (int y = 100; y < 240; ++y)
     for (int x = 150; x < 320; ++x) image(x, y) = 200;
@@ -154,28 +153,7 @@ TEST(OpticalFlow, EdgesHaveASmallEigenvalueAndCornersALargeOne) {
   const std::vector<Eigen::Vector2f> points = {{150, 100}, {150, 180}};
   const std::vector<FlowResult> results = OpticalFlow().track(pyramid, pyramid, points);
   EXPECT_TRUE(results[0].found);
-  EXPECT_GT(results[0].min_eigenvalue, 100);
-  EXPECT_NEAR(results[1].min_eigenvalue, 0, 1e-3);
   EXPECT_FALSE(results[1].found);
-}
-
-TEST(OpticalFlow, GoingThereAndBackRejectsWhatGotCovered) {
-  const Motion still{};
-  Scene scene(still);
-  GreyImage covered = scene.current.level(0);
-  for (int y = 60; y < 180; ++y)
-    for (int x = 80; x < 240; ++x) covered(x, y) = noise_image(1, 1, static_cast<uint64_t>(1000 * y + x))(0, 0);
-  scene.current.build(covered);
-  OpticalFlow flow({.max_residual = 200});
-  std::vector<FlowResult> results = flow.track(scene.previous, scene.current, scene.points);
-  flow.reject_inconsistent(scene.previous, scene.current, scene.points, 0.5, results);
-  size_t wrong = 0, kept = 0;
-  for (size_t i = 0; i < results.size(); ++i) {
-    kept += results[i].found;
-    wrong += results[i].found && (results[i].position - scene.points[i]).norm() > 1.5F;
-  }
-  EXPECT_GT(kept, scene.points.size() / 4);
-  EXPECT_LT(wrong, scene.points.size() / 20);
 }
 
 TEST(OpticalFlow, RefusesBadInput) {
