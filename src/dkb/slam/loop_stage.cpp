@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/loop_stage.h"
 
-#include <algorithm>
-
 namespace dkb {
 namespace {
 
@@ -48,9 +46,7 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
     // The newest ones are searched: what they show is where the camera is.
     const auto left = static_cast<size_t>(view->keyframe_count() - keyframe);
     if (may_skip && search_.outstanding() + left > kMaxLate) continue;
-    // Never before the search before it, however many keyframes were culled meanwhile.
-    search_due_ = std::max(search_due_, now + rate.frames(options_.loop_latency(keyframes)));
-    search_.push({view, keyframe, generation_}, search_due_);
+    search_.push({view, keyframe, generation_}, now + rate.frames(options_.loop_latency(keyframes)));
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {

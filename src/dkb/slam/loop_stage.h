@@ -66,7 +66,6 @@ class LoopStage {
   int closed_generation_ = -1;  // likewise: where it found the last loop
   int generation_ = 0;          // corrections handed out that moved the map by a loop or a merge
   KeyframeId next_ = 0;         // the first keyframe that was not offered yet
-  FrameIndex search_due_ = 0;   // of the search pushed last
   bool adjustment_wanted_ = false, adjustment_overtaken_ = false;
   StageTimes times_;
   DueStage<Task, Result> search_, adjustment_;  // last: their threads use the above

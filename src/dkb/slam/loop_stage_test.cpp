@@ -116,6 +116,21 @@ TEST(LoopStage, AnAdjustmentIsOvertakenOnce) {
   EXPECT_FALSE(stage.idle()) << "its search";
 }
 
+// At its end a run takes what is outstanding at once, while mapping still culls keyframes: the next adjustment is asked
+// for in the same frame, of a smaller map.
+TEST(LoopStage, AMapThatHasShrunkIsAdjustedAsWell) {
+  test::RoundTrip large, small;
+  large.go(30), small.go(10);
+  LoopStage stage(large.optics(), prompt(), {}, 1, false);
+  for (const test::RoundTrip* world : {&large, &small}) {
+    stage.start_at(world->map.keyframe_count());
+    stage.want_adjustment();
+    stage.offer(world->map.snapshot(), 0, FrameRate(30), false);
+    EXPECT_EQ(stage.take_due(1000, true).size(), 1U);
+  }
+  EXPECT_TRUE(stage.idle());
+}
+
 TEST(LoopStage, EndsWithWorkOutstanding) {
   test::RoundTrip world;
   world.go(10);

@@ -69,9 +69,7 @@ class Pipeline {
 
  private:
   // When what mapping is given now becomes visible. It must not fall, also when the rate has just become known.
-  FrameIndex mapping_due() {
-    return mapping_due_ = std::max(mapping_due_, next_frame_ + rate_.frames(options_.pipeline.mapper_latency));
-  }
+  FrameIndex mapping_due() const { return next_frame_ + rate_.frames(options_.pipeline.mapper_latency); }
   void shed_load();
   bool late_for_features() const { return load_ && load_->level() >= LoadShedding::kFeatures; }
   void follow_motion(const Scene& scene);  // since the last keyframe
@@ -113,7 +111,6 @@ class Pipeline {
   // What the next frame needs of the one before.
   FrameRate rate_;
   FrameIndex next_frame_ = 0;
-  FrameIndex mapping_due_ = 0;  // of what was given to mapping last
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   double crowded_share_ = 0;  // of its features that movers took

@@ -329,7 +329,7 @@ void Pipeline::push_start(const TrackedFrame* next) {
   start_.reset();
   if (next != nullptr && next->start_features) tracker_.remake(*next, start.packet);
   if (options_.mapping.planes) start.packet.planes = find_planes(start.scene);
-  mapping_.push(std::move(start.packet), std::max(start.due, mapping_due_));
+  mapping_.push(std::move(start.packet), start.due);
 }
 
 void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked) {

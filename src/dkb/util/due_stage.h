@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -10,7 +11,6 @@
 #include <functional>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -51,10 +51,9 @@ class DueStage {
   DueStage(const DueStage&) = delete;
   DueStage& operator=(const DueStage&) = delete;
 
-  // Throws std::logic_error when `due` is before that of the task pushed last.
+  // Results come in order: none is due before that of the task pushed before.
   void push(Task task, int64_t due) {
-    if (due < last_due_) throw std::logic_error(options_.name + ": due frames must not fall");
-    last_due_ = due;
+    due = last_due_ = std::max(last_due_, due);
     if (!options_.threaded) {
       finished_.push_back(work_at({std::move(task), due}));
       return;
