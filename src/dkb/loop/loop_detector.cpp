@@ -13,7 +13,7 @@ constexpr double kDegrees = 57.295779513082321;
 // Candidates. All figures of this file: chosen on the simulated rounds and twins, docs/decisions.md.
 constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
 constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
-constexpr int kAreaKeyframes = 8;               // a candidate and its best covisible ones, whose points are matched
+constexpr size_t kAreaKeyframes = 8;            // a candidate and its best covisible ones, whose points are matched
 constexpr double kMinShare = 0.2;               // of the area's well-known points that ought to be in view
 
 // Keyframes around the newest one that show the area just there as well.
@@ -30,21 +30,6 @@ constexpr double kDriftRotationPerMetre = 1.5;   // [deg/m]
 // Between maps that are not joined there is no path, and appearance alone decides.
 constexpr int kMergeMinInliers = 80;
 constexpr double kMergeMinShare = 0.3;
-
-// A part of the map that may be seen again: a keyframe, its best covisible ones, and their points.
-struct MapArea {
-  std::vector<KeyframeId> keyframes;  // the first is the one that the area is named after
-  std::vector<Candidate> points;      // by increasing id
-};
-
-MapArea area_around(const Map& map, KeyframeId centre) {
-  MapArea area;
-  area.keyframes.push_back(centre);
-  for (const Covisible& c : map.keyframe(centre)->covisible)
-    if (static_cast<int>(area.keyframes.size()) < kAreaKeyframes) area.keyframes.push_back(c.keyframe);
-  for (PointId id : map.points_of(area.keyframes)) area.points.push_back(candidate_of(*map.point(id)));
-  return area;
-}
 
 // Of the area's well-known points that ought to be in view.
 double share_found(const Map& map, const MapArea& area, const PlaceFit& fit) {
@@ -162,7 +147,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
       break;
     candidates.push_back(m.id);
     const auto& covisible = map.keyframe(m.id)->covisible;
-    for (size_t i = 0; i < std::min<size_t>(covisible.size(), static_cast<size_t>(kAreaKeyframes / 2)); ++i)
+    for (size_t i = 0; i < std::min(covisible.size(), kAreaKeyframes / 2); ++i)
       covered[static_cast<size_t>(covisible[i].keyframe)] = 1;
   }
 
@@ -170,7 +155,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
     const bool merge = map.root(far) != root;
-    const MapArea area = area_around(map, far);
+    const MapArea area = area_around(map, far, kAreaKeyframes);
     const auto located =
         fit_by_descriptors(area.points, *newest->features, optics, kMinPlaceMatches,
                            {.min_inliers = kMinPlaceMatches, .seed = seed + static_cast<uint64_t>(id)});

@@ -23,6 +23,13 @@ Candidate candidate_of(const MapPoint& point) {
           -1.0f,    point.descriptor, false};
 }
 
+std::vector<Candidate> candidates_of(const Map& map, const std::vector<PointId>& live_points) {
+  std::vector<Candidate> candidates;
+  candidates.reserve(live_points.size());
+  for (PointId id : live_points) candidates.push_back(candidate_of(*map.point(id)));
+  return candidates;
+}
+
 Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
                        double scale_factor) {
   const Keypoint& k = features.keypoints[feature];

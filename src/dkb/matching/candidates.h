@@ -24,6 +24,7 @@ struct Candidate {
 };
 
 Candidate candidate_of(const MapPoint& point);
+std::vector<Candidate> candidates_of(const Map& map, const std::vector<PointId>& live_points);
 
 // What feature `feature` shows, to be found again in another frame: it stands at `position` [m] in the world,
 // `distance` [m] from the camera that saw it.

@@ -5,11 +5,14 @@
 #include "dkb/matching/pose_observation.h"
 
 namespace dkb {
-namespace {
-
-constexpr int kMinInliers = RansacOptions().min_inliers;  // a pose by guided matches rests on no fewer than one without
-
-}  // namespace
+MapArea area_around(const Map& map, KeyframeId centre, size_t keyframes) {
+  MapArea area;
+  area.keyframes.push_back(centre);
+  for (const Covisible& c : map.keyframe(centre)->covisible)
+    if (area.keyframes.size() < keyframes) area.keyframes.push_back(c.keyframe);
+  area.points = candidates_of(map, map.points_of(area.keyframes));
+  return area;
+}
 
 std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, const MatchableFeatures& matchable,
                                            const Optics& optics, int min_matches, const RansacOptions& ransac) {
@@ -38,22 +41,22 @@ std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, 
 
 std::optional<PlaceFit> fit_by_projection(const std::vector<Candidate>& known, const MatchableFeatures& matchable,
                                           const Optics& optics, const Rigid3& expected_cam_from_world,
-                                          std::span<const float> radii) {
+                                          std::span<const float> radii, const ProjectionFitOptions& options) {
   const RgbdFeatures& features = matchable.features;
   PlaceFit fit;
   fit.cam_from_world = expected_cam_from_world;
   for (const float radius : radii) {
-    ProjectionMatchOptions match;
+    ProjectionMatchOptions match = options.match;
     match.radius = radius;
     std::vector<uint8_t> visible(known.size(), 0);
     const auto matches = match_by_projection(known, matchable, optics, fit.cam_from_world, match, nullptr, &visible);
+    if (static_cast<int>(matches.size()) < options.min_matches) return std::nullopt;
     std::vector<PoseObservation> observations;
     observations.reserve(matches.size());
     for (const ProjectionMatch& m : matches)
       observations.push_back(pose_observation(features.keypoints[static_cast<size_t>(m.feature)],
                                               known[static_cast<size_t>(m.candidate)].position, optics));
-    const PoseEstimate pose =
-        optimise_pose(optics.camera, fit.cam_from_world, observations, {.min_inliers = kMinInliers});
+    const PoseEstimate pose = optimise_pose(optics.camera, fit.cam_from_world, observations, options.pose);
     if (!pose.ok) return std::nullopt;
     fit.cam_from_world = pose.cam_from_world;
     fit.covariance = pose.covariance;

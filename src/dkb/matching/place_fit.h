@@ -18,6 +18,13 @@ inline bool well_known(const MapPoint& point) {
   return point.observations.size() >= 3;
 }
 
+// A part of the map: a keyframe, its best covisible ones, and their points.
+struct MapArea {
+  std::vector<KeyframeId> keyframes;  // the first is the one that the area is named after
+  std::vector<Candidate> points;      // by increasing id
+};
+MapArea area_around(const Map& map, KeyframeId centre, size_t keyframes);
+
 enum class Sighting : uint8_t { out_of_view, missed, found };
 
 // A pose from which a camera sees points of the map, and which ones.
@@ -40,11 +47,18 @@ std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, 
 // what was found there puts them. Chosen on the twins, where no view is a place seen before.
 inline constexpr float kSearchRadii[] = {10, 4};
 
+struct ProjectionFitOptions {
+  ProjectionMatchOptions match;  // but for the radius
+  int min_matches = 0;           // fewer are no place
+  // A pose by guided matches rests on no fewer points than one without.
+  PoseOptions pose{.min_inliers = RansacOptions().min_inliers};
+};
+
 // The pose near an expected one: known points are matched where they should be in view and the pose is refined on them,
 // within the first radius [px], then from there within the next. Nothing when too few for a pose are found.
 // Deterministic.
 std::optional<PlaceFit> fit_by_projection(const std::vector<Candidate>& known, const MatchableFeatures& matchable,
                                           const Optics& optics, const Rigid3& expected_cam_from_world,
-                                          std::span<const float> radii);
+                                          std::span<const float> radii, const ProjectionFitOptions& options = {});
 
 }  // namespace dkb

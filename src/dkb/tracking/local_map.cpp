@@ -42,11 +42,7 @@ std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, 
     for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours_of_each)); ++n)
       add(neighbours[n].keyframe);
   }
-  const std::vector<PointId> ids = map.points_of(keyframes);
-  std::vector<Candidate> candidates;
-  candidates.reserve(ids.size());
-  for (PointId id : ids) candidates.push_back(candidate_of(*map.point(id)));
-  return candidates;
+  return candidates_of(map, map.points_of(keyframes));
 }
 
 }  // namespace dkb

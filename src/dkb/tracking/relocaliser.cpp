@@ -86,7 +86,18 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
 std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe,
                                                       const MatchableFeatures& features,
                                                       const IgnoresPoint& ignores) const {
-  const auto coarse = coarse_fit(map, keyframe, features, ignores);
+  std::vector<Candidate> known = area_around(map, keyframe, 1 + kNeighbours).points;
+  // What this keyframe shows is known by how it looks there.
+  const Keyframe& seen_there = *map.keyframe(keyframe);
+  for (size_t f = 0; f < seen_there.points.size(); ++f) {
+    if (map.point(seen_there.points[f]) == nullptr) continue;
+    std::lower_bound(known.begin(), known.end(), seen_there.points[f], [](const Candidate& c, PointId id) {
+      return c.id < id;
+    })->descriptor = seen_there.features->descriptors[f];
+  }
+  std::erase_if(known, [&](const Candidate& k) { return ignores(k.id); });
+  const auto coarse =
+      fit_by_descriptors(known, features, optics_, kMinPlaceMatches, {.seed = seed_ + static_cast<uint64_t>(keyframe)});
   if (!coarse) return std::nullopt;
   return fit_around(map, coarse->points, features, ignores, coarse->cam_from_world, kSearchRadii);
 }
@@ -113,29 +124,6 @@ std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, const std::v
   if (!fit) return std::nullopt;
   proposal.fit = std::move(*fit);
   return proposal;
-}
-
-// By descriptors alone.
-std::optional<PlaceFit> Relocaliser::coarse_fit(const Map& map, KeyframeId id, const MatchableFeatures& features,
-                                                const IgnoresPoint& ignores) const {
-  std::vector<Candidate> known;
-  const Keyframe& keyframe = *map.keyframe(id);
-  for (size_t f = 0; f < keyframe.points.size(); ++f)
-    if (const MapPoint* seen = map.point(keyframe.points[f])) {
-      known.push_back(candidate_of(*seen));
-      known.back().descriptor = keyframe.features->descriptors[f];
-    }
-  const size_t neighbours = std::min(keyframe.covisible.size(), kNeighbours);
-  for (size_t n = 0; n < neighbours; ++n)
-    for (PointId p : map.keyframe(keyframe.covisible[n].keyframe)->points)
-      if (const MapPoint* seen = map.point(p)) known.push_back(candidate_of(*seen));
-  // The keyframe's own descriptors come first and stay.
-  const auto before = [](const Candidate& a, const Candidate& b) { return a.id < b.id; };
-  const auto same = [](const Candidate& a, const Candidate& b) { return a.id == b.id; };
-  std::stable_sort(known.begin(), known.end(), before);
-  known.erase(std::unique(known.begin(), known.end(), same), known.end());
-  std::erase_if(known, [&](const Candidate& k) { return ignores(k.id); });
-  return fit_by_descriptors(known, features, optics_, kMinPlaceMatches, {.seed = seed_ + static_cast<uint64_t>(id)});
 }
 
 // How the map points look that should be in view. In a room that is only similar most are as they were, but some are

@@ -58,8 +58,6 @@ class Relocaliser {
   std::optional<PoseProposal> fit_around(const Map& map, const std::vector<PointId>& points,
                                          const MatchableFeatures& features, const IgnoresPoint& ignores,
                                          const Rigid3& expected_cam_from_world, std::span<const float> radii) const;
-  std::optional<PlaceFit> coarse_fit(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
-                                     const IgnoresPoint& ignores) const;
   void look_around(const Map& map, PointAppearance* appearance, PoseProposal& proposal) const;
 
   Optics optics_;

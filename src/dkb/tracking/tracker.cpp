@@ -68,11 +68,6 @@ Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
   return new_world_from_old;
 }
 
-Rigid3 Tracker::expected_motion(double seconds) const {
-  if (!velocity_) return {};
-  return rigid3_from_tangent(*velocity_ * seconds);
-}
-
 std::optional<Eigen::Vector3d> Tracker::position(PointId id) const {
   if (const MapPoint* p = map_.view().point(id)) return p->position;
   const auto it = provisional_.find(id);
@@ -122,7 +117,7 @@ Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, co
 }
 
 PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
-                             const std::optional<PosePrediction>& expected, const PoseOptions& options) const {
+                             const std::optional<PosePrediction>& expected) const {
   std::vector<PoseObservation> observations;
   observations.reserve(pairs.size());
   for (const Pair& pair : pairs) {
@@ -133,9 +128,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }
-  if (!expected || !expected->weighs) return optimise_pose(optics_.camera, initial, observations, options);
+  if (!expected || !expected->weighs) return optimise_pose(optics_.camera, initial, observations);
   const PosePrior prior{expected->cam_from_world, inverse(expected->covariance)};
-  return optimise_pose(optics_.camera, initial, observations, options, &prior);
+  return optimise_pose(optics_.camera, initial, observations, {}, &prior);
 }
 
 double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, const RgbdFeatures& features) const {
@@ -187,17 +182,11 @@ void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
   const size_t left = frame.source.size();
   if (left == frame.points.size()) return;
   frame.features = std::make_shared<const RgbdFeatures>(subset(*frame.features, frame.source));
-  for (size_t k = 0; k < left; ++k) {
-    const auto f = static_cast<size_t>(frame.source[k]);
-    frame.points[k] = frame.points[f];
-    frame.outlier[k] = frame.outlier[f];
-    frame.odometry[k] = frame.odometry[f];
-    frame.motion[k] = frame.motion[f];
-  }
-  frame.points.resize(left);
-  frame.outlier.resize(left);
-  frame.odometry.resize(left);
-  frame.motion.resize(left);
+  const auto keep = [&](auto& of_features) {
+    for (size_t k = 0; k < left; ++k) of_features[k] = of_features[static_cast<size_t>(frame.source[k])];
+    of_features.resize(left);
+  };
+  keep(frame.points), keep(frame.outlier), keep(frame.odometry), keep(frame.motion);
 }
 
 bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
@@ -406,11 +395,14 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   const bool has_map = state_ != TrackingState::initialising;
   const auto predicted = frame.predicted = predict(input);
   const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
-  bool followed = has_map && track_from_last(frame, input);
+  bool followed = has_map && (track_from_last(frame, input) || (predicted && track_expected(*predicted, frame)));
   bool found_again = has_map && !followed && confirm_relocalisation(frame, input);
   if (has_map && !followed && !found_again && relocalise(frame, input.appearance, expected)) {
-    // At once where it is but a step from the frame before, or where it was expected; else when the next frame agrees.
-    followed = moved_plausibly_from_last(frame) || (expected != nullptr && expected->agrees(frame.cam_from_world));
+    // At once where it was expected, or where it is but a step from the frame before and nothing else is expected; else
+    // when the next frame agrees.
+    const bool near = last_ && last_->index + 1 == frame.index && state_ == TrackingState::tracking &&
+                      plausible_motion(frame.cam_from_world, frame.timestamp);
+    followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world));
     found_again = followed;
     if (!followed) {
       finish(frame);

@@ -48,7 +48,6 @@ class Tracker {
   const TrackingMap& map() const { return map_; }
 
   // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
-  Rigid3 expected_motion(double seconds) const;
   // Motion from the last frame to one at `timestamp`: what `prior` tells, and for what it does not tell the velocity.
   // Nothing without a last frame.
   std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
@@ -101,11 +100,8 @@ class Tracker {
   double forget_strays(const std::vector<Pair>& pairs, size_t first, const PoseEstimate& pose,
                        const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
-                      const std::optional<PosePrediction>& expected = {}, const PoseOptions& options = {}) const;
-  std::optional<Rigid3> track_last_frame(const Rigid3& predicted, double radius, const MatchableFeatures& features,
-                                         std::vector<PointId>& points) const;
-  std::optional<Rigid3> match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const;
-  std::vector<Rigid3> expected_poses(double dt, const TrackingInput& input) const;
+                      const std::optional<PosePrediction>& expected) const;
+  std::vector<Candidate> points_shown_last() const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
@@ -113,11 +109,10 @@ class Tracker {
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
   void forget_velocity();
-  double spread_px(const Matrix6d& covariance) const;
-  double search_radius(double radius) const;
+  double reach_px(double radius, const Matrix6d& covariance) const;
+  std::vector<double> widening_radii(const Matrix6d& covariance) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
-  bool moved_plausibly_from_last(const TrackedFrame& frame) const;
   bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);
   Rigid3 express_anew(TrackedFrame& frame) const;
   bool start_map(TrackedFrame& frame, const PosePrediction* expected);
@@ -125,7 +120,6 @@ class Tracker {
   bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                        TrackedFrame& frame, const std::function<bool(const PoseEstimate&)>& accept = {});
   bool is_retracted(PointId id) const;
-  void take_reports(KeyframePacket& packet);
   void refresh_candidates(const std::vector<PointId>& points, double now);
   Vector6d velocity_to(const TrackedFrame& frame) const;
   bool refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;

@@ -98,16 +98,20 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, cons
   last_->state = frame.state;
 }
 
-// [px] around where a point is expected.
-double Tracker::search_radius(double radius) const {
-  if (!last_ || last_->state != TrackingState::predicted) return radius;
-  return std::min(kMaxSearchRadius, radius + spread_px(last_->covariance));
+// [px] `radius`, and three standard deviations of where a pose of that covariance puts a point 1 m away, nearer than
+// most.
+double Tracker::reach_px(double radius, const Matrix6d& covariance) const {
+  const auto sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const double spread = 3 * optics_.camera.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
+  return std::min(kMaxSearchRadius, radius + spread);
 }
 
-// [px] three standard deviations of where a pose of that covariance puts a point 1 m away, nearer than most.
-double Tracker::spread_px(const Matrix6d& covariance) const {
-  const auto sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return 3 * optics_.camera.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
+// [px] Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
+std::vector<double> Tracker::widening_radii(const Matrix6d& covariance) const {
+  const double reach = reach_px(kRadiusLocalMap, covariance);
+  std::vector<double> radii;
+  for (double radius = kRadiusLocalMap; radius < 2 * reach; radius *= 2) radii.push_back(std::min(radius, reach));
+  return radii;
 }
 
 // The keyframes whose cameras stand nearest to the expected one and look the same way.
@@ -130,11 +134,10 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   const auto right = [&](const std::optional<PoseProposal>& found) {
     return found && found->verified() && expected.agrees(found->fit.cam_from_world);
   };
-  // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
-  const double reach_px = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
-  for (double radius = kRadiusLocalMap; radius < 2 * reach_px && !nearby.empty(); radius *= 2) {
-    auto found = relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world,
-                                         std::min(radius, reach_px), features, ignores);
+  if (nearby.empty()) return std::nullopt;
+  for (const double radius : widening_radii(expected.covariance)) {
+    auto found =
+        relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world, radius, features, ignores);
     if (right(found)) return found;
   }
   for (const auto& [off, id] : nearby) {

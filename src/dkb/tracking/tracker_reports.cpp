@@ -13,14 +13,10 @@ constexpr int kMinNewPoints = 100;  // nearest depths that make points at a keyf
 
 }  // namespace
 
-void Tracker::take_reports(KeyframePacket& packet) {
-  packet.visibility = visibility_.take();
-  packet.retracted = std::exchange(unreported_, {});
-}
-
 KeyframePacket Tracker::make_report() {
   KeyframePacket packet;
-  take_reports(packet);
+  packet.visibility = visibility_.take();
+  packet.retracted = std::exchange(unreported_, {});
   return packet;
 }
 
@@ -57,7 +53,7 @@ std::vector<PointInView> Tracker::points_in_view() const {
 }
 
 KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) {
-  KeyframePacket packet;
+  KeyframePacket packet = make_report();
   packet.id = id;
   packet.frame = frame.index;
   packet.timestamp = frame.timestamp;
@@ -84,7 +80,6 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
     p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
     packet.new_points.push_back(p);
   }
-  take_reports(packet);
 
   map_.add_pending(id, packet.reference, packet.cam_from_reference);
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);

@@ -22,10 +22,10 @@ constexpr int kMinMatches = 20;            // with the last frame that make a po
 
 }  // namespace
 
-std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double radius,
-                                                const MatchableFeatures& features, std::vector<PointId>& points) const {
-  std::vector<Candidate> candidates;
-  candidates.reserve(last_->points.size());
+// The map points that the last frame showed, as they looked there.
+std::vector<Candidate> Tracker::points_shown_last() const {
+  std::vector<Candidate> shown;
+  shown.reserve(last_->points.size());
   // What was seen last may have been seen from elsewhere: scale and orientation are of that view.
   const Eigen::Vector3d centre = centre_in_world(last_->seen_cam_from_cam * last_->cam_from_world);
   const bool seen_from_here = last_->state != TrackingState::predicted;
@@ -38,94 +38,56 @@ std::optional<Rigid3> Tracker::track_last_frame(const Rigid3& predicted, double 
     c.id = id;
     if (!seen_from_here) c.angle = -1;
     c.established = established(id, last_->timestamp);
-    candidates.push_back(c);
+    shown.push_back(c);
   }
-  ProjectionMatchOptions match;
-  match.radius = static_cast<float>(radius);
-  match.max_distance = kMatchDistance;
-  match.ratio = 0.9f;
-  const auto matches = match_by_projection(candidates, features, optics_, predicted, match, nullptr, nullptr);
-  if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
-  std::vector<Pair> pairs;
-  pairs.reserve(matches.size());
-  for (const auto& m : matches) pairs.push_back({m.feature, candidates[static_cast<size_t>(m.candidate)].position});
-  // It need only say where the map is to be searched.
-  const PoseEstimate pose = refine(predicted, pairs, features.features, {}, {.tail_rounds = 0});
-  if (!pose.ok || pose.inliers < kMinMatches / 2) return std::nullopt;
-  for (size_t i = 0; i < matches.size(); ++i)
-    if (pose.inlier[i])
-      points[static_cast<size_t>(matches[i].feature)] = candidates[static_cast<size_t>(matches[i].candidate)].id;
-  return pose.cam_from_world;
-}
-
-// By descriptors alone, for a camera whose motion is not known or not what was expected: in a fast turn a search around
-// the last place of each point finds just enough wrong ones for a wrong pose.
-std::optional<Rigid3> Tracker::match_last_frame(const TrackedFrame& frame, std::vector<PointId>& points) const {
-  std::vector<Candidate> known;
-  for (size_t f = 0; f < last_->points.size(); ++f) {
-    const PointId id = last_->points[f];
-    if (id == kNoPoint || is_retracted(id)) continue;
-    const auto at = position(id);
-    if (!at) continue;
-    Candidate& k = known.emplace_back();
-    k.id = id;
-    k.position = *at;
-    k.descriptor = last_->features->descriptors[f];
-  }
-  auto found = fit_by_descriptors(known, frame.matchable(), optics_, kMinMatches, {.seed = seed_});
-  if (!found || found->inliers < kMinMatches || !plausible_motion(found->cam_from_world, frame.timestamp))
-    return std::nullopt;
-  points = std::move(found->points);
-  return found->cam_from_world;
-}
-
-// Where the camera is expected: by what is known of the step where there is anything, else by the motion so far.
-std::vector<Rigid3> Tracker::expected_poses(double dt, const TrackingInput& input) const {
-  std::vector<Rigid3> steps;
-  if (input.step != nullptr) steps.push_back(input.step->previous_from_current.inverse());
-  if (velocity_) steps.push_back(expected_motion(dt));
-  for (Rigid3& step : steps) step = step * last_->cam_from_world;
-  return steps;
+  return shown;
 }
 
 bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   if (state_ == TrackingState::lost || !last_) return false;
   const MatchableFeatures features = frame.matchable();
-  std::vector<PointId> points(frame.points.size(), kNoPoint);
-  std::optional<Rigid3> pose;
-  for (const Rigid3& expected : expected_poses(frame.timestamp - last_->timestamp, input))
-    if (!pose) pose = track_last_frame(expected, search_radius(kRadiusLastFrame), features, points);
-  const auto shown = [](const std::vector<PointId>& of) {
-    return std::count_if(of.begin(), of.end(), [](PointId p) { return p != kNoPoint; });
+  const std::vector<Candidate> shown = points_shown_last();
+  // It need only say where the map is to be searched.
+  const auto fit_near = [&](const Rigid3& expected, double radius) {
+    const float radii[] = {static_cast<float>(radius)};
+    return fit_by_projection(shown, features, optics_, expected, radii,
+                             {.match = {.max_distance = kMatchDistance, .ratio = 0.9f},
+                              .min_matches = kMinMatches,
+                              .pose = {.tail_rounds = 0, .min_inliers = kMinMatches / 2}});
   };
-  const auto surface = [&](const std::vector<PointId>& of, const Rigid3& from) {
+  // By what is known of the step where there is anything, then by the motion so far.
+  std::optional<PlaceFit> fit;
+  const double radius =
+      last_->state == TrackingState::predicted ? reach_px(kRadiusLastFrame, last_->covariance) : kRadiusLastFrame;
+  if (input.step != nullptr)
+    fit = fit_near(input.step->previous_from_current.inverse() * last_->cam_from_world, radius);
+  if (!fit && velocity_)
+    fit = fit_near(rigid3_from_tangent(*velocity_ * (frame.timestamp - last_->timestamp)) * last_->cam_from_world,
+                   radius);
+  const auto surface = [&](const PlaceFit& of) {
     double sum = 0;
-    for (PointId id : of)
-      if (id != kNoPoint) sum += surface_around((from * *position(id)).z());
+    for (PointId id : of.points)
+      if (id != kNoPoint) sum += surface_around((of.cam_from_world * *position(id)).z());
     return sum;
   };
-  // Where little of what was shown is found where it is expected, it may be elsewhere.
-  if (!pose || 4 * shown(points) < shown(last_->points)) {
-    std::vector<PointId> elsewhere(frame.points.size(), kNoPoint);
-    const std::optional<Rigid3> other = match_last_frame(frame, elsewhere);
-    if (other && (!pose || surface(elsewhere, *other) > surface(points, *pose))) {
-      pose = other;
-      points = std::move(elsewhere);
-      if (frame.predicted && !frame.predicted->agrees(*pose)) frame.predicted->weighs = false;
+  // Where little of what was shown is found where it is expected, it may be elsewhere. By descriptors alone, since in a
+  // fast turn a search around the last place of each point finds just enough wrong ones for a wrong pose.
+  if (!fit || 4 * static_cast<size_t>(fit->inliers) < shown.size()) {
+    auto other = fit_by_descriptors(shown, features, optics_, kMinMatches, {.seed = seed_});
+    if (other && other->inliers >= kMinMatches && plausible_motion(other->cam_from_world, frame.timestamp) &&
+        (!fit || surface(*other) > surface(*fit))) {
+      fit = std::move(other);
+      if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world)) frame.predicted->weighs = false;
     }
   }
-  if (!pose) pose = track_last_frame(last_->cam_from_world, kRadiusWide, features, points);
-  if (!pose && map_.view().live_keyframe(last_->reference) != nullptr) {
+  if (!fit) fit = fit_near(last_->cam_from_world, kRadiusWide);
+  if (!fit && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
                                           [this](PointId id) { return is_retracted(id); });
-    if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) {
-      pose = near->fit.cam_from_world;
-      points = std::move(near->fit.points);
-    }
+    if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) fit = std::move(near->fit);
   }
-  if (pose && track_local_map(*pose, kRadiusLocalMap, options_.min_inliers, points, frame)) return true;
-  return frame.predicted && track_expected(*frame.predicted, frame);
+  return fit && track_local_map(fit->cam_from_world, kRadiusLocalMap, options_.min_inliers, fit->points, frame);
 }
 
 // Where something else says where the camera is, fewer points need vouch for it: half as many, if they agree with what
@@ -135,13 +97,9 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
     return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() && expected.agrees(pose.cam_from_world);
   };
   refresh_candidates(last_->points, frame.timestamp);  // of no matches there would be none
-  // Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
-  const double reach = std::min(kMaxSearchRadius, kRadiusLocalMap + spread_px(expected.covariance));
-  for (double radius = kRadiusLocalMap; radius < 2 * reach; radius *= 2) {
+  for (const double radius : widening_radii(expected.covariance)) {
     std::vector<PointId> points(frame.points.size(), kNoPoint);
-    if (track_local_map(expected.cam_from_world, std::min(radius, reach), options_.min_inliers / 2, points, frame,
-                        agrees))
-      return true;
+    if (track_local_map(expected.cam_from_world, radius, options_.min_inliers / 2, points, frame, agrees)) return true;
   }
   return false;
 }
@@ -183,11 +141,6 @@ bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) c
   const double seconds = timestamp - last_->timestamp;
   return motion.translation.norm() <= kMaxVelocity * seconds &&
          vector_from_rotation(motion.rotation).norm() <= kMaxAngularVelocity * seconds;
-}
-
-bool Tracker::moved_plausibly_from_last(const TrackedFrame& frame) const {
-  return last_ && last_->index + 1 == frame.index && state_ != TrackingState::lost &&
-         plausible_motion(frame.cam_from_world, frame.timestamp);
 }
 
 }  // namespace dkb
