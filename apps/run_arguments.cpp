@@ -28,6 +28,8 @@ void check_detector(const DetectorChoice& choice) {
 
 void check_arguments(const RunArguments& args, const Options& options) {
   if (args.localize && args.load_map.empty()) throw InputError("--localize: needs a map; give --load-map FILE");
+  if (args.localize && args.dense)
+    throw InputError("--dense: --localize makes no keyframes, which the dense map is made of; leave one of them out");
   if (args.has_preset && options.preset() != args.preset)
     throw InputError("--preset " + args.preset + ": the settings say `preset: " + options.preset() +
                      "`; leave one of them out");

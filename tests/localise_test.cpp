@@ -75,6 +75,16 @@ TEST_F(Localise, WithAMapOfAnotherCameraOrWithNoneIsRefused) {
   EXPECT_EQ(damaged.finished.error_lines(), 1U);
 }
 
+TEST_F(Localise, WithADenseMapIsRefusedAndKeepsAnEarlierOne) {
+  fs::create_directory(temp / "out");
+  write_text(temp / "out" / "dense.ply", "earlier");
+  const SlamRun run(sequence(), temp / "out", {"--load-map", map.string(), "--localize", "--dense"});
+  EXPECT_EQ(run.finished.exit_code, 2);
+  EXPECT_NE(run.finished.err.find("--dense: --localize"), std::string::npos) << run.finished.err;
+  EXPECT_EQ(run.finished.error_lines(), 1U);
+  EXPECT_EQ(read_text(temp / "out" / "dense.ply"), "earlier");
+}
+
 TEST_F(Localise, MapsThatMeetAreMergedInTheWorldOfTheFirst) {
   const SlamRun second(sequence(), temp / "second", {"--start", "0.4"});
   ASSERT_EQ(second.finished.exit_code, 0) << second.finished.err;

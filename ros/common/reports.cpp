@@ -71,7 +71,7 @@ void SlamCore::run_grids() {
 #ifdef __linux__
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
 #endif
-  bool said_no_floor = false;
+  std::string said;  // why there is no grid
   std::unique_lock lock(report_mutex_);
   while (!report_due_.wait_until(lock, in_seconds(parameters_.grid_period), [this] { return stopping_; })) {
     const bool started = slam_ != nullptr;
@@ -94,8 +94,10 @@ void SlamCore::run_grids() {
             grid.stamp_ns = stamp_ns;
             grid.frame_id = parameters_.map_frame;
             middleware_.publish(grid);
-          } else if (!std::exchange(said_no_floor, true)) {
-            middleware_.log(LogLevel::warning, "no grid: the floor has not been seen");
+          } else {
+            const std::string why =
+                dense.views == 0 ? "no keyframes yet; localize_only makes none" : "the floor has not been seen";
+            if (std::exchange(said, why) != why) middleware_.log(LogLevel::warning, "no grid: " + why);
           }
         } catch (const std::exception& error) {
           middleware_.log(LogLevel::warning, error.what());

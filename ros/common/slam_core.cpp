@@ -31,6 +31,10 @@ SlamCore::SlamCore(const Parameters& parameters, Middleware& middleware)
       pairing_(static_cast<int64_t>(1e9 * parameters.sync_tolerance), static_cast<size_t>(parameters.queue_size)),
       odometry_(parameters.prior_drift) {
   parameters_.options.check();
+  if (parameters_.localize_only && parameters_.grid_period > 0)
+    middleware_.log(LogLevel::warning,
+                    "grid_period: localize_only makes no keyframes, which grids are made of; serve the grid that was "
+                    "saved with the map by map_server");
   tracking_ = std::thread([this] { run_tracking(); });
   reports_ = std::thread([this] { run_reports(); });
   if (parameters_.grid_period > 0) grids_ = std::thread([this] { run_grids(); });

@@ -287,6 +287,21 @@ TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
   std::filesystem::remove(file);
 }
 
+TEST_F(SlamCoreTest, LocalizeOnlySaysWhyThereIsNoGrid) {
+  const auto core = start({{"localize_only", true}, {"grid_period", 0.05}});
+  ASSERT_TRUE(out.wait([&] { return !out.logged.empty(); }));
+  EXPECT_NE(out.logged[0].find("map_server"), std::string::npos) << out.logged[0];
+  core->camera_info(info_of(source_camera()));
+  const auto said = [&](const char* text) {
+    return std::any_of(out.logged.begin(), out.logged.end(),
+                       [&](const std::string& line) { return line.find(text) != std::string::npos; });
+  };
+  feed(*core, 0);
+  ASSERT_TRUE(out.wait([&] { return said("no grid: "); }));
+  EXPECT_TRUE(said("no keyframes yet"));
+  EXPECT_FALSE(said("the floor has not been seen"));
+}
+
 TEST_F(SlamCoreTest, AFullQueueDropsTheOldestAndCounts) {
   const auto core = start({{"queue_size", int64_t{4}}});
   core->camera_info(info_of(source_camera()));
