@@ -3,15 +3,36 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 namespace dkb_ros {
 namespace {
 
 constexpr int64_t kJump = 1'000'000'000;  // [ns] further back is no late message but another clock
+constexpr int64_t kAheadPeriods = 3;      // further ahead, and by more than kJump: a pause or a broken stamp
 constexpr int kJumpMessages = 3;          // that must say so; one alone may be broken
 constexpr size_t kIntervals = 10;
 
 }  // namespace
+
+// Whether the image has to wait for the next one of its stream: a stamp far ahead would make all that follow late.
+bool Pairing::hold(Stream* stream, ImageMessage* image) {
+  if (stream->ahead) {
+    if (image->stamp_ns > stream->ahead->stamp_ns)
+      enter(stream, *std::exchange(stream->ahead, std::nullopt));
+    else if (image->stamp_ns < stream->ahead->stamp_ns)
+      stream->ahead.reset(), ++late_;
+  }
+  if (!stream->newest || image->stamp_ns - *stream->newest <= std::max(kJump, kAheadPeriods * stream->period))
+    return false;
+  if (stream->ahead) ++late_;  // the same one again
+  stream->ahead = std::move(*image);
+  return true;
+}
+
+void Pairing::enter(Stream* stream, ImageMessage image) {
+  if (accept(stream, image)) stream->waiting.push_back(std::move(image));
+}
 
 // Notes the image's stamp. False: it is left out.
 bool Pairing::accept(Stream* stream, const ImageMessage& image) {
@@ -19,8 +40,9 @@ bool Pairing::accept(Stream* stream, const ImageMessage& image) {
     stream->far_behind = image.stamp_ns < *stream->newest - kJump ? stream->far_behind + 1 : 0;
     ++late_;
     if (stream->far_behind < kJumpMessages) return false;
-    restart();
-    clock_jumped_ = true;
+    forget_images();
+    // Images after the last pair go on from it: what lay far ahead was wrong.
+    if (last_pair_ && image.stamp_ns <= *last_pair_) clock_jumped_ = true;
   }
   if (stream->newest) {
     stream->intervals.push_back(image.stamp_ns - *stream->newest);
@@ -35,8 +57,14 @@ bool Pairing::accept(Stream* stream, const ImageMessage& image) {
 }
 
 void Pairing::restart() {
+  forget_images();
+  last_pair_.reset();
+  clock_jumped_ = false;
+}
+
+void Pairing::forget_images() {
   for (Stream* s : {&colour_, &depth_}) {
-    unpaired_ += static_cast<int64_t>(s->waiting.size());
+    unpaired_ += static_cast<int64_t>(s->waiting.size()) + (s->ahead ? 1 : 0);
     *s = {};
   }
 }
@@ -47,8 +75,8 @@ void Pairing::drop_first(Stream* stream) {
 }
 
 std::vector<ImagePair> Pairing::add(Stream* stream, ImageMessage image) {
-  if (!accept(stream, image)) return {};
-  stream->waiting.push_back(std::move(image));
+  if (hold(stream, &image)) return {};
+  enter(stream, std::move(image));
   std::vector<ImagePair> pairs = match();
   if (stream->waiting.size() > capacity_) drop_first(stream);
   return pairs;
@@ -81,6 +109,7 @@ std::vector<ImagePair> Pairing::match() {
                        (depths.back().stamp_ns >= stamp && best->stamp_ns < stamp);
     if (!final) break;
     while (&depths.front() != &*best) drop_first(&depth_);
+    last_pair_ = stamp;
     pairs.push_back({std::move(colours.front()), std::move(depths.front()), clock_jumped_});
     clock_jumped_ = false;
     colours.pop_front();

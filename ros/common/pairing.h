@@ -29,21 +29,26 @@ class Pairing {
 
  private:
   struct Stream {
-    std::deque<ImageMessage> waiting;  // by stamp
-    std::optional<int64_t> newest;     // stamp
-    int64_t period = 0;                // [ns] median of the last intervals, 0 = not known
-    std::deque<int64_t> intervals;     // [ns] the last ones
-    int far_behind = 0;                // images in a row that were more than a second late
+    std::deque<ImageMessage> waiting;   // by stamp
+    std::optional<ImageMessage> ahead;  // more than a second after the newest: waits until the next one confirms it
+    std::optional<int64_t> newest;      // stamp
+    int64_t period = 0;                 // [ns] median of the last intervals, 0 = not known
+    std::deque<int64_t> intervals;      // [ns] the last ones
+    int far_behind = 0;                 // images in a row that were more than a second late
   };
 
   std::vector<ImagePair> add(Stream* stream, ImageMessage image);
   std::vector<ImagePair> match();
+  bool hold(Stream* stream, ImageMessage* image);
+  void enter(Stream* stream, ImageMessage image);
   bool accept(Stream* stream, const ImageMessage& image);
+  void forget_images();
   void drop_first(Stream* stream);
 
   int64_t tolerance_;
   size_t capacity_;
   Stream colour_, depth_;
+  std::optional<int64_t> last_pair_;  // stamp of its colour image
   bool clock_jumped_ = false;
   int64_t unpaired_ = 0, late_ = 0;
 };

@@ -94,5 +94,51 @@ TEST(Pairing, AClockThatWentBackBeginsAnewAndSaysSo) {
   EXPECT_EQ(std::count(jumped.begin(), jumped.end(), true), 1);
 }
 
+// Both streams, or one, with a stamp far ahead once: how many pairs come of 30 stamps, and none says that a clock
+// jumped.
+size_t pairs_with_one_far_ahead(bool colour_ahead, bool depth_ahead, int64_t times) {
+  Pairing pairing(20 * kMs, 10);
+  size_t count = 0;
+  for (int64_t i = 0; i < 30; ++i) {
+    const int64_t broken = i >= 3 && i < 3 + times ? 5000 : 0;
+    std::vector<ImagePair> pairs = pairing.add_colour(image(33 * i + (colour_ahead ? broken : 0)));
+    for (ImagePair& p : pairing.add_depth(image(33 * i + (depth_ahead ? broken : 0)))) pairs.push_back(std::move(p));
+    for (const ImagePair& p : pairs) {
+      EXPECT_FALSE(p.clock_jumped) << i;
+      EXPECT_LT(p.colour.stamp_ns, 1000 * kMs);
+    }
+    count += pairs.size();
+  }
+  return count;
+}
+
+TEST(Pairing, OneStampFarAheadCostsNoMoreThanItsImages) {
+  EXPECT_EQ(pairs_with_one_far_ahead(true, true, 1), 29u);
+  EXPECT_EQ(pairs_with_one_far_ahead(true, false, 1), 29u);
+  EXPECT_EQ(pairs_with_one_far_ahead(false, true, 1), 29u);
+  // Two that confirm each other, of one stream, until three that follow say that they were wrong.
+  EXPECT_GE(pairs_with_one_far_ahead(true, false, 2), 24u);
+}
+
+TEST(Pairing, APauseLosesNoImage) {
+  Pairing pairing(20 * kMs, 10);
+  size_t pairs = 0;
+  for (int64_t i = 0; i < 30; ++i) {
+    const int64_t t = 33 * i + (i < 10 ? 0 : 60'000);
+    pairs += pairing.add_depth(image(t)).size() + pairing.add_colour(image(t)).size();
+  }
+  EXPECT_EQ(pairs, 30u);
+  EXPECT_EQ(pairing.unpaired() + pairing.late(), 0);
+}
+
+TEST(Pairing, ImagesEveryTwoSecondsPair) {
+  Pairing pairing(20 * kMs, 10);
+  size_t pairs = 0;
+  for (int64_t i = 0; i < 30; ++i)
+    pairs += pairing.add_depth(image(2000 * i)).size() + pairing.add_colour(image(2000 * i)).size();
+  EXPECT_EQ(pairs, 30u);
+  EXPECT_EQ(pairing.unpaired() + pairing.late(), 0);
+}
+
 }  // namespace
 }  // namespace dkb_ros
