@@ -138,6 +138,7 @@ void SlamCore::load_map(const std::string& path, Done done) {
   request(
       [this, path](dkb::Slam& slam) {
         slam.load_map(path);
+        loaded_map_ = path;
         begin_anew();
         return Answer{true, "going on in " + path};
       },
@@ -148,6 +149,7 @@ void SlamCore::reset(Done done) {
   request(
       [this](dkb::Slam& slam) {
         slam.reset();
+        loaded_map_.clear();
         begin_anew();
         return Answer{true, "a new world begins"};
       },
@@ -219,9 +221,7 @@ void SlamCore::process(const ImagePair& pair) {
       odometry_.clear();
       gyro_.clear();
     }
-    complain(LogLevel::warning, "the stamps of the images went back by more than a second: a new world begins");
-    if (slam_) slam_->reset();
-    forget_motion();
+    begin_after_jump();
   }
   if (!slam_ && !start(pair)) return;
   // What comes while a visitor of the page has paused is dropped.
@@ -306,6 +306,7 @@ std::shared_ptr<dkb::Slam> SlamCore::make_slam(const dkb::Camera& camera, const 
   auto slam = std::make_shared<dkb::Slam>(camera, options, dkb::make_detectors(parameters_.detector, camera));
   slam->localize_only(parameters_.localize_only);
   if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
+  loaded_map_ = parameters_.load_map;
   return slam;
 }
 
@@ -381,6 +382,22 @@ void SlamCore::begin_anew() {
   pairing_.restart();
   odometry_.clear();
   gyro_.clear();
+}
+
+// Another recording, or the robot's clock was set: a map that was loaded holds all the same.
+void SlamCore::begin_after_jump() {
+  const std::string jumped = "the stamps of the images went back by more than a second: ";
+  bool loaded = false;
+  if (slam_ && !loaded_map_.empty()) try {
+      slam_->load_map(loaded_map_);
+      loaded = true;
+    } catch (const std::exception& error) {
+      complain(LogLevel::error, error.what());
+      loaded_map_.clear();
+    }
+  if (slam_ && !loaded) slam_->reset();
+  complain(LogLevel::warning, jumped + (loaded ? "begins again in " + loaded_map_ : "a new world begins"));
+  forget_motion();
 }
 
 void SlamCore::forget_motion() {

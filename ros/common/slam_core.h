@@ -88,6 +88,7 @@ class SlamCore final : public RosCore {
   void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_anew();
+  void begin_after_jump();
   void forget_motion();
   std::vector<dkb::Event> tell_events();
   void open_page();
@@ -121,6 +122,7 @@ class SlamCore final : public RosCore {
   std::deque<std::pair<int64_t, Rigid3>> unplaced_;  // map_from_base at times that the robot's odometry has not reached
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
   std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
+  std::string loaded_map_;                           // file that this world began in; empty = it began anew
   std::string failed_start_;                         // why there is no system and will be none
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;

@@ -140,6 +140,14 @@ class SlamCoreTest : public testing::Test {
     core.colour(message_of(frames().at(i), false));
     core.depth(message_of(frames().at(i), true));
   }
+  // Its stamp moved by so much.
+  void feed_at(RosCore& core, size_t i, int64_t offset_ns) {
+    ImageMessage colour = message_of(frames().at(i), false), depth = message_of(frames().at(i), true);
+    colour.stamp_ns += offset_ns;
+    depth.stamp_ns += offset_ns;
+    core.colour(std::move(colour));
+    core.depth(std::move(depth));
+  }
   // Each frame once the one before is out, so that no machine is too slow.
   void feed_all(RosCore& core, size_t from, size_t count) {
     for (size_t i = from; i < from + count; ++i) {
@@ -335,18 +343,38 @@ TEST_F(SlamCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
 TEST_F(SlamCoreTest, StampsThatGoBackBeginANewWorld) {
   const auto core = start();
   core->camera_info(info_of(source_camera()));
-  const auto feed_at = [&](size_t i, int64_t offset) {
-    ImageMessage colour = message_of(frames().at(i), false), depth = message_of(frames().at(i), true);
-    colour.stamp_ns += offset;
-    depth.stamp_ns += offset;
-    core->colour(std::move(colour));
-    core->depth(std::move(depth));
-  };
-  for (size_t i = 0; i < 5; ++i) feed_at(i, 100'000'000'000);
+  for (size_t i = 0; i < 5; ++i) feed_at(*core, i, 100'000'000'000);
   ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
-  for (size_t i = 0; i < 8; ++i) feed_at(i, 0);
+  for (size_t i = 0; i < 8; ++i) feed_at(*core, i, 0);
   ASSERT_TRUE(out.wait([&] { return out.odometry.size() >= 10; }));
   EXPECT_LT(out.odometry[5].pose.pose.translation.norm(), 1e-6);
+}
+
+TEST_F(SlamCoreTest, StampsThatGoBackKeepAMapThatWasLoaded) {
+  const std::string file = testing::TempDir() + "dkb_ros_core_test_jump.dkb";
+  {
+    const auto mapping = start();
+    mapping->camera_info(info_of(source_camera()));
+    feed_all(*mapping, 0, 10);
+    ASSERT_TRUE(answer_of([&](auto done) { mapping->save_map(file, done); }).success);
+  }
+  const auto core = start({{"load_map", file}, {"localize_only", true}, {"queue_size", int64_t{100}}});
+  core->camera_info(info_of(source_camera()));
+  const auto found_after = [&](int64_t offset_ns) {
+    return out.wait([&] {
+      return !out.odometry.empty() && out.odometry.back().pose.stamp_ns >= frames()[3].stamp_ns() + offset_ns &&
+             out.odometry.back().pose.stamp_ns <= frames()[9].stamp_ns() + offset_ns;
+    });
+  };
+  out.odometry.clear();
+  for (size_t i = 0; i < 10; ++i) feed_at(*core, i, 100'000'000'000);
+  ASSERT_TRUE(found_after(100'000'000'000));
+  for (size_t i = 0; i < 10; ++i) feed_at(*core, i, 0);
+  ASSERT_TRUE(found_after(0));
+  const std::lock_guard lock(out.mutex);
+  EXPECT_TRUE(std::any_of(out.logged.begin(), out.logged.end(),
+                          [&](const std::string& line) { return line.find("again in " + file) != std::string::npos; }));
+  std::filesystem::remove(file);
 }
 
 TEST_F(SlamCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
