@@ -33,6 +33,7 @@ Camera device_camera(const std::string& name, const Camera& told, const SourceOp
     throw InputError(name + ": its images are of " + size_text(told) + " px, the camera is of " + size_text(camera) +
                      "; give the camera that took them");
   if (camera.fps == 0) camera.fps = told.fps;
+  if (told.depth_factor > 0) camera.depth_factor = told.depth_factor;
   try {
     camera.check();
   } catch (const InvalidOption& e) {

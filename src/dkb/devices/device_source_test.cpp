@@ -233,6 +233,20 @@ TEST(DeviceSource, OptionsAreCheckedAndOnesThatLeaveNothingAreNamed) {
   EXPECT_EQ(source.next().state, SourceState::ended);
 }
 
+TEST(DeviceCamera, TheUnitOfDepthIsTheDevicesWhateverTheCameraFileSays) {
+  Camera told;
+  told.fx = 0, told.depth_factor = 1000;
+  SourceOptions file, map;
+  file.camera = "fr1";  // 5000 units per metre, as in TUM's folders
+  map.fallback_camera.emplace();
+  for (const SourceOptions& options : {file, map}) {
+    EXPECT_EQ(device_camera("it", told, options).depth_factor, 1000);
+    Camera silent = told;
+    silent.depth_factor = 0;
+    EXPECT_EQ(device_camera("it", silent, options).depth_factor, 5000);
+  }
+}
+
 TEST(DeviceSource, StopEndsTheWaitForADeviceThatIsGone) {
   Steps steps;
   steps.push_back({DeviceState::unplugged});

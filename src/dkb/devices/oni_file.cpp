@@ -282,9 +282,8 @@ Camera camera_of(const OniFile& file, const std::string& name, const SourceOptio
     told.fy = stream.height / (2 * std::tan(stream.vertical_fov / 2));
     told.cx = (stream.width - 1) / 2.0, told.cy = (stream.height - 1) / 2.0;
   }
-  Camera camera = device_camera(name, told, options);
-  camera.depth_factor = file.depth_factor();  // the recording knows its unit
-  return camera;
+  told.depth_factor = file.depth_factor();
+  return device_camera(name, told, options);
 }
 
 }  // namespace
