@@ -110,7 +110,8 @@ OnnxInput read_onnx_input(std::string_view bytes, const std::string& name) {
   std::vector<OnnxInput> inputs;
   std::set<std::string> initialisers;
   size_t nodes = 0;
-  // GraphProto: node = 1 {attribute = 5}, initializer = 5 {name = 8}, input = 11.
+  bool elsewhere = false;  // weights in a file beside it, which nobody moves or checks with the model
+  // GraphProto: node = 1 {attribute = 5}, initializer = 5 {name = 8, data_location = 14}, input = 11.
   const auto read_graph = [&](const Field& f) {
     if (!f.is_message) return;
     if (f.number == 1) {
@@ -121,6 +122,7 @@ OnnxInput read_onnx_input(std::string_view bytes, const std::string& name) {
     } else if (f.number == 5) {
       wire.each_field(f.message, [&](const Field& tensor) {
         if (tensor.number == 8 && tensor.is_message) initialisers.emplace(tensor.message);
+        elsewhere |= tensor.number == 14 && !tensor.is_message && tensor.varint == 1;
       });
     } else if (f.number == 11) {
       inputs.push_back(read_value_info(wire, f.message));
@@ -133,6 +135,10 @@ OnnxInput read_onnx_input(std::string_view bytes, const std::string& name) {
     if (f.number == 7 && f.is_message) wire.each_field(f.message, read_graph);
   });
   if (!versioned || nodes == 0) wire.fail("it holds no graph");
+  if (elsewhere)
+    throw InputError(name +
+                     ": its weights lie in another file; export it as one file (external_data=False, or "
+                     "onnx.save of the loaded model)");
   std::erase_if(inputs, [&](const OnnxInput& input) { return initialisers.count(input.name) != 0; });
   const auto size = std::find_if(inputs.begin(), inputs.end(), [](const OnnxInput& input) {
     return input.name == kSizeInput && input.element_type == kOnnxInt64;

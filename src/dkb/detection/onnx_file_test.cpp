@@ -6,6 +6,7 @@
 #include "dkb/detection/onnx_graph_test_util.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -47,6 +48,18 @@ TEST(OnnxFile, TheSizeThatBoxesReferToIsASecondInput) {
 TEST(OnnxFile, NoOrSeveralInputsAreRefused) {
   EXPECT_THROW(read_onnx_input(identity(""), "m"), InputError);
   EXPECT_THROW(read_onnx_input(identity(value_info(11, "a", {1}) + value_info(11, "b", {1})), "m"), InputError);
+}
+
+TEST(OnnxFile, WeightsInAnotherFileAreRefused) {
+  const auto with_weights = [](int64_t location) {
+    const std::string weights = number(1, 3) + number(2, 1) + message(8, "w") + number(14, location);
+    return identity(value_info(11, "images", {1, 3, 64, 64}) + message(5, weights));
+  };
+  EXPECT_EQ(read_onnx_input(with_weights(0), "m").name, "images");
+  EXPECT_EQ(
+      test::input_error_of([&] { read_onnx_input(with_weights(1), "m"); }),
+      "m: its weights lie in another file; export it as one file (external_data=False, or onnx.save of the loaded "
+      "model)");
 }
 
 TEST(OnnxFile, EveryTruncationIsRefused) {
