@@ -276,33 +276,48 @@ std::unique_ptr<Source> open_v4l2_device(const std::string& where, const SourceO
       std::make_unique<DeviceSource>(std::make_unique<V4l2Device>(place, camera), camera, options));
 }
 
-std::vector<std::string> v4l2_devices() {
-  std::vector<std::string> paths;
-  std::error_code ec;
-  for (std::filesystem::directory_iterator it("/dev", ec), end; !ec && it != end; it.increment(ec))
-    if (it->path().filename().string().starts_with("video")) paths.push_back(it->path().string());
-  std::sort(paths.begin(), paths.end());
+std::vector<std::string> v4l2_pairs(std::vector<V4l2Node> nodes) {
+  // By the number at the end: video10 comes after video9.
+  const auto less = [](const V4l2Node& a, const V4l2Node& b) {
+    return std::pair(a.path.size(), a.path) < std::pair(b.path.size(), b.path);
+  };
+  std::sort(nodes.begin(), nodes.end(), less);
   std::vector<std::pair<std::string, std::string>> depth;  // path, where it is plugged in
-  std::map<std::string, std::string> colour;               // where, path
-  for (const std::string& path : paths) {
-    const Descriptor fd(path);
-    v4l2_capability capability{};
-    if (fd.get() < 0 || control(fd.get(), VIDIOC_QUERYCAP, &capability) < 0) continue;
-    const std::string bus = reinterpret_cast<const char*>(capability.bus_info);
-    bool gives_colour = false, gives_depth = false;
-    for (const uint32_t fourcc : formats_of(fd.get())) {
+  std::map<std::string, std::string> colour, grey;         // where, path
+  for (const V4l2Node& node : nodes) {
+    bool gives_colour = false, gives_grey = false, gives_depth = false;
+    for (const uint32_t fourcc : node.formats) {
       V4l2Pixels pixels{};
-      if (v4l2_pixels_of(fourcc, &pixels)) (pixels == V4l2Pixels::z16 ? gives_depth : gives_colour) = true;
+      if (!v4l2_pixels_of(fourcc, &pixels)) continue;
+      (pixels == V4l2Pixels::z16 ? gives_depth : pixels == V4l2Pixels::grey ? gives_grey : gives_colour) = true;
     }
     if (gives_depth)
-      depth.emplace_back(path, bus);
+      depth.emplace_back(node.path, node.bus);
     else if (gives_colour)
-      colour[bus] = path;
+      colour.emplace(node.bus, node.path);
+    else if (gives_grey)
+      grey.emplace(node.bus, node.path);
   }
+  colour.merge(grey);  // where a camera has no other
   std::vector<std::string> devices;
+  devices.reserve(depth.size());
   for (const auto& [path, bus] : depth)
     devices.push_back("v4l2:" + (colour.contains(bus) ? colour[bus] : "COLOUR") + "," + path);
   return devices;
+}
+
+std::vector<std::string> v4l2_devices() {
+  std::vector<V4l2Node> nodes;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator it("/dev", ec), end; !ec && it != end; it.increment(ec)) {
+    if (!it->path().filename().string().starts_with("video")) continue;
+    const std::string path = it->path().string();
+    const Descriptor fd(path);
+    v4l2_capability capability{};
+    if (fd.get() < 0 || control(fd.get(), VIDIOC_QUERYCAP, &capability) < 0) continue;
+    nodes.push_back({path, reinterpret_cast<const char*>(capability.bus_info), formats_of(fd.get())});
+  }
+  return v4l2_pairs(std::move(nodes));
 }
 
 }  // namespace dkb

@@ -24,6 +24,20 @@ TEST(V4l2Place, TwoDevicesByPathOrNumber) {
             "v4l2:1,1: colour and depth must come from two video devices");
 }
 
+TEST(V4l2Pairs, ColourComesBeforeInfraredWhateverTheNumbers) {
+  const std::vector<uint32_t> depth{V4L2_PIX_FMT_Z16}, infrared{V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_UYVY},
+      colour{V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG};
+  const std::vector<V4l2Node> nodes{{"/dev/video10", "usb-1", infrared}, {"/dev/video12", "usb-1", colour},
+                                    {"/dev/video8", "usb-1", depth},     {"/dev/video0", "usb-2", colour},
+                                    {"/dev/video2", "usb-3", infrared},  {"/dev/video4", "usb-3", depth},
+                                    {"/dev/video6", "usb-4", depth},     {"/dev/video7", "usb-5", {0x12345678}}};
+  EXPECT_EQ(v4l2_pairs(nodes), (std::vector<std::string>{"v4l2:/dev/video2,/dev/video4", "v4l2:COLOUR,/dev/video6",
+                                                         "v4l2:/dev/video12,/dev/video8"}));
+  // The infrared camera's number is the higher one.
+  EXPECT_EQ(v4l2_pairs({{"/dev/video9", "a", colour}, {"/dev/video10", "a", infrared}, {"/dev/video4", "a", depth}}),
+            std::vector<std::string>{"v4l2:/dev/video9,/dev/video4"});
+}
+
 TEST(V4l2Place, MutatedPlacesThrowNothingButInputErrors) {
   Random random(23);
   for (int i = 0; i < 3000; ++i) {
