@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -24,12 +25,26 @@ struct DkbDeviceImage {
   int64_t stamp_ns;
 };
 
+// Which way the coefficients of a lens work.
+enum DkbDeviceLens {
+  dkb_lens_forward = 0,  // OpenCV's: k1 k2 p1 p2 k3 distort; with k4 k5 k6 the rational model
+  dkb_lens_inverse = 1,  // k1 k2 p1 p2 k3 take the distortion away
+  dkb_lens_other = 2     // a model that these coefficients do not hold
+};
+
 struct DkbDeviceCamera {
   int width, height;
   double fx, fy, cx, cy;  // [px]; fx 0 = the device does not tell
-  double k1, k2, p1, p2, k3;
-  double depth_factor;  // [units per metre]
+  double k1, k2, p1, p2, k3, k4, k5, k6;
+  int lens;             // DkbDeviceLens
+  double depth_factor;  // [units per metre]; 0 = the device does not tell
   double fps;
+};
+
+// The images that are wanted, of both streams.
+struct DkbDeviceMode {
+  int width, height;
+  int fps;
 };
 
 enum DkbDeviceState { dkb_images = 1, dkb_waiting = 0, dkb_unplugged = -1, dkb_failed = -2 };
@@ -38,7 +53,7 @@ struct DkbDeviceApi {
   // Writes the places of the devices that are plugged in, a line each. Returns their number, or -1.
   int (*list)(char* lines, size_t lines_size, char* error, size_t error_size);
   // The place is a serial number or a URI; empty = the first device. Null when that fails.
-  void* (*open)(const char* place, char* error, size_t error_size);
+  void* (*open)(const char* place, const struct DkbDeviceMode* mode, char* error, size_t error_size);
   void (*camera)(void* device, struct DkbDeviceCamera* camera);
   // Depth comes registered to colour. Returns a DkbDeviceState; images may come one at a time.
   int (*next)(void* device, int timeout_ms, struct DkbDeviceImage* colour, struct DkbDeviceImage* depth, char* error,
@@ -47,7 +62,7 @@ struct DkbDeviceApi {
 };
 
 // The one symbol looked up. The number in its name changes with the interface.
-__attribute__((visibility("default"))) const struct DkbDeviceApi* dkb_device_api_1();
+__attribute__((visibility("default"))) const struct DkbDeviceApi* dkb_device_api_2();
 
 }  // extern "C"
 
@@ -61,9 +76,16 @@ struct AsItIs {
   }
 };
 
+// The makers tell units of depth as floats: 0.001F is meant to be 1000 to the metre, not 999.99995.
+inline double depth_factor_of(double metres_per_unit) {
+  if (!(metres_per_unit > 0)) return 0;
+  const double factor = 1 / metres_per_unit, whole = std::round(factor);
+  return std::abs(factor - whole) < 1e-6 * factor ? whole : factor;
+}
+
 // For the modules: the interface around a class that has places() (static: of the devices that are plugged in),
-// Device(place), describe(camera) and next(timeout_ms, colour, depth). `Calls` runs what may throw; it turns what is no
-// std::exception into one.
+// Device(place, mode), describe(camera) and next(timeout_ms, colour, depth). `Calls` runs what may throw; it turns what
+// is no std::exception into one.
 template <class Device, class Calls = AsItIs>
 const DkbDeviceApi* device_api() {
   static const DkbDeviceApi api{
@@ -78,9 +100,9 @@ const DkbDeviceApi* device_api() {
           });
         });
       },
-      [](const char* place, char* error, size_t error_size) {
+      [](const char* place, const DkbDeviceMode* mode, char* error, size_t error_size) {
         return guarded<void*>(nullptr, error, error_size,
-                              [&] { return Calls::run([&]() -> void* { return new Device(place); }); });
+                              [&] { return Calls::run([&]() -> void* { return new Device(place, *mode); }); });
       },
       [](void* device, DkbDeviceCamera* camera) {  // a device that fails here tells nothing
         DkbDeviceCamera told{};

@@ -21,12 +21,13 @@ std::string size_text(const Camera& camera) {
 
 }  // namespace
 
-Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options) {
+Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options,
+                     const std::string& untold) {
   Camera camera = told;
   if (!options.camera.empty()) {
     camera = choose_camera(options.camera, {}).camera;
   } else if (!(told.fx > 0)) {
-    if (!options.fallback_camera) throw InputError(name + ": does not tell its camera; give --camera FILE");
+    if (!options.fallback_camera) throw InputError(name + ": " + untold + "; give --camera FILE");
     camera = *options.fallback_camera;
   }
   if (camera.width != told.width || camera.height != told.height)

@@ -82,7 +82,8 @@ class DeviceSource final : public Source {
 
 // The camera of a device or a recording of one: the option's, else what it tells (`told`; fx is 0 where it tells only
 // the size of its images and their rate), else the fallback. The unit of depth is always the one that it tells (0:
-// none). Throws InputError, which begins with `name`.
-Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options);
+// none). Throws InputError, which begins with `name`; `untold` says why fx is 0.
+Camera device_camera(const std::string& name, const Camera& told, const SourceOptions& options,
+                     const std::string& untold = "does not tell its camera");
 
 }  // namespace dkb

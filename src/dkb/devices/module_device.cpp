@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
+#include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/devices/device_module.h"
 #include "dkb/devices/device_source.h"
+#include "dkb/devices/told_camera.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/module.h"
 #include "dkb/util/one_line.h"
@@ -18,7 +21,7 @@ using Error = std::array<char, 512>;
 
 const DkbDeviceApi* load(const DeviceModule& module, std::string* reason) {
   void* symbol = module_symbol({module.file, DKB_MODULE_LIBDIR, {DKB_MODULE_BUILD_DIR, DKB_MODULE_INSTALL_DIR}},
-                               "dkb_device_api_1", reason);
+                               "dkb_device_api_2", reason);
   return symbol == nullptr ? nullptr : reinterpret_cast<const DkbDeviceApi* (*)()>(symbol)();
 }
 
@@ -30,8 +33,8 @@ const DkbDeviceApi& api_of(const DeviceModule& module, const std::string& where)
 
 class ModuleDevice final : public ImageDevice {
  public:
-  ModuleDevice(const DkbDeviceApi& api, std::string where, std::string place)
-      : api_(api), where_(std::move(where)), place_(std::move(place)) {
+  ModuleDevice(const DkbDeviceApi& api, std::string where, std::string place, const DkbDeviceMode& mode)
+      : api_(api), where_(std::move(where)), place_(std::move(place)), mode_(mode) {
     Error error{};
     if (!open(&error)) throw InputError(where_ + ": " + one_line(error.data()));
   }
@@ -70,7 +73,7 @@ class ModuleDevice final : public ImageDevice {
             image.stamp_ns};
   }
   bool open(Error* error) {
-    device_ = api_.open(place_.c_str(), error->data(), error->size());
+    device_ = api_.open(place_.c_str(), &mode_, error->data(), error->size());
     return device_ != nullptr;
   }
   void close() {
@@ -80,23 +83,26 @@ class ModuleDevice final : public ImageDevice {
 
   const DkbDeviceApi& api_;
   const std::string where_, place_;
+  const DkbDeviceMode mode_;
   void* device_ = nullptr;
 };
 
-Camera told_camera(const ModuleDevice& device) {
-  const DkbDeviceCamera told = device.camera();
-  Camera camera;
-  camera.width = told.width, camera.height = told.height, camera.fps = told.fps;
-  camera.fx = told.fx, camera.fy = told.fy, camera.cx = told.cx, camera.cy = told.cy;
-  camera.k1 = told.k1, camera.k2 = told.k2, camera.p1 = told.p1, camera.p2 = told.p2, camera.k3 = told.k3;
-  camera.depth_factor = told.depth_factor;
-  return camera;
+// That of the camera that will be used, where it is known already.
+DkbDeviceMode wanted_mode(const SourceOptions& options) {
+  DkbDeviceMode mode{640, 480, 30};
+  std::optional<Camera> camera = options.fallback_camera;
+  if (!options.camera.empty()) camera = choose_camera(options.camera, {}).camera;
+  if (!camera) return mode;
+  mode.width = camera->width, mode.height = camera->height;
+  if (camera->fps > 0) mode.fps = std::max(1, static_cast<int>(std::lround(camera->fps)));
+  return mode;
 }
 
 std::unique_ptr<Source> open_device(const DeviceModule& module, const std::string& where, const std::string& place,
                                     const SourceOptions& options) {
-  auto device = std::make_unique<ModuleDevice>(api_of(module, where), where, place);
-  const Camera camera = device_camera(where, told_camera(*device), options);
+  auto device = std::make_unique<ModuleDevice>(api_of(module, where), where, place, wanted_mode(options));
+  const ToldCamera told = told_camera(device->camera());
+  const Camera camera = device_camera(where, told.camera, options, told.reason);
   return std::make_unique<DeviceSource>(std::move(device), camera, options);
 }
 

@@ -40,7 +40,7 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
     for (int i = 0; i < devices.getSize(); ++i) uris.emplace_back(devices[i].getUri());
     return uris;
   }
-  explicit Device(const char* place) {
+  Device(const char* place, const DkbDeviceMode& mode) {
     start_library();
     const char* uri = *place == '\0' ? openni::ANY_DEVICE : place;
     require(device_.open(uri), "finds no such camera; is it plugged in? `dkb-slam sources` lists them");
@@ -50,7 +50,7 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
     device_.setDepthColorSyncEnabled(true);  // not every camera can
     require(colour_.create(device_, openni::SENSOR_COLOR), "gives no colour");
     require(depth_.create(device_, openni::SENSOR_DEPTH), "gives no depth");
-    choose_modes();
+    choose_modes(mode);
     colour_.setMirroringEnabled(false), depth_.setMirroringEnabled(false);
     OpenNI::addDeviceDisconnectedListener(this);
   }
@@ -120,13 +120,14 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
     }
   }
 
-  // 640 x 480 or what is next to it, at 30 Hz, both of one size.
-  void choose_modes() {
+  // What is next to the wanted size and rate, both of one size.
+  void choose_modes(const DkbDeviceMode& wanted) {
     const auto choose = [&](openni::VideoStream& stream, auto fits) {
       const openni::Array<openni::VideoMode>& modes = stream.getSensorInfo().getSupportedVideoModes();
       const openni::VideoMode* best = nullptr;
-      const auto badness = [](const openni::VideoMode& m) {
-        return std::abs(m.getResolutionX() - 640) + std::abs(m.getResolutionY() - 480) + std::abs(m.getFps() - 30);
+      const auto badness = [&](const openni::VideoMode& m) {
+        return std::abs(m.getResolutionX() - wanted.width) + std::abs(m.getResolutionY() - wanted.height) +
+               std::abs(m.getFps() - wanted.fps);
       };
       for (int i = 0; i < modes.getSize(); ++i)
         if (fits(modes[i]) && (best == nullptr || badness(modes[i]) < badness(*best))) best = &modes[i];
@@ -173,6 +174,6 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_1() {
+extern "C" const DkbDeviceApi* dkb_device_api_2() {
   return dkb::device_api<Device>();
 }

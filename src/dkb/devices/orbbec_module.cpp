@@ -10,7 +10,22 @@
 
 namespace {
 
-constexpr uint32_t kWidth = 640, kHeight = 480, kFps = 30;
+// Coefficients of these kinds are ours or can be turned into ours.
+int lens_of(const OBCameraDistortion& lens) {
+  const bool more = lens.k4 != 0 || lens.k5 != 0 || lens.k6 != 0;
+  const bool straight = !more && lens.k1 == 0 && lens.k2 == 0 && lens.k3 == 0 && lens.p1 == 0 && lens.p2 == 0;
+  switch (lens.model) {
+    case OB_DISTORTION_BROWN_CONRADY:
+    case OB_DISTORTION_BROWN_CONRADY_K6:
+      return dkb_lens_forward;
+    case OB_DISTORTION_INVERSE_BROWN_CONRADY:
+      return more ? dkb_lens_other : dkb_lens_inverse;
+    case OB_DISTORTION_KANNALA_BRANDT4:
+      return dkb_lens_other;
+    default:
+      return straight ? dkb_lens_forward : dkb_lens_other;
+  }
+}
 
 std::shared_ptr<ob::Device> find_device(ob::Context& context, const std::string& serial) {
   const std::shared_ptr<ob::DeviceList> devices = context.queryDeviceList();
@@ -28,7 +43,7 @@ class Device {
     for (uint32_t i = 0; i < devices->getCount(); ++i) serials.emplace_back(devices->getSerialNumber(i));
     return serials;
   }
-  explicit Device(const std::string& serial) {
+  Device(const std::string& serial, const DkbDeviceMode& mode) : fps_(mode.fps) {
     const std::shared_ptr<ob::Device> device = find_device(context_, serial);
     if (device == nullptr)
       throw std::runtime_error(
@@ -36,8 +51,10 @@ class Device {
     serial_ = device->getDeviceInfo()->getSerialNumber();
     pipeline_ = std::make_unique<ob::Pipeline>(device);
     auto config = std::make_shared<ob::Config>();
-    config->enableVideoStream(OB_STREAM_COLOR, kWidth, kHeight, kFps, OB_FORMAT_RGB);
-    config->enableVideoStream(OB_STREAM_DEPTH, OB_WIDTH_ANY, OB_HEIGHT_ANY, kFps, OB_FORMAT_Y16);
+    const auto width = static_cast<uint32_t>(mode.width), height = static_cast<uint32_t>(mode.height);
+    const auto fps = static_cast<uint32_t>(mode.fps);
+    config->enableVideoStream(OB_STREAM_COLOR, width, height, fps, OB_FORMAT_RGB);
+    config->enableVideoStream(OB_STREAM_DEPTH, OB_WIDTH_ANY, OB_HEIGHT_ANY, fps, OB_FORMAT_Y16);
     config->setFrameAggregateOutputMode(OB_FRAME_AGGREGATE_OUTPUT_ALL_TYPE_FRAME_REQUIRE);
     pipeline_->enableFrameSync();
     pipeline_->start(config);
@@ -61,15 +78,12 @@ class Device {
     const OBCameraParam parameters = pipeline_->getCameraParam();
     const OBCameraIntrinsic& in = parameters.rgbIntrinsic;
     const OBCameraDistortion& lens = parameters.rgbDistortion;
-    camera->width = in.width, camera->height = in.height, camera->fps = kFps;
-    camera->depth_factor = 1 / metres_per_unit_;
-    // The rational model and models of other names have other coefficients; the user must calibrate then.
-    const bool rational = lens.k4 != 0 || lens.k5 != 0 || lens.k6 != 0;
-    const bool straight = lens.k1 == 0 && lens.k2 == 0 && lens.k3 == 0 && lens.p1 == 0 && lens.p2 == 0;
-    const bool brown = lens.model == OB_DISTORTION_BROWN_CONRADY || lens.model == OB_DISTORTION_BROWN_CONRADY_K6;
-    if (rational || (!straight && !brown)) return;
+    camera->width = in.width, camera->height = in.height, camera->fps = fps_;
+    camera->depth_factor = dkb::depth_factor_of(metres_per_unit_);
+    camera->lens = lens_of(lens);
     camera->fx = in.fx, camera->fy = in.fy, camera->cx = in.cx, camera->cy = in.cy;
     camera->k1 = lens.k1, camera->k2 = lens.k2, camera->p1 = lens.p1, camera->p2 = lens.p2, camera->k3 = lens.k3;
+    camera->k4 = lens.k4, camera->k5 = lens.k5, camera->k6 = lens.k6;
   }
 
   int next(int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth) {
@@ -99,6 +113,7 @@ class Device {
   std::unique_ptr<ob::Pipeline> pipeline_;
   ob::Align align_{OB_STREAM_COLOR};
   std::shared_ptr<ob::FrameSet> frames_;
+  int fps_ = 0;
   double metres_per_unit_ = 0;
 };
 
@@ -116,6 +131,6 @@ struct Calls {
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_1() {
+extern "C" const DkbDeviceApi* dkb_device_api_2() {
   return dkb::device_api<Device, Calls>();
 }

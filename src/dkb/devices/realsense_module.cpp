@@ -10,7 +10,14 @@
 
 namespace {
 
-constexpr int kWidth = 640, kHeight = 480, kFps = 30;
+// Coefficients of these kinds are ours or can be turned into ours.
+int lens_of(const rs2_intrinsics& in) {
+  if (in.model == RS2_DISTORTION_BROWN_CONRADY) return dkb_lens_forward;
+  if (in.model == RS2_DISTORTION_INVERSE_BROWN_CONRADY) return dkb_lens_inverse;
+  const bool fisheye = in.model == RS2_DISTORTION_FTHETA || in.model == RS2_DISTORTION_KANNALA_BRANDT4;
+  const bool straight = std::all_of(in.coeffs, in.coeffs + 5, [](float k) { return k == 0; });
+  return straight && !fisheye ? dkb_lens_forward : dkb_lens_other;
+}
 
 class Device {
  public:
@@ -21,17 +28,19 @@ class Device {
       serials.emplace_back(device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER));
     return serials;
   }
-  explicit Device(const std::string& serial) {
+  Device(const std::string& serial, const DkbDeviceMode& mode) {
     rs2::config config;
     if (!serial.empty()) config.enable_device(serial);
-    config.enable_stream(RS2_STREAM_COLOR, kWidth, kHeight, RS2_FORMAT_RGB8, kFps);
-    config.enable_stream(RS2_STREAM_DEPTH, kWidth, kHeight, RS2_FORMAT_Z16, kFps);
+    config.enable_stream(RS2_STREAM_COLOR, mode.width, mode.height, RS2_FORMAT_RGB8, mode.fps);
+    config.enable_stream(RS2_STREAM_DEPTH, mode.width, mode.height, RS2_FORMAT_Z16, mode.fps);
     try {
       profile_ = pipeline_.start(config);
     } catch (const rs2::error& e) {
-      throw std::runtime_error(std::string("librealsense2 cannot start it (") + e.what() +
-                               "); is it plugged in? `dkb-slam sources` lists the cameras");
+      throw std::runtime_error("librealsense2 cannot start it with " + std::to_string(mode.width) + "x" +
+                               std::to_string(mode.height) + " px at " + std::to_string(mode.fps) + " Hz (" + e.what() +
+                               "); is it plugged in, and does it give these? `dkb-slam sources` lists the cameras");
     }
+    fps_ = mode.fps;
     serial_ = profile_.get_device().get_info(RS2_CAMERA_INFO_SERIAL_NUMBER);
     for (const rs2::sensor& sensor : profile_.get_device().query_sensors())
       if (sensor.is<rs2::depth_sensor>()) metres_per_unit_ = rs2::depth_sensor(sensor).get_depth_scale();
@@ -47,11 +56,9 @@ class Device {
 
   void describe(DkbDeviceCamera* camera) const {
     const rs2_intrinsics in = profile_.get_stream(RS2_STREAM_COLOR).as<rs2::video_stream_profile>().get_intrinsics();
-    camera->width = in.width, camera->height = in.height, camera->fps = kFps;
-    camera->depth_factor = 1 / static_cast<double>(metres_per_unit_);
-    const bool straight = std::all_of(in.coeffs, in.coeffs + 5, [](float k) { return k == 0; });
-    // Other models than this one have other coefficients; the user must calibrate then.
-    if (!straight && in.model != RS2_DISTORTION_BROWN_CONRADY) return;
+    camera->width = in.width, camera->height = in.height, camera->fps = fps_;
+    camera->depth_factor = dkb::depth_factor_of(static_cast<double>(metres_per_unit_));
+    camera->lens = lens_of(in);
     camera->fx = in.fx, camera->fy = in.fy, camera->cx = in.ppx, camera->cy = in.ppy;
     camera->k1 = in.coeffs[0], camera->k2 = in.coeffs[1], camera->p1 = in.coeffs[2], camera->p2 = in.coeffs[3];
     camera->k3 = in.coeffs[4];
@@ -95,11 +102,12 @@ class Device {
   rs2::align align_{RS2_STREAM_COLOR};
   rs2::frameset frames_;
   std::string serial_;
+  int fps_ = 0;
   float metres_per_unit_ = 0.001F;
 };
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_1() {
+extern "C" const DkbDeviceApi* dkb_device_api_2() {
   return dkb::device_api<Device>();
 }

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dkb/devices/told_camera.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "dkb/util/errors.h"
+
+namespace dkb {
+namespace {
+
+constexpr double kMostError = 0.5;  // [px] of a fitted lens
+constexpr int kColumns = 33, kRows = 25;
+
+ToldCamera untold(Camera camera, const std::string& reason) {
+  camera.fx = 0;
+  return {camera, reason};
+}
+
+}  // namespace
+
+double fit_inverse_lens(Camera* camera) {
+  const Camera inverse = *camera;
+  struct Ray {
+    Eigen::Vector2d ideal, image;  // tangents
+  };
+  std::vector<Ray> rays;
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < kColumns; ++column) {
+      const double x = (column * (inverse.width - 1.0) / (kColumns - 1) - inverse.cx) / inverse.fx;
+      const double y = (row * (inverse.height - 1.0) / (kRows - 1) - inverse.cy) / inverse.fy;
+      const double r2 = x * x + y * y;
+      const double radial = 1 + r2 * (inverse.k1 + r2 * (inverse.k2 + r2 * inverse.k3));
+      rays.push_back({{x * radial + 2 * inverse.p1 * x * y + inverse.p2 * (r2 + 2 * x * x),
+                       y * radial + 2 * inverse.p2 * x * y + inverse.p1 * (r2 + 2 * y * y)},
+                      {x, y}});
+    }
+  // The distorting model is linear in its coefficients k1, k2, k3, p1, p2.
+  const auto count = static_cast<Eigen::Index>(rays.size());
+  Eigen::MatrixXd factors(2 * count, 5);
+  Eigen::VectorXd offsets(2 * count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Ray& ray = rays[static_cast<size_t>(i)];
+    const double x = ray.ideal.x(), y = ray.ideal.y(), r2 = ray.ideal.squaredNorm();
+    factors.row(2 * i) << x * r2, x * r2 * r2, x * r2 * r2 * r2, 2 * x * y, r2 + 2 * x * x;
+    factors.row(2 * i + 1) << y * r2, y * r2 * r2, y * r2 * r2 * r2, r2 + 2 * y * y, 2 * x * y;
+    offsets.segment<2>(2 * i) = ray.image - ray.ideal;
+  }
+  const Eigen::VectorXd fitted = factors.colPivHouseholderQr().solve(offsets);
+  camera->k1 = fitted[0], camera->k2 = fitted[1], camera->k3 = fitted[2];
+  camera->p1 = fitted[3], camera->p2 = fitted[4];
+  double largest = 0;
+  for (const Ray& ray : rays) {
+    const Eigen::Vector2d pixel(inverse.fx * ray.image.x() + inverse.cx, inverse.fy * ray.image.y() + inverse.cy);
+    const double error = (camera->distort(camera->project({ray.ideal.x(), ray.ideal.y(), 1})) - pixel).norm();
+    if (!(error <= largest)) largest = error;
+  }
+  return largest;
+}
+
+ToldCamera told_camera(const DkbDeviceCamera& told) {
+  Camera camera;
+  camera.width = told.width, camera.height = told.height, camera.fps = told.fps;
+  camera.fx = told.fx, camera.fy = told.fy, camera.cx = told.cx, camera.cy = told.cy;
+  camera.depth_factor = told.depth_factor;
+  if (!(told.fx > 0)) return untold(camera, "does not tell its camera");
+  if (told.lens == dkb_lens_other)
+    return untold(camera, "its lens is told by a model that is none of ours (Brown-Conrady, its inverse, rational)");
+  if (told.lens == dkb_lens_inverse) {
+    camera.k1 = told.k1, camera.k2 = told.k2, camera.p1 = told.p1, camera.p2 = told.p2, camera.k3 = told.k3;
+    if (!camera.distorted()) return {camera, ""};
+    const double error = fit_inverse_lens(&camera);
+    if (!(error <= kMostError))
+      return untold(camera, "its lens, told by the inverse Brown-Conrady model, is met by ours only within " +
+                                std::to_string(error) + " px");
+    return {camera, ""};
+  }
+  try {
+    const bool rational = told.k4 != 0 || told.k5 != 0 || told.k6 != 0;
+    std::vector<double> coefficients{told.k1, told.k2, told.p1, told.p2, told.k3};
+    if (rational) coefficients.insert(coefficients.end(), {told.k4, told.k5, told.k6});
+    camera.set_distortion(rational ? "rational_polynomial" : "plumb_bob", coefficients);
+  } catch (const InputError& e) {
+    return untold(camera, e.what());
+  }
+  return {camera, ""};
+}
+
+}  // namespace dkb
