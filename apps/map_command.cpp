@@ -109,7 +109,8 @@ void export_model(const MapExportArguments& arguments) {
   else
     write_nerfstudio(file, keyframes, !arguments.images.empty(), out);
   folder.keep();
-  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes.size(), file.map.point_count(), pictures);
+  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes.size(),
+       file.map.points_of(keyframes).size(), pictures);
 }
 
 void check_arguments(const MapExportArguments& arguments) {

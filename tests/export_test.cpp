@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "dkb/dataset/image_codecs.h"
+#include "dkb/map/map_file.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/ros_messages.h"
 #include "e2e_support.h"
@@ -110,6 +111,22 @@ TEST_F(Export, NerfstudiosPosesAreTheKeyframesWithTheAxesOfOpengl) {
     EXPECT_EQ(read_picture(folder / "nerfstudio" / picture).grey.width(), 640);
     EXPECT_EQ(read_grey(folder / "nerfstudio" / frame["mask_path"].get<std::string>()).height(), 480);
   }
+}
+
+TEST_F(Export, AModelHoldsNoPointsOfAMapThatIsNotJoined) {
+  MapFile file = load_map(run.out / "map.dkb");
+  const size_t points = file.map.point_count();
+  file.map.append(Map(file.map));
+  ASSERT_EQ(file.map.roots().size(), 2U);
+  save_map(run.out / "map.dkb", file.map, file.context);
+  for (const char* format : {"colmap", "nerfstudio"}) {
+    const Finished done = export_map(format);
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_NE(done.out.find(", " + std::to_string(points) + " points;"), std::string::npos) << done.out;
+  }
+  EXPECT_EQ(lines_of(folder / "colmap" / "sparse" / "0" / "points3D.txt").size(), points);
+  EXPECT_NE(read_text(folder / "nerfstudio" / "sparse_pc.ply").find("element vertex " + std::to_string(points) + "\n"),
+            std::string::npos);
 }
 
 TEST_F(Export, AModelWithoutPicturesSaysSoAndAForeignRecordingIsRefused) {

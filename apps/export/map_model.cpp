@@ -114,7 +114,7 @@ void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyfra
     model["frames"].push_back(std::move(frame));
   }
   make_output_folder(folder);
-  write_file_atomically(folder / "sparse_pc.ply", point_cloud_ply(file.map));
+  write_file_atomically(folder / "sparse_pc.ply", point_cloud_ply(file.map, file.map.points_of(keyframes)));
   write_file_atomically(folder / "transforms.json", model.dump(1) + "\n");
 }
 

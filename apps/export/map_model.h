@@ -22,8 +22,8 @@ std::vector<KeyframeId> keyframes_of_first_map(const Map& map);
 // below `folder`. Pixels have their origin at the corner of the top-left pixel there.
 void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes, const std::filesystem::path& folder);
 
-// nerfstudio's transforms.json of them and sparse_pc.ply below `folder`. Poses are world_from_cam with the axes of
-// OpenGL: x right, y up, z backward. `has_masks`: masks/STAMP.png lie beside the pictures.
+// nerfstudio's transforms.json of them and sparse_pc.ply of what they show, below `folder`. Poses are world_from_cam
+// with the axes of OpenGL: x right, y up, z backward. `has_masks`: masks/STAMP.png lie beside the pictures.
 void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyframes, bool has_masks,
                       const std::filesystem::path& folder);
 

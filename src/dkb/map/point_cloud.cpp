@@ -17,6 +17,10 @@ void write_position(ByteWriter& out, const Eigen::Vector3d& position) {
 }  // namespace
 
 std::string point_cloud_ply(const Map& map) {
+  return point_cloud_ply(map, map.live_points());
+}
+
+std::string point_cloud_ply(const Map& map, const std::vector<PointId>& points) {
   ByteWriter out;
   out.raw(
       fmt::format("ply\n"
@@ -31,8 +35,8 @@ std::string point_cloud_ply(const Map& map) {
                   "property uchar blue\n"
                   "property int observations\n"
                   "end_header\n",
-                  map.point_count()));
-  for (PointId id : map.live_points()) {
+                  points.size()));
+  for (PointId id : points) {
     const MapPoint& p = *map.point(id);
     write_position(out, p.position);
     for (uint8_t channel : {p.colour.r, p.colour.g, p.colour.b}) out.u8(channel);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "dkb/map/map.h"
 
@@ -12,6 +13,8 @@ namespace dkb {
 // Stanford PLY, binary little-endian: x y z float, red green blue uchar, observations int (keyframes that see the
 // point).
 std::string point_cloud_ply(const Map& map);
+// These alone, which must exist.
+std::string point_cloud_ply(const Map& map, const std::vector<PointId>& points);
 
 // Point Cloud Library's PCD 0.7, binary: x y z float, rgb as packed 0x00RRGGBB.
 std::string point_cloud_pcd(const Map& map);

@@ -53,6 +53,12 @@ TEST(PointCloud, PlyHasTheHeaderAndRowsOfTheFormat) {
   EXPECT_EQ(float_at(ply, at + 19), 0.1f);
 }
 
+TEST(PointCloud, PlyOfSomePointsHoldsTheseAlone) {
+  const std::string ply = point_cloud_ply(two_points(), {make_point_id(0, 1)});
+  EXPECT_NE(ply.find("element vertex 1\n"), std::string::npos);
+  EXPECT_EQ(float_at(ply, ply.find("end_header\n") + 11), 0.1f);
+}
+
 TEST(PointCloud, PcdHasTheHeaderAndRowsOfTheFormat) {
   const std::string pcd = point_cloud_pcd(two_points());
   const std::string end = "DATA binary\n";
