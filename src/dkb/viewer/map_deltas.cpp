@@ -30,7 +30,7 @@ void MapDeltas::clear() {
 void MapDeltas::update(const MapSnapshot& snapshot) {
   const std::shared_ptr<const Map>& map = snapshot.map();
   if (map == nullptr || map == last_) return;
-  if (static_cast<size_t>(map->keyframe_count()) < keyframes_.size()) clear();
+  if (static_cast<size_t>(map->keyframe_count()) < keyframes_.size() || begins_otherwise(*map)) clear();
   ++version_;
   update_keyframes(*map);
   update_points(*map);
@@ -39,6 +39,14 @@ void MapDeltas::update(const MapSnapshot& snapshot) {
     loops_version_ = version_;
   }
   last_ = map;
+}
+
+// A map that was loaded has frames before 0, and other stamps unless it was made in this session.
+bool MapDeltas::begins_otherwise(const Map& map) const {
+  if (keyframes_.empty()) return false;
+  const dkb::Keyframe* first = map.keyframe(0);
+  const Keyframe& known = keyframes_.front();
+  return first != nullptr && known.version > 0 && (first->frame != known.frame || first->timestamp != known.timestamp);
 }
 
 void MapDeltas::update_keyframes(const Map& map) {
@@ -51,6 +59,7 @@ void MapDeltas::update_keyframes(const Map& map) {
     if (known.version == 0 || known.culled != given->culled || !same_pose(known.world_from_cam, pose)) {
       known.version = version_;
       known.frame = given->frame;
+      known.timestamp = given->timestamp;
       known.culled = given->culled;
       known.world_from_cam = pose;
       known.map = map.root(id);

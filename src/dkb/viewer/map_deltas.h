@@ -83,7 +83,8 @@ class MapDeltas {
  public:
   explicit MapDeltas(double unit) : unit_(unit) {}
 
-  // Takes in what differs from the snapshot before it.
+  // Takes in what differs from the snapshot before it. One of another world, which has fewer keyframes or begins with
+  // another one, begins anew as after clear().
   void update(const MapSnapshot& snapshot);
   // The snapshot is of another world: clients have to begin anew.
   void clear();
@@ -108,6 +109,7 @@ class MapDeltas {
   struct Keyframe {
     uint64_t version = 0, covisibility_version = 0;
     int frame = 0, map = 0;
+    double timestamp = 0;
     bool culled = false;
     Rigid3 world_from_cam;
     std::vector<std::pair<uint32_t, uint32_t>> covisible;
@@ -124,6 +126,7 @@ class MapDeltas {
     std::vector<Point> points;  // by index
   };
 
+  bool begins_otherwise(const Map& map) const;
   void update_keyframes(const Map& map);
   void update_points(const Map& map);
 

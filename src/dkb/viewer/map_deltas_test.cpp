@@ -106,5 +106,24 @@ TEST(MapDeltas, BeginAnewWithAnotherWorld) {
   EXPECT_EQ(reader.points.size(), 8U);
 }
 
+TEST(MapDeltas, BeginAnewWithALoadedMapOfAsManyKeyframes) {
+  MapDeltas deltas(0.001);
+  Map map = world(5, 4);
+  deltas.update(snapshot_of(map));
+  Reader reader;
+  reader.take(deltas);
+  map.edit_point(make_point_id(1, 2)).position.x() += 0.05;
+  deltas.update(snapshot_of(map));
+  EXPECT_FALSE(deltas.begun_anew(reader.client));
+  Map loaded = world(6, 4);
+  loaded.date_back();
+  deltas.update(snapshot_of(loaded));
+  EXPECT_TRUE(deltas.begun_anew(reader.client));
+  reader.keyframes.clear();
+  reader.points.clear();
+  reader.take(deltas);
+  EXPECT_EQ(reader.keyframes.size(), 6U);
+}
+
 }  // namespace
 }  // namespace dkb
