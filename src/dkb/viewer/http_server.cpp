@@ -54,6 +54,7 @@ const char* reason_of(int status) {
 
 // How often a stream is asked although nothing is new: what it sends then shows whether its client is still there.
 constexpr std::chrono::seconds kHeartbeat{2};
+constexpr std::chrono::milliseconds kDeaf{100};
 
 constexpr const char* kCommonHeaders =
     "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -134,9 +135,11 @@ void HttpServer::run() {
   std::vector<pollfd> fds;
   std::vector<Connection*> polled;
   while (!stopping_) {
-    fds.assign({{listener_, POLLIN, 0}, {wake_fd_, POLLIN, 0}});
+    const bool deaf = Clock::now() < deaf_until_;
+    fds.assign({{deaf ? -1 : listener_, POLLIN, 0}, {wake_fd_, POLLIN, 0}});
     polled.clear();
     Clock::time_point until = Clock::now() + std::chrono::seconds(5);
+    if (deaf) until = std::min(until, deaf_until_);
     for (Connection& c : connections_) {
       const bool sends = c.sent < c.head.size() + c.body.size();
       fds.push_back({c.fd, static_cast<short>(POLLIN | (sends ? POLLOUT : 0)), 0});
@@ -178,7 +181,8 @@ void HttpServer::accept_all() {
   for (int n = 0; n < 64; ++n) {
     const int fd = accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) {
-      if (errno == EMFILE || errno == ENFILE) make_room();
+      // The listener stays readable: without a rest a whole core would go into asking.
+      if ((errno == EMFILE || errno == ENFILE) && !make_room()) deaf_until_ = Clock::now() + kDeaf;
       return;
     }
     if (connections_.size() >= kMaxConnections) make_room();
@@ -198,15 +202,16 @@ void HttpServer::accept_all() {
 }
 
 // The oldest connection that still owes its request, or is only waited for, goes.
-void HttpServer::make_room() {
+bool HttpServer::make_room() {
   for (const Phase phase : {Phase::lingering, Phase::reading}) {
     const auto oldest =
         std::find_if(connections_.begin(), connections_.end(), [&](const Connection& c) { return c.phase == phase; });
     if (oldest == connections_.end()) continue;
     if (!oldest->closed) close(oldest->fd);
     connections_.erase(oldest);
-    return;
+    return true;
   }
+  return false;
 }
 
 void HttpServer::sweep() {

@@ -80,7 +80,7 @@ class HttpServer {
   };
 
   void accept_all();
-  void make_room();
+  bool make_room();  // whether one went
   void read(Connection& c);
   void write(Connection& c);
   void answer(Connection& c);
@@ -98,6 +98,7 @@ class HttpServer {
   std::list<Connection> connections_;  // oldest first
   bool news_ = false, stopping_ = false;
   Clock::time_point next_tick_{};
+  Clock::time_point deaf_until_{};  // no descriptor is left for who knocks: not asked before
 };
 
 }  // namespace dkb

@@ -3,9 +3,13 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <ctime>
 #include <thread>
 #include <vector>
 
@@ -119,6 +123,37 @@ TEST_F(HttpServerTest, ServesBesideAThousandIdleConnections) {
   EXPECT_TRUE(get("/b").starts_with("HTTP/1.1 200 "));
   for (const int fd : idle) close(fd);
   EXPECT_TRUE(get("/c").starts_with("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
+  const auto busy_ms = [this] {
+    clockid_t clock{};
+    timespec used{};
+    pthread_getcpuclockid(thread_.native_handle(), &clock);
+    clock_gettime(clock, &used);
+    return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
+  };
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  rlimit before{};
+  getrlimit(RLIMIT_NOFILE, &before);
+  rlimit few = before;
+  few.rlim_cur = static_cast<rlim_t>(fd) + 8;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
+  std::vector<int> taken;
+  for (int copy = 0; (copy = dup(fd)) >= 0;) taken.push_back(copy);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<uint16_t>(server_.port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  const double at_first = busy_ms();
+  poll(nullptr, 0, 300);
+  EXPECT_LT(busy_ms() - at_first, 50) << "[ms] of 300";
+  for (const int copy : taken) close(copy);
+  setrlimit(RLIMIT_NOFILE, &before);
+  const std::string request = "GET /b HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  send(fd, request.data(), request.size(), MSG_NOSIGNAL);
+  EXPECT_TRUE(all_of(fd).starts_with("HTTP/1.1 200 "));
 }
 
 TEST_F(HttpServerTest, HasAQuotaForStreams) {
