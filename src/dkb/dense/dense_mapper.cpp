@@ -50,13 +50,17 @@ void DenseMapper::remove_movers(FrameIndex frame, const MoverMask& movers) {
   }
 }
 
-DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed) const {
+DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed, const Rigid3& base_from_cam) const {
   std::vector<PlacedView> placed;
+  const Eigen::Quaterniond& mount = base_from_cam.rotation;
+  const bool mounted = mount.vec().norm() > 1e-9;
+  const Eigen::Vector3d up_in_cam =
+      mounted ? Eigen::Vector3d(mount.conjugate() * Eigen::Vector3d::UnitZ()) : Eigen::Vector3d(0, -1, 0);
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   for (const auto& view : views_)
     if (const auto world_from_cam = pose_at(trajectory, view->depth_timestamp)) {
       placed.push_back({view.get(), world_from_cam->inverse()});
-      up -= world_from_cam->rotation * Eigen::Vector3d::UnitY();
+      up += world_from_cam->rotation * up_in_cam;
     }
   DenseMap map;
   map.views = static_cast<int>(placed.size());

@@ -34,8 +34,9 @@ class DenseMapper {
   size_t keyframes() const { return views_.size(); }
 
   // Poses by time, of colour images; a view takes its pose at its depth image's time from them and is left out when
-  // they do not reach within 0.2 s of it. `seed` is that of the floor's RANSAC.
-  DenseMap build(std::span<const TimedPose> trajectory, uint64_t seed) const;
+  // they do not reach within 0.2 s of it. `seed` is that of the floor's RANSAC. The floor's normal is looked for within
+  // 35 degrees of up: the z axis of the robot's base, or -y of the cameras where `base_from_cam` turns nothing.
+  DenseMap build(std::span<const TimedPose> trajectory, uint64_t seed, const Rigid3& base_from_cam = {}) const;
 
  private:
   SensorNoise noise_;

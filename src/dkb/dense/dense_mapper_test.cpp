@@ -46,6 +46,27 @@ TEST(DenseMapper, MapsTheSceneWithItsFloorAndObstacles) {
   EXPECT_EQ(cell_of({-0.3, 1.2, 2.3}), OccupancyGrid::kFree);
 }
 
+TEST(DenseMapper, AMountTellsWhereUpIsForCamerasThatLookDown) {
+  // Half a right angle down, and on its side: without a mount up is taken for that of the image.
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(-0.7854, 0, 0), Eigen::Vector3d(0, 0, 1.5708)}) {
+    const Eigen::Quaterniond tilt = testing::scene_pose(0).rotation.conjugate() * rotation_from_vector(turn);
+    const Eigen::Quaterniond base_from_optical(0.5, -0.5, 0.5, -0.5);
+    DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
+    std::vector<TimedPose> poses;
+    for (int i = 0; i < 8; ++i) {
+      const Rigid3 at(testing::scene_pose(i).rotation * tilt, testing::scene_pose(i).translation);
+      poses.push_back({time_of(i), at});
+      mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), at, time_of(i)), {});
+    }
+    EXPECT_FALSE(mapper.build(poses, 1).grid);
+    const Rigid3 mount(base_from_optical * rotation_from_vector(turn), {0.1, 0, 0.4});
+    const DenseMap map = mapper.build(poses, 1, mount);
+    ASSERT_TRUE(map.grid);
+    EXPECT_NEAR((map.grid->floor_from_world * Eigen::Vector3d(0.2, 1.2, 2)).z(), 0, 0.01);
+    EXPECT_NEAR((map.grid->floor_from_world * Eigen::Vector3d(0, 0, 0)).z(), 1.2, 0.01);
+  }
+}
+
 TEST(DenseMapper, SameInputGivesTheSameBytes) {
   const DenseMap a = mapper_with_views(5).build(trajectory(5), 1), b = mapper_with_views(5).build(trajectory(5), 1);
   EXPECT_EQ(mesh_ply(a.mesh), mesh_ply(b.mesh));

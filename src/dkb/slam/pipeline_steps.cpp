@@ -470,7 +470,9 @@ std::function<DenseMap()> Pipeline::dense_map_task() const {
   std::vector<TimedPose> poses;
   for (const TrajectoryFrame& f : record_.trajectory(TrajectoryKind::by_map))
     if (f.map == 0) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
-  return [dense = *dense_, poses = std::move(poses), seed = options_.seed] { return dense.build(poses, seed); };
+  return [dense = *dense_, poses = std::move(poses), seed = options_.seed, mount = options_.base_from_cam] {
+    return dense.build(poses, seed, mount);
+  };
 }
 
 }  // namespace dkb
