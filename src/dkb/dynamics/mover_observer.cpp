@@ -27,7 +27,12 @@ constexpr float kBodyReach = 3;   // times the standard deviation: so far from w
 constexpr double kToldApart = 0.35;   // [m] movers expected nearer to each other have no regions each
 constexpr double kOthersShare = 0.2;  // of what hangs together in depth that somebody else must have, to be told apart
 constexpr float kBin = 0.05f;         // [m] of depth histograms
+constexpr float kFarthest = 200;      // [m] what lies beyond is in their last bin, however far a camera may tell
 constexpr size_t kMaxPoints = 300;    // per object, that its place and size are taken of
+
+size_t bin_of(float depth) {
+  return static_cast<size_t>(std::min(depth, kFarthest) / kBin);
+}
 
 size_t stride_through(std::span<const uint32_t> cells) {
   return (cells.size() + kMaxPoints - 1) / kMaxPoints;
@@ -139,7 +144,7 @@ MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
 float MoverObserver::main_layer(const std::vector<float>& depths) const {
   std::vector<int> histogram;
   for (float d : depths) {
-    const auto bin = static_cast<size_t>(d / kBin);
+    const size_t bin = bin_of(d);
     if (bin >= histogram.size()) histogram.resize(bin + 1, 0);
     ++histogram[bin];
   }
@@ -156,8 +161,7 @@ float MoverObserver::main_layer(const std::vector<float>& depths) const {
   }
   std::vector<float> in;
   for (float d : depths)
-    if (const auto bin = static_cast<size_t>(d / kBin); bin <= end_of_most && bin + window > end_of_most)
-      in.push_back(d);
+    if (const size_t bin = bin_of(d); bin <= end_of_most && bin + window > end_of_most) in.push_back(d);
   return upper_median(in);
 }
 

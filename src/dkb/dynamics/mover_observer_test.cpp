@@ -28,6 +28,17 @@ TEST(MoverObserver, ThePositionIsTheMedianOfTheVisibleSurface) {
   EXPECT_GT(found[0].position_sd, 0);
 }
 
+TEST(MoverObserver, DepthsBeyondAllReasonCostNoMemory) {
+  MoverTestScene scene;
+  scene.camera.depth_max = 1e12;  // a camera file may say so
+  scene.add(100, 40, 160, 200, 2);
+  for (int y = 40; y < 80; ++y)
+    for (int x = 100; x < 160; ++x) scene.depth(x, y) = 1e11f;
+  const auto found = observe(scene);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].position_in_world.z(), 2, 1e-6);
+}
+
 TEST(MoverObserver, PositionsAreInTheWorld) {
   MoverTestScene scene;
   scene.add(100, 40, 160, 200, 2);
