@@ -388,13 +388,15 @@ void SlamCore::begin_anew() {
 void SlamCore::begin_after_jump() {
   const std::string jumped = "the stamps of the images went back by more than a second: ";
   bool loaded = false;
-  if (slam_ && !loaded_map_.empty()) try {
+  if (slam_ && !loaded_map_.empty()) {
+    try {
       slam_->load_map(loaded_map_);
       loaded = true;
     } catch (const std::exception& error) {
       complain(LogLevel::error, error.what());
       loaded_map_.clear();
     }
+  }
   if (slam_ && !loaded) slam_->reset();
   complain(LogLevel::warning, jumped + (loaded ? "begins again in " + loaded_map_ : "a new world begins"));
   forget_motion();
