@@ -56,10 +56,9 @@ struct Keyframe {
   KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
   Rigid3 cam_from_parent;            // frozen when culled: the pose then follows the parent
   bool culled = false;
-  // Since the live keyframe made just before it; null where nothing tells of it. Map files leave it out.
+  // Since the live keyframe made just before it; null where nothing tells of it.
   std::shared_ptr<const KeyframeMotion> motion;
-  // The flat surfaces that it sees, and the planes they are; null and empty where nobody looked. Map files leave them
-  // out.
+  // The flat surfaces that it sees, and the planes they are; null and empty where nobody looked.
   std::shared_ptr<const PlaneView> planes;
   std::vector<PlaneId> plane_of_patch;
 };

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Format 1. All numbers are little-endian; a varint has 7 bits per byte, low ones first; zigzag is a signed varint;
-// floats are IEEE 754, bit for bit; "packed" is the entropy coding of entropy_coder.h.
+// Format 2; format 1, which is read too, ends after section POIN. All numbers are little-endian; a varint has 7 bits
+// per byte, low ones first; zigzag is a signed varint; floats are IEEE 754, bit for bit; "packed" is the entropy coding
+// of entropy_coder.h.
 //
 //   file     "DKBMAP\r\n", format u32, sections u32, CRC-32C u32 of these 16 bytes, then the sections in this order:
 //   section  tag (4 letters), length u64 of the content, CRC-32C u32 of tag, length and content, content
@@ -24,6 +25,13 @@
 //         length u64 and packed: per point found zigzag, visible zigzag, born_at - birth zigzag, number of the first
 //         observation with the same descriptor counted from 1, 0 = none: then the descriptor follows: 4 x u64
 //         fused: count varint; per point id varint minus the one before, survivor - id zigzag
+//   MOTN  count varint, then per keyframe with a motion: id varint minus the one before (-1 before the first), id minus
+//         that of the keyframe that it is since varint, rotation only u8, previous_from_current 7 x f64, covariance
+//         36 x f64
+//   PLAN  count varint, then per keyframe whose flat surfaces are known: id varint as in MOTN, surfaces varint, per
+//         surface: plane varint (numbered from 0 as they come), normal over distance 3 x f64, covariance 6 x f64,
+//         centre 3 x f64; then the surface that each block of 16 x 16 px shows, from 1, 0 = none: u8 each, row by row,
+//         packed
 //
 // Observations are not stored: they are the keyframes' points turned round. Of the points that are no more, those are
 // stored that were fused into one that lives, which is all that Map::resolve() can tell of them.
@@ -43,7 +51,7 @@ namespace {
 
 // The line end shows a transfer that "converted" the file.
 constexpr std::string_view kMagic("DKBMAP\r\n", 8);
-constexpr uint32_t kFormat = 1;
+constexpr uint32_t kFormat = 2;
 constexpr size_t kPreamble = 20;
 constexpr const char* kRemedy = "; take it from a backup or make the map anew";
 
@@ -54,7 +62,7 @@ std::string section_header(std::string_view tag, size_t length) {
   return header.bytes();
 }
 
-std::array<std::string_view, 5> split(std::string_view bytes) {
+std::array<std::string_view, MapSections::kCount> split(std::string_view bytes) {
   if (bytes.substr(0, kMagic.size()) != kMagic) {
     if (bytes.substr(0, 6) == kMagic.substr(0, 6))
       throw InputError("its line ends were converted on the way; copy it in binary mode");
@@ -65,15 +73,15 @@ std::array<std::string_view, 5> split(std::string_view bytes) {
   const uint32_t format = preamble.u32(), count = preamble.u32();
   if (preamble.u32() != crc32c(bytes.substr(0, 16)))
     throw InputError("the head of the file is damaged" + std::string(kRemedy));
-  if (format != kFormat)
-    throw InputError("is of map format " + std::to_string(format) + ", this program reads format " +
+  if (format < 1 || format > kFormat)
+    throw InputError("is of map format " + std::to_string(format) + ", this program reads formats 1 and " +
                      std::to_string(kFormat) + "; use the version of dkb-slam that wrote it");
-  if (count != MapSections::kTags.size())
-    throw InputError("has " + std::to_string(count) + " sections instead of 5" + kRemedy);
+  const size_t expected = format == 1 ? MapSections::kOfFormat1 : MapSections::kCount;
+  if (count != expected) throw InputError(fmt::format("has {} sections instead of {}{}", count, expected, kRemedy));
 
-  std::array<std::string_view, 5> sections;
+  std::array<std::string_view, MapSections::kCount> sections;
   ByteReader in(bytes.substr(kPreamble), "the file");
-  for (size_t i = 0; i < sections.size(); ++i) {
+  for (size_t i = 0; i < expected; ++i) {
     const std::string tag(MapSections::kTags[i]);
     if (in.left() < 16) throw InputError("ends before section " + tag + kRemedy);
     const std::string_view header = in.raw(12);
@@ -122,7 +130,7 @@ std::string encode_map(const Map& map, const MapFileContext& context) {
 }
 
 MapFile decode_map(std::string_view bytes, const std::string& name) {
-  std::array<std::string_view, 5> sections;
+  std::array<std::string_view, MapSections::kCount> sections;
   try {
     sections = split(bytes);
   } catch (const InputError& e) {

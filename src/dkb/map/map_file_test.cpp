@@ -41,10 +41,17 @@ int mutations(int usual) {
   return wanted != nullptr ? std::max(1, std::atoi(wanted)) : usual;
 }
 
+using Contents = std::array<std::string, MapSections::kCount>;
+
 // The file of these sections, with right checksums.
-std::string sealed(const std::array<std::string, 5>& contents) {
-  std::string file = encode_map(Map(), MapFileContext()).substr(0, 20);
-  for (size_t i = 0; i < contents.size(); ++i) {
+std::string sealed(const Contents& contents, uint32_t format = 2, size_t count = MapSections::kCount) {
+  ByteWriter preamble;
+  preamble.raw(encode_map(Map(), MapFileContext()).substr(0, 8));
+  preamble.u32(format);
+  preamble.u32(static_cast<uint32_t>(count));
+  preamble.u32(crc32c(preamble.bytes()));
+  std::string file = preamble.bytes();
+  for (size_t i = 0; i < count; ++i) {
     ByteWriter header, crc;
     header.raw(MapSections::kTags[i]);
     header.u64(contents[i].size());
@@ -220,7 +227,7 @@ TEST(MapFile, NoMutationCrashesEvenWithRightChecksums) {
   const int rounds = mutations(6000);
   for (int round = 0; round < rounds; ++round) {
     auto contents = sections.bytes;
-    std::string& target = contents[random.below(5)];
+    std::string& target = contents[random.below(MapSections::kCount)];
     const int changes = 1 + static_cast<int>(random.below(3));
     for (int c = 0; c < changes && !target.empty(); ++c) {
       const size_t at = random.below(static_cast<uint32_t>(target.size()));
@@ -285,7 +292,7 @@ TEST(MapFile, LengthsAreCheckedBeforeAnythingIsAllocated) {
   const MapSections good = write_sections(test::random_map(10, 3, 8, 0), fr1_context());
   ByteWriter huge;
   huge.varint(1ull << 60);
-  for (size_t s : {size_t{1}, size_t{4}}) {
+  for (size_t s : {size_t{1}, size_t{4}, size_t{5}, size_t{6}}) {
     auto contents = good.bytes;
     contents[s] = huge.bytes();
     EXPECT_NE(complaint(sealed(contents)).find("claims more items than it can hold"), std::string::npos);
@@ -301,13 +308,38 @@ TEST(MapFile, ForeignFilesAreNamedAsSuch) {
 }
 
 TEST(MapFile, NewerFormatsAreRefusedByNumber) {
-  std::string newer = encode_map(Map(), fr1_context());
-  newer[8] = 2;
-  ByteWriter crc;
-  crc.u32(crc32c(std::string_view(newer).substr(0, 16)));
-  newer.replace(16, 4, crc.bytes());
-  EXPECT_EQ(complaint(newer),
-            "a.dkb: is of map format 2, this program reads format 1; use the version of dkb-slam that wrote it");
+  EXPECT_EQ(complaint(sealed(write_sections(Map(), fr1_context()).bytes, 3)),
+            "a.dkb: is of map format 3, this program reads formats 1 and 2; use the version of dkb-slam that wrote it");
+}
+
+// Files of format 1 have neither motions nor planes, which the map does without.
+TEST(MapFile, TheOlderFormatIsRead) {
+  const Map map = test::random_map(5, 12, 40, 15);
+  const Contents contents = write_sections(map, fr1_context()).bytes;
+  const MapFile older = decode_map(sealed(contents, 1, MapSections::kOfFormat1), "a.dkb");
+  EXPECT_EQ(older.map.live_points(), map.live_points());
+  for (KeyframeId id = 0; id < older.map.keyframe_count(); ++id) {
+    EXPECT_EQ(older.map.keyframe(id)->motion, nullptr);
+    EXPECT_EQ(older.map.keyframe(id)->planes, nullptr);
+  }
+  EXPECT_EQ(complaint(sealed(contents, 1)),
+            "a.dkb: has 7 sections instead of 5; take it from a backup or make the map anew");
+}
+
+TEST(MapFile, KeepsMotionsAndPlanesAndPutsNewPlanesBesideThem) {
+  const Map map = test::random_map(5, 30, 10, 2);
+  Map loaded = decode_map(encode_map(map, fr1_context()), "a.dkb").map;
+  int motions = 0, planes = 0;
+  for (KeyframeId id : loaded.live_keyframes()) {
+    motions += loaded.keyframe(id)->motion != nullptr;
+    planes += loaded.keyframe(id)->planes != nullptr;
+    for (PlaneId p : loaded.keyframe(id)->plane_of_patch) EXPECT_EQ(loaded.plane(p), p);
+  }
+  EXPECT_GT(motions, 10);
+  EXPECT_GT(planes, 10);
+  const PlaneId made = loaded.add_plane();
+  for (KeyframeId id : loaded.live_keyframes())
+    for (PlaneId p : loaded.keyframe(id)->plane_of_patch) EXPECT_NE(p, made);
 }
 
 TEST(MapFile, DamageIsPutDownToItsSection) {
@@ -315,7 +347,7 @@ TEST(MapFile, DamageIsPutDownToItsSection) {
   bytes.back() = static_cast<char>(bytes.back() ^ 1);
   EXPECT_EQ(
       complaint(bytes),
-      "a.dkb: the checksum of section POIN is wrong: the file is damaged; take it from a backup or make the map anew");
+      "a.dkb: the checksum of section PLAN is wrong: the file is damaged; take it from a backup or make the map anew");
 }
 
 TEST(MapFile, MapsThatNoFileCanHoldAreRefusedWhenSaved) {

@@ -2,6 +2,7 @@
 // Map::restore: everything that the rest of Map takes for granted is checked here, once, for maps that come from
 // outside.
 #include <algorithm>
+#include <numeric>
 #include <string>
 
 #include "dkb/map/map.h"
@@ -115,6 +116,11 @@ Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, 
     if (!k.culled) map.places_.add(k.id, k.features->descriptors);
     map.keyframes_.push_back({std::make_shared<Keyframe>(std::move(k)), map.epoch_.value()});
   }
+  PlaneId planes = 0;
+  for (const auto& k : map.keyframes_)
+    for (PlaneId p : k.value->plane_of_patch) planes = std::max(planes, p + 1);
+  map.joined_to_.resize(static_cast<size_t>(planes));
+  std::iota(map.joined_to_.begin(), map.joined_to_.end(), PlaneId{0});
   map.check_keyframes();
   map.check_forwarding();
   return map;

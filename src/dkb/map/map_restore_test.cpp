@@ -20,7 +20,10 @@ struct Parts {
 
 Parts parts_of(const Map& map) {
   Parts parts;
-  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) parts.keyframes.push_back(*map.keyframe(id));
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
+    parts.keyframes.push_back(*map.keyframe(id));
+    for (PlaneId& p : parts.keyframes.back().plane_of_patch) p = map.plane(p);
+  }
   for (PointId id : map.live_points()) parts.points.push_back(*map.point(id));
   parts.removed = map.removed_points();
   return parts;

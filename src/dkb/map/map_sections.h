@@ -4,22 +4,36 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "dkb/map/byte_stream.h"
 #include "dkb/map/map_file.h"
 
 namespace dkb {
 
 // Contents of a map file, section by section; see map_file.cpp for the format.
 struct MapSections {
-  static constexpr std::array<std::string_view, 5> kTags = {"HEAD", "KEYF", "DESC", "FEAT", "POIN"};
-  std::array<std::string, 5> bytes;
+  static constexpr size_t kCount = 7, kOfFormat1 = 5;
+  static constexpr std::array<std::string_view, kCount> kTags = {"HEAD", "KEYF", "DESC", "FEAT",
+                                                                 "POIN", "MOTN", "PLAN"};
+  std::array<std::string, kCount> bytes;
 };
 
 // Throws std::logic_error for a map that no file can hold.
 MapSections write_sections(const Map& map, const MapFileContext& context);
 
-// Throws InputError, without a file name, when the sections are not those of a map.
-MapFile read_sections(const std::array<std::string_view, 5>& sections);
+// Throws InputError, without a file name, when the sections are not those of a map. Format 1 has none of the last two:
+// they are empty then.
+MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections);
+
+void write_pose(ByteWriter& out, const Rigid3& pose);
+Rigid3 read_pose(ByteReader& in);
+
+// What holds keyframes together beside points. Motions and planes with numbers that cannot be are left out.
+std::string motion_section(const Map& map);
+void read_motion_section(std::string_view bytes, std::vector<Keyframe>& keyframes);
+std::string plane_section(const Map& map, const CameraModel& camera);
+void read_plane_section(std::string_view bytes, const CameraModel& camera, std::vector<Keyframe>& keyframes);
 
 // What is wrong with the numbers of a keyframe or a point; empty when nothing is.
 std::string flaw_of(const Keyframe& keyframe, int levels);

@@ -35,13 +35,6 @@ Integer narrow_unsigned(const ByteReader& in, uint64_t v) {
   return static_cast<Integer>(v);
 }
 
-Rigid3 read_pose(ByteReader& in) {
-  Rigid3 pose;
-  for (int i = 0; i < 4; ++i) pose.rotation.coeffs()[i] = in.f64();
-  for (int i = 0; i < 3; ++i) pose.translation[i] = in.f64();
-  return pose;
-}
-
 Descriptor read_descriptor(ByteReader& in) {
   Descriptor d;
   for (uint64_t& word : d) word = in.u64();
@@ -284,12 +277,21 @@ Points read_points(std::string_view bytes) {
 
 }  // namespace
 
-MapFile read_sections(const std::array<std::string_view, 5>& sections) {
-  const auto [head, keyframe_bytes, descriptors, feature_bytes, point_bytes] = sections;
+Rigid3 read_pose(ByteReader& in) {
+  Rigid3 pose;
+  for (int i = 0; i < 4; ++i) pose.rotation.coeffs()[i] = in.f64();
+  for (int i = 0; i < 3; ++i) pose.translation[i] = in.f64();
+  return pose;
+}
+
+MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections) {
+  const auto [head, keyframe_bytes, descriptors, feature_bytes, point_bytes, motions, planes] = sections;
   MapFile file;
   file.context = read_head(head);
   Keyframes keyframes = read_keyframes(keyframe_bytes, descriptors.size());
   read_feature_section(feature_bytes, descriptors, file.context, keyframes);
+  if (!motions.empty()) read_motion_section(motions, keyframes.all);
+  if (!planes.empty()) read_plane_section(planes, file.context.camera, keyframes.all);
   Points points = read_points(point_bytes);
   std::vector<std::pair<PointId, uint64_t>> sources;
   for (size_t i = 0; i < points.live.size(); ++i)

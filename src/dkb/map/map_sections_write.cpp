@@ -29,11 +29,6 @@ uint32_t step_from(float prediction, float pixel) {
   return step << 1 ^ (0u - (step >> 31));
 }
 
-void write_pose(ByteWriter& out, const Rigid3& pose) {
-  for (int i = 0; i < 4; ++i) out.f64(pose.rotation.coeffs()[i]);
-  for (int i = 0; i < 3; ++i) out.f64(pose.translation[i]);
-}
-
 void write_descriptor(ByteWriter& out, const Descriptor& d) {
   for (uint64_t word : d) out.u64(word);
 }
@@ -218,6 +213,11 @@ std::string point_section(const Map& map) {
 
 }  // namespace
 
+void write_pose(ByteWriter& out, const Rigid3& pose) {
+  for (int i = 0; i < 4; ++i) out.f64(pose.rotation.coeffs()[i]);
+  for (int i = 0; i < 3; ++i) out.f64(pose.translation[i]);
+}
+
 std::string flaw_of(const Keyframe& keyframe, int levels) {
   const std::string name = "keyframe " + std::to_string(keyframe.id);
   if (!std::isfinite(keyframe.timestamp)) return name + " has no finite timestamp";
@@ -244,7 +244,7 @@ MapSections write_sections(const Map& map, const MapFileContext& context) {
     if (const std::string flaw = flaw_of(*map.keyframe(id), context.levels); !flaw.empty())
       throw std::logic_error("map: " + flaw);
   return {{head_section(context), keyframe_section(map), descriptor_section(map), feature_section(map, context),
-           point_section(map)}};
+           point_section(map), motion_section(map), plane_section(map, context.camera)}};
 }
 
 }  // namespace dkb

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
 #include <set>
 
 #include "dkb/map/byte_stream.h"
@@ -139,6 +140,33 @@ std::string removed_broken(const Map& map) {
 
 }  // namespace
 
+namespace {
+
+Matrix6d random_covariance(Random& random) {
+  Matrix6d root;
+  for (int i = 0; i < 36; ++i) root.data()[i] = 0.01 * random.normal();
+  const Matrix6d product = root * root.transpose();
+  return 0.5 * (product + product.transpose());  // symmetric to the last bit
+}
+
+std::shared_ptr<const PlaneView> random_planes(Random& random) {
+  auto view = std::make_shared<PlaneView>();
+  const CameraModel camera = distorted_camera();
+  view->patch_at = Image<uint8_t>(camera.width / PlaneView::kBlock, camera.height / PlaneView::kBlock);
+  for (uint32_t p = random.below(4); p > 0; --p) {
+    PlanePatch& patch = view->patches.emplace_back();
+    patch.over_distance = {random.normal(), random.normal(), 1};
+    patch.covariance = random_covariance(random).topLeftCorner<3, 3>();
+    patch.centre = {random.normal(), random.normal(), 2};
+    for (int i = 0; i < 50; ++i)
+      view->patch_at.data()[random.below(static_cast<uint32_t>(view->patch_at.size()))] =
+          static_cast<uint8_t>(view->patches.size());
+  }
+  return view;
+}
+
+}  // namespace
+
 CameraModel distorted_camera() {
   return *builtin_camera("fr1");
 }
@@ -184,7 +212,19 @@ KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen,
       k.points[random.below(static_cast<uint32_t>(features))] = near[random.below(static_cast<uint32_t>(near.size()))];
   }
   const KeyframeId id = k.id;
+  if (k.id > 0 && random.below(4) != 0)
+    k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{
+        map.live_keyframes().back(), {random_pose(random), random.below(2) != 0, random_covariance(random)}});
+  if (random.below(3) != 0) k.planes = random_planes(random);
+  const size_t patches = k.planes ? k.planes->patches.size() : 0;
   map.add_keyframe(std::move(k));
+  std::vector<PlaneId> planes;
+  for (size_t p = 0; p < patches; ++p) {
+    planes.push_back(map.add_plane());
+    for (PlaneId before : map.keyframe(std::max(0, id - 1))->plane_of_patch)
+      if (random.below(3) == 0) map.join_planes(planes.back(), before);
+  }
+  if (patches > 0) map.name_planes(id, planes);
   for (int i = 0; i < born; ++i) {
     const auto feature = static_cast<int>(random.below(static_cast<uint32_t>(features)));
     if (map.keyframe(id)->points[static_cast<size_t>(feature)] != kNoPoint) continue;
@@ -289,6 +329,7 @@ std::string broken_invariant(const Map& map) {
 
 std::string fingerprint(const Map& map) {
   ByteWriter out;
+  std::map<PlaneId, int32_t> planes;  // numbered as they come: a file numbers them anew
   for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
     const Keyframe& k = *map.keyframe(id);
     out.i32(k.id);
@@ -305,6 +346,20 @@ std::string fingerprint(const Map& map) {
       out.i32(c.keyframe);
       out.i32(c.shared_points);
     }
+    if (k.motion) {
+      out.i32(k.motion->previous);
+      out.u8(k.motion->since.rotation_only);
+      write(out, k.motion->since.previous_from_current);
+      for (double v : k.motion->since.covariance.reshaped()) out.f64(v);
+    }
+    for (PlaneId p : k.plane_of_patch)
+      out.i32(planes.emplace(map.plane(p), static_cast<int32_t>(planes.size())).first->second);
+    if (!k.planes) continue;
+    for (const PlanePatch& patch : k.planes->patches) {
+      for (int i = 0; i < 3; ++i) out.f64(patch.over_distance[i]), out.f64(patch.centre[i]);
+      for (double v : patch.covariance.reshaped()) out.f64(v);
+    }
+    for (size_t i = 0; i < k.planes->patch_at.size(); ++i) out.u8(k.planes->patch_at.data()[i]);
   }
   for (PointId id : map.live_points()) {
     const MapPoint& p = *map.point(id);
