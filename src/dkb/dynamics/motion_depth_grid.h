@@ -33,9 +33,9 @@ class MotionRays {
 
   // Through the middle of a cell, at depth 1.
   Eigen::Vector3f ray(int x, int y) const {
-    const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
-    return {x_[i], y_[i], 1};
+    return ray(static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x));
   }
+  Eigen::Vector3f ray(size_t cell) const { return {x_[cell], y_[cell], 1}; }
   // The cell that sees a point of the camera's; false when none does.
   bool find_cell(const Eigen::Vector3f& point, int* x, int* y) const;
   // Projects what each cell in `range` sees at `depth` [m], `missing` standing in for depth that is not above 0, into

@@ -18,7 +18,8 @@ constexpr int kCell = 4;           // [px] one depth is looked at per square of 
 constexpr size_t kMinCells = 12;   // cells with depth that a boxed object needs
 constexpr size_t kMinRegion = 40;  // the same for a region without a box
 constexpr double kMargin = 0.1;    // share of a box's size by which its rim reaches; mask there is no object of its own
-constexpr float kLayer = 0.45f;    // [m] an object reaches so far before and behind its main depth layer
+constexpr float kDepthJump = 0.05f;  // [1] depth step between neighbouring cells of one region, relative to depth
+constexpr float kLayer = 0.45f;      // [m] an object reaches so far before and behind its main depth layer
 constexpr double kInnerShare = 0.4;  // of a region's cells must have all four neighbours in it: others are rims
 constexpr int kGap = 4;              // [cells] regions so near to each other in the image are one ...
 constexpr float kMergeAcross = 0.45f, kMergeDepth = 0.25f;  // [m] ... when so near across and in depth
@@ -34,10 +35,6 @@ size_t bin_of(float depth) {
   return static_cast<size_t>(std::min(depth, kFarthest) / kBin);
 }
 
-size_t stride_through(std::span<const uint32_t> cells) {
-  return (cells.size() + kMaxPoints - 1) / kMaxPoints;
-}
-
 // What was measured on simulated people: cells on the rim, depth taken at another moment than the picture, and the
 // sensor's noise.
 double position_sd(double depth) {
@@ -46,19 +43,8 @@ double position_sd(double depth) {
 
 }  // namespace
 
-MoverObserver::MoverObserver(const CameraModel& camera, const MoverObserverOptions& options)
-    : camera_(camera), options_(options) {
-  camera_.check();
-  columns_ = (camera_.width + kCell - 1) / kCell;
-  rows_ = (camera_.height + kCell - 1) / kCell;
-  parts_ = DepthParts(columns_, rows_);
-  rays_.reserve(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
-  for (int y = 0; y < rows_; ++y)
-    for (int x = 0; x < columns_; ++x) {
-      const Eigen::Vector2d middle((x + 0.5) * kCell - 0.5, (y + 0.5) * kCell - 0.5);
-      rays_.push_back(camera_.unproject(camera_.undistort(middle), 1.0).head<2>().cast<float>());
-    }
-}
+MoverObserver::MoverObserver(const CameraModel& camera)
+    : camera_(camera), rays_(camera, kCell), parts_(rays_.width(), rays_.height()) {}
 
 // Cells whose middle lies in the box, widened by a share of its size.
 CellBounds MoverObserver::cells_in(const Box& b, double margin) const {
@@ -67,15 +53,15 @@ CellBounds MoverObserver::cells_in(const Box& b, double margin) const {
   };
   const double x = static_cast<double>(b.x), y = static_cast<double>(b.y), w = static_cast<double>(b.w),
                h = static_cast<double>(b.h);
-  return {first(x - margin * w, columns_), first(y - margin * h, rows_), first(x + (1 + margin) * w, columns_),
-          first(y + (1 + margin) * h, rows_)};
+  return {first(x - margin * w, rays_.width()), first(y - margin * h, rays_.height()),
+          first(x + (1 + margin) * w, rays_.width()), first(y + (1 + margin) * h, rays_.height())};
 }
 
 template <class Function>
 void MoverObserver::for_each_cell(const CellBounds& r, const Function& function) const {
   for (int y = r.y0; y < r.y1; ++y)
     for (int x = r.x0; x < r.x1; ++x)
-      function(static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x), x, y);
+      function(static_cast<size_t>(y) * static_cast<size_t>(rays_.width()) + static_cast<size_t>(x), x, y);
 }
 
 // Depth in the middle of a cell, or beside it; 0 = none.
@@ -86,44 +72,38 @@ float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
   return 0;
 }
 
-// Between the twentieths at either end, which may be of other surfaces.
-Eigen::Vector3d MoverObserver::size_of(std::span<const uint32_t> cells) const {
-  const size_t stride = stride_through(cells);
-  std::array<std::vector<float>, 3> values;
-  for (auto& v : values) v.reserve(cells.size() / stride + 1);
+// Some points of a surface [m], coordinate by coordinate in the camera's axes.
+std::array<std::vector<float>, 3> MoverObserver::sample(std::span<const uint32_t> cells) const {
+  const size_t stride = (cells.size() + kMaxPoints - 1) / kMaxPoints;
+  std::array<std::vector<float>, 3> points;
+  for (auto& p : points) p.reserve(cells.size() / stride + 1);
   for (size_t k = 0; k < cells.size(); k += stride) {
-    const Eigen::Vector2f& ray = rays_[cells[k]];
-    const float depth = depth_[cells[k]];
-    values[0].push_back(depth * ray.x());
-    values[1].push_back(depth * ray.y());
-    values[2].push_back(depth);
+    const Eigen::Vector3f p = depth_[cells[k]] * rays_.ray(cells[k]);
+    for (size_t i = 0; i < 3; ++i) points[i].push_back(p[static_cast<Eigen::Index>(i)]);
   }
-  Eigen::Vector3d size;
-  for (size_t i = 0; i < 3; ++i) {
-    const auto place = [n = values[i].size()](double share) {
-      return static_cast<std::ptrdiff_t>(std::min(n - 1, static_cast<size_t>(share * static_cast<double>(n))));
-    };
-    const auto begin = values[i].begin(), low = begin + place(0.05), high = begin + place(0.95);
-    std::nth_element(begin, high, values[i].end());
-    const float most = *high;
-    std::nth_element(begin, low, high + 1);  // the others are larger
-    size[static_cast<Eigen::Index>(i)] = most - *low;
-  }
-  return size;
+  return points;
 }
 
-Eigen::Vector3d MoverObserver::median_position(std::span<const uint32_t> cells) const {
+// What the cells of an object tell of it.
+MoverObservation MoverObserver::measure(std::span<const uint32_t> cells) const {
+  std::array<std::vector<float>, 3> here = sample(cells), turned = here;
   const Eigen::Matrix3f rotation = world_from_cam_.matrix3().cast<float>();
-  const size_t stride = stride_through(cells);
-  std::array<std::vector<float>, 3> values;
-  for (auto& v : values) v.reserve(cells.size() / stride + 1);
-  for (size_t k = 0; k < cells.size(); k += stride) {
-    const Eigen::Vector2f& ray = rays_[cells[k]];
-    const Eigen::Vector3f p = rotation * (depth_[cells[k]] * Eigen::Vector3f(ray.x(), ray.y(), 1));
-    for (size_t i = 0; i < 3; ++i) values[i].push_back(p[static_cast<Eigen::Index>(i)]);
+  for (size_t k = 0; k < here[0].size(); ++k) {
+    const Eigen::Vector3f p = rotation * Eigen::Vector3f(here[0][k], here[1][k], here[2][k]);
+    for (size_t i = 0; i < 3; ++i) turned[i][k] = p[static_cast<Eigen::Index>(i)];
   }
-  return world_from_cam_.translation +
-         Eigen::Vector3f(upper_median(values[0]), upper_median(values[1]), upper_median(values[2])).cast<double>();
+  MoverObservation o;
+  o.position_in_world =
+      world_from_cam_.translation +
+      Eigen::Vector3f(upper_median(turned[0]), upper_median(turned[1]), upper_median(turned[2])).cast<double>();
+  o.position_sd = position_sd(static_cast<double>(upper_median(here[2])));
+  // Between the twentieths at either end, which may be of other surfaces.
+  for (size_t i = 0; i < 3; ++i) {
+    const float high = quantile(here[i], 0.95), low = quantile(here[i], 0.05);
+    o.size[static_cast<Eigen::Index>(i)] = high - low;
+  }
+  o.surface = surface_of(cells);
+  return o;
 }
 
 MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
@@ -132,10 +112,8 @@ MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
   for (const uint32_t i : cells) surface.area += side * side * static_cast<double>(depth_[i] * depth_[i]);
   const size_t stride = (cells.size() + MoverSurface::kMaxPoints - 1) / MoverSurface::kMaxPoints;
   for (size_t k = 0; k < cells.size(); k += stride) {
-    const Eigen::Vector2f& ray = rays_[cells[k]];
     const auto depth = static_cast<double>(depth_[cells[k]]);
-    surface.points_in_world.push_back(world_from_cam_ * Eigen::Vector3d(depth * static_cast<double>(ray.x()),
-                                                                        depth * static_cast<double>(ray.y()), depth));
+    surface.points_in_world.push_back(world_from_cam_ * (depth * rays_.ray(cells[k]).cast<double>()));
   }
   return surface;
 }
@@ -169,16 +147,15 @@ float MoverObserver::main_layer(const std::vector<float>& depths) const {
 // the cells that these do not explain.
 std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
                                              const std::vector<CellBounds>& ranges) const {
-  std::vector<int> count(rays_.size(), 0);
+  std::vector<int> count(depth_.size(), 0);
   for (const CellBounds& r : ranges) for_each_cell(r, [&](size_t i, int, int) { ++count[i]; });
   std::vector<size_t> by_area(boxes.size());
   std::iota(by_area.begin(), by_area.end(), size_t{0});
   std::stable_sort(by_area.begin(), by_area.end(),
                    [&](size_t a, size_t b) { return boxes[a].box.area() < boxes[b].box.area(); });
 
-  const float half = kLayer;
   std::vector<float> found(boxes.size(), 0), depths;
-  std::vector<char> explained(rays_.size(), 0);
+  std::vector<char> explained(depth_.size(), 0);
   const auto settle = [&](size_t b, const auto& counts) {
     depths.clear();
     for_each_cell(ranges[b], [&](size_t i, int, int) {
@@ -186,7 +163,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
     });
     if (depths.size() < kMinCells) return;
     const float depth = found[b] = main_layer(depths);
-    for_each_cell(ranges[b], [&](size_t i, int, int) { explained[i] |= std::abs(depth_[i] - depth) < half; });
+    for_each_cell(ranges[b], [&](size_t i, int, int) { explained[i] |= std::abs(depth_[i] - depth) < kLayer; });
   };
   for (const size_t b : by_area) settle(b, [&](size_t i) { return count[i] == 1; });
   for (const size_t b : by_area)
@@ -198,20 +175,19 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
   std::vector<CellBounds> ranges;
   for (const Detection& d : boxes) ranges.push_back(cells_in(d.box, 0));
   const std::vector<float> depths = box_depths(boxes, ranges);
-  const float half = kLayer;
   // A cell in several boxes goes to the object at whose depth and in whose middle it is.
-  std::vector<float> min_cost(rays_.size(), std::numeric_limits<float>::max());
-  std::vector<int> owner(rays_.size(), -1);
+  std::vector<float> min_cost(depth_.size(), std::numeric_limits<float>::max());
+  std::vector<size_t> owner(depth_.size(), boxes.size());
   for (size_t b = 0; b < boxes.size(); ++b) {
     if (!(depths[b] > 0)) continue;
     const float middle = 0.5f * static_cast<float>(ranges[b].x0 + ranges[b].x1 - 1);
     const float across = std::max(1.0f, 0.5f * static_cast<float>(ranges[b].x1 - ranges[b].x0));
     for_each_cell(ranges[b], [&](size_t i, int x, int) {
-      const float off = std::abs(depth_[i] - depths[b]) / half, aside = (static_cast<float>(x) - middle) / across;
+      const float off = std::abs(depth_[i] - depths[b]) / kLayer, aside = (static_cast<float>(x) - middle) / across;
       const float cost = off + 0.5f * aside * aside;
       if (!(depth_[i] > 0) || off > 1 || cost >= min_cost[i]) return;
       min_cost[i] = cost;
-      owner[i] = static_cast<int>(b);
+      owner[i] = b;
     });
   }
   std::vector<MoverObservation> observations;
@@ -219,11 +195,13 @@ std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detec
   for (size_t b = 0; b < boxes.size(); ++b) {
     cells.clear();
     for_each_cell(ranges[b], [&](size_t i, int, int) {
-      if (owner[i] == static_cast<int>(b)) cells.push_back(static_cast<uint32_t>(i));
+      if (owner[i] == b) cells.push_back(static_cast<uint32_t>(i));
     });
     if (cells.size() >= kMinCells) {
-      observations.push_back({boxes[b].class_name, boxes[b].box, median_position(cells), true,
-                              position_sd(static_cast<double>(depths[b])), size_of(cells), surface_of(cells), -1});
+      MoverObservation& o = observations.emplace_back(measure(cells));
+      o.class_name = boxes[b].class_name;
+      o.box = boxes[b].box;
+      o.position_sd = position_sd(static_cast<double>(depths[b]));
     } else if (const Box& box = boxes[b].box; ranges[b].x0 < ranges[b].x1 && ranges[b].y0 < ranges[b].y1) {
       const Eigen::Vector2d middle(0.5 * static_cast<double>(2 * box.x + box.w),
                                    0.5 * static_cast<double>(2 * box.y + box.h));
@@ -240,7 +218,7 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(std::span<const D
   for (const Detection& d : boxes)
     for_each_cell(cells_in(d.box, kMargin), [&](size_t i, int, int) { free_depth_[i] = 0; });
   std::vector<Region> regions;
-  for (DepthPart& part : parts_.find(free_depth_, static_cast<float>(options_.depth_jump))) {
+  for (DepthPart& part : parts_.find(free_depth_, kDepthJump)) {
     // The mask's rim lies on what is behind the movers: a ring one or two cells wide is no object, nor are specks.
     if (static_cast<double>(part.inner) < kInnerShare * static_cast<double>(part.cells.size())) continue;
     for (Region& region : divide({part.bounds, std::move(part.cells), -1})) regions.push_back(std::move(region));
@@ -253,17 +231,9 @@ std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts
   std::vector<size_t> merged_into(parts.size());
   std::iota(merged_into.begin(), merged_into.end(), size_t{0});
   std::vector<Eigen::Vector2f> middles;
-  std::vector<float> across, deep;
   for (const Region& part : parts) {
-    across.clear();
-    deep.clear();
-    const size_t stride = stride_through(part.cells);
-    for (size_t k = 0; k < part.cells.size(); k += stride) {
-      const Eigen::Vector2f p = from_above(part.cells[k]);
-      across.push_back(p.x());
-      deep.push_back(p.y());
-    }
-    middles.emplace_back(upper_median(across), upper_median(deep));
+    auto points = sample(part.cells);
+    middles.emplace_back(upper_median(points[0]), upper_median(points[2]));
   }
   const auto root = [&](size_t p) {
     while (merged_into[p] != p) p = merged_into[p];
@@ -318,7 +288,7 @@ std::vector<uint16_t> MoverObserver::owners_of(std::span<const uint32_t> cells) 
   std::vector<float> across(cells.size()), deep(cells.size()), least(cells.size(), std::numeric_limits<float>::max());
   for (size_t k = 0; k < cells.size(); ++k) {
     deep[k] = depth_[cells[k]];
-    across[k] = deep[k] * rays_[cells[k]].x();
+    across[k] = deep[k] * rays_.ray(cells[k]).x();
   }
   std::vector<uint16_t> owners(cells.size(), static_cast<uint16_t>(footprints_.size()));
   for (size_t e = 0; e < footprints_.size(); ++e)
@@ -369,10 +339,10 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
     result[0].cells = std::move(part.cells);
     return result;
   }
-  for (Region& r : result) r.bounds = {columns_, rows_, 0, 0};
+  for (Region& r : result) r.bounds = {rays_.width(), rays_.height(), 0, 0};
   for (size_t k = 0; k < part.cells.size(); ++k) {
     Region& r = result[static_cast<size_t>(region_of[owner[k]])];
-    const int x = static_cast<int>(part.cells[k]) % columns_, y = static_cast<int>(part.cells[k]) / columns_;
+    const int x = static_cast<int>(part.cells[k]) % rays_.width(), y = static_cast<int>(part.cells[k]) / rays_.width();
     r.bounds = {std::min(r.bounds.x0, x), std::min(r.bounds.y0, y), std::max(r.bounds.x1, x + 1),
                 std::max(r.bounds.y1, y + 1)};
     r.cells.push_back(part.cells[k]);
@@ -381,10 +351,11 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
 }
 
 void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
-  depth_.assign(rays_.size(), 0.0f);
+  depth_.assign(rays_.all_cells().count, 0.0f);
   const float middle = 0.5f * static_cast<float>(kCell);
-  const bool same_cells = mask.cell == kCell && mask.cells.width() == columns_ && mask.cells.height() == rows_;
-  for_each_cell({0, 0, columns_, rows_}, [&](size_t i, int x, int y) {
+  const bool same_cells =
+      mask.cell == kCell && mask.cells.width() == rays_.width() && mask.cells.height() == rays_.height();
+  for_each_cell({0, 0, rays_.width(), rays_.height()}, [&](size_t i, int x, int y) {
     if (same_cells ? mask.cells(x, y) != 0
                    : mask.at(static_cast<float>(x * kCell) + middle, static_cast<float>(y * kCell) + middle))
       depth_[i] = depth_near(depth, x, y);
@@ -403,16 +374,13 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   take_masked_depth(depth, mask);
   footprints_ = footprints(expected);
   std::vector<MoverObservation> observations = observe_boxes(boxes);
-  std::vector<float> depths;
   for (const Region& r : find_regions(boxes)) {
-    depths.clear();
-    for (size_t k = 0; k < r.cells.size(); k += stride_through(r.cells)) depths.push_back(depth_[r.cells[k]]);
     const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
-    observations.push_back({"", clip(bounds, camera_.width, camera_.height), median_position(r.cells), true,
-                            position_sd(static_cast<double>(upper_median(depths))), size_of(r.cells),
-                            surface_of(r.cells), r.expected});
+    MoverObservation& o = observations.emplace_back(measure(r.cells));
+    o.box = clip(bounds, camera_.width, camera_.height);
+    o.expected = r.expected;
   }
   return observations;
 }

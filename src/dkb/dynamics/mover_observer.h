@@ -2,22 +2,20 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "dkb/detection/detection.h"
 #include "dkb/dynamics/depth_parts.h"
+#include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/dynamics/mover_surface.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 
 namespace dkb {
-
-struct MoverObserverOptions {
-  double depth_jump = 0.05;  // [1] depth step between neighbouring cells of one region, relative to depth, > 0
-};
 
 // A mover that is followed: where it should be seen.
 struct ExpectedMover {
@@ -42,7 +40,7 @@ struct MoverObservation {
 // expected goes to these, so that neighbours are not one region, and a body cut up by missing depth is. Deterministic.
 class MoverObserver {
  public:
-  MoverObserver(const CameraModel& camera, const MoverObserverOptions& options);  // throws InvalidOption
+  explicit MoverObserver(const CameraModel& camera);
 
   // `depth` has the camera's size (else InputError); `boxes` are in pixels of the same image. Objects in boxes come
   // first, in the order of the boxes; regions of too few cells with depth are left out.
@@ -66,8 +64,8 @@ class MoverObserver {
   template <class Function>
   void for_each_cell(const CellBounds& range, const Function& function) const;
   float depth_near(const DepthImage& depth, int x, int y) const;
-  Eigen::Vector3d median_position(std::span<const uint32_t> cells) const;
-  Eigen::Vector3d size_of(std::span<const uint32_t> cells) const;
+  std::array<std::vector<float>, 3> sample(std::span<const uint32_t> cells) const;
+  MoverObservation measure(std::span<const uint32_t> cells) const;
   MoverSurface surface_of(std::span<const uint32_t> cells) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
   float main_layer(const std::vector<float>& depths) const;
@@ -75,16 +73,13 @@ class MoverObserver {
   std::vector<MoverObservation> observe_boxes(std::span<const Detection> boxes) const;
   std::vector<Region> find_regions(std::span<const Detection> boxes);
   std::vector<Footprint> footprints(std::span<const ExpectedMover> expected) const;
-  Eigen::Vector2f from_above(uint32_t cell) const { return {depth_[cell] * rays_[cell].x(), depth_[cell]}; }
   std::vector<uint16_t> owners_of(std::span<const uint32_t> cells) const;
   std::vector<Region> divide(Region part) const;
   std::vector<Region> join(std::vector<Region> parts) const;
 
   CameraModel camera_;
-  MoverObserverOptions options_;
-  int columns_ = 0, rows_ = 0;
-  DepthParts parts_{0, 0};
-  std::vector<Eigen::Vector2f> rays_;  // per cell: x/z, y/z of its middle
+  MotionRays rays_;
+  DepthParts parts_;
 
   // Of the frame looked at.
   Rigid3 world_from_cam_;

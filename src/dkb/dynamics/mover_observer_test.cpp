@@ -10,7 +10,7 @@ namespace dkb {
 namespace {
 
 std::vector<MoverObservation> observe(const MoverTestScene& scene, const Rigid3& world_from_cam = {}) {
-  return MoverObserver(scene.camera, {}).observe(scene.depth, scene.mask, scene.boxes, world_from_cam);
+  return MoverObserver(scene.camera).observe(scene.depth, scene.mask, scene.boxes, world_from_cam);
 }
 
 TEST(MoverObserver, ThePositionIsTheMedianOfTheVisibleSurface) {
@@ -144,7 +144,7 @@ TEST(MoverObserver, ABoxWithoutDepthTellsADirection) {
 std::vector<MoverObservation> observe_expecting(const MoverTestScene& scene, const std::vector<Eigen::Vector3d>& at) {
   std::vector<ExpectedMover> expected;
   for (const Eigen::Vector3d& p : at) expected.push_back({p, 0.01 * Eigen::Matrix3d::Identity()});
-  return MoverObserver(scene.camera, {}).observe(scene.depth, scene.mask, scene.boxes, {}, expected);
+  return MoverObserver(scene.camera).observe(scene.depth, scene.mask, scene.boxes, {}, expected);
 }
 
 TEST(MoverObserver, NeighboursWhoTouchAreToldApartByWhereTheyAreExpected) {

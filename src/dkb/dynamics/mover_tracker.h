@@ -27,9 +27,8 @@ struct MoverSighting {
 // Deterministic: the same frames in the same order give the same movers.
 class MoverTracker {
  public:
-  explicit MoverTracker(const CameraModel& camera, const SensorNoise& noise = {},
-                        const MoverObserverOptions& options = {})
-      : camera_(camera), noise_(noise), observer_(camera, options) {}
+  MoverTracker(const CameraModel& camera, const SensorNoise& noise)
+      : camera_(camera), noise_(noise), observer_(camera) {}
 
   // Looks for movers in a frame whose pose may be but expected. `mask`: silhouettes of the boxes, regions that move, or
   // both; empty when nothing moves. `boxes` may be empty: regions of the mask are the objects then. `timestamp` [s]
