@@ -176,34 +176,30 @@ std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage
   std::vector<char> taken(observations.size(), 0);
   std::vector<Eigen::Vector3d> seen;
   for (size_t i = 0; i < observation_of.size(); ++i) {
-    if (observation_of[i] < 0) continue;
-    const auto k = static_cast<size_t>(observation_of[i]);
-    taken[k] = 1;
-    const MoverObservation& o = observations[k];
     Track& t = tracks_[i];
+    const bool observed = observation_of[i] >= 0;
+    MoverObservation o;
+    if (observed) {
+      const auto k = static_cast<size_t>(observation_of[i]);
+      taken[k] = 1;
+      o = observations[k];
+    } else if (t.moved && t.surface.stands(depth, camera_, noise_, world_from_cam)) {
+      o.box = t.surface.box_in(camera_, world_from_cam);
+      o.position_in_world = t.surface.position_in_world;
+      o.position_sd = t.position_sd;
+      o.size = t.size;
+    } else {
+      t.hidden = stands_behind(t, depth);
+      continue;
+    }
     const Eigen::Vector3d position = place(o, t);
     correct(o, noise, &t);
-    if (o.has_depth) remember(o, depth, &t);
+    if (observed && o.has_depth) remember(o, depth, &t);
     seen.push_back(position);
     if (t.id == 0) continue;
     const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
     movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), position_sd,
                       t.covariance, t.size, o.box});
-  }
-  for (size_t i = 0; i < observation_of.size(); ++i) {
-    Track& t = tracks_[i];
-    if (observation_of[i] >= 0) continue;
-    if (t.moved && t.surface.stands(depth, camera_, noise_, world_from_cam)) {
-      const MoverObservation o{
-          "", t.surface.box_in(camera_, world_from_cam), t.surface.position_in_world, true, t.position_sd, t.size, {},
-          -1};
-      correct(o, noise, &t);
-      movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, o.position_in_world, t.state.tail<3>(),
-                        o.position_sd, t.covariance, t.size, o.box});
-      seen.push_back(o.position_in_world);
-    } else {
-      t.hidden = stands_behind(t, depth);
-    }
   }
   for (size_t k = 0; k < observations.size(); ++k) {
     const MoverObservation& o = observations[k];

@@ -42,8 +42,6 @@ class MoverTracker {
 
   // The estimated world has moved under the camera (a loop was closed): what was at p is at new_from_old * p.
   void rebase(const Rigid3& new_from_old);
-  // Forgets all movers; ids go on counting.
-  void reset() { tracks_.clear(); }
 
  private:
   using State = Eigen::Matrix<double, 6, 1>;  // position [m], velocity [m/s] in the world

@@ -232,14 +232,5 @@ TEST(MoverTracker, RebasingMovesWhatIsRemembered) {
   EXPECT_EQ(movers[0].id, 1);
 }
 
-TEST(MoverTracker, ResetForgetsMoversAndGoesOnCounting) {
-  MoverTracker tracker(MoverTestScene().camera, {});
-  for (int i = 0; i < 3; ++i) show(&tracker, i * kStep, one_person(0, 2));
-  tracker.reset();
-  EXPECT_TRUE(show(&tracker, 3 * kStep, one_person(0, 2)).empty());
-  show(&tracker, 4 * kStep, one_person(0, 2));
-  EXPECT_EQ(show(&tracker, 5 * kStep, one_person(0, 2)).at(0).id, 2);
-}
-
 }  // namespace
 }  // namespace dkb
