@@ -17,9 +17,6 @@ float depth_near(const DepthImage& depth, float x, float y) {
 
 }  // namespace
 
-RivalFilter::RivalFilter(FilterKind kind, const Camera& camera, const RivalFilterOptions& options)
-    : kind_(kind), camera_(camera), options_(options), flow_(options.flow) {}
-
 std::vector<FilterFeature> RivalFilter::describe(const RivalFilterInput& input) const {
   const auto& corners = input.orb.corners;
   std::vector<FilterFeature> features(corners.size());
@@ -80,7 +77,7 @@ std::vector<uint8_t> RivalFilter::dynamic(const RivalFilterInput& input) const {
     case FilterKind::epipolar:
       return epipolar_filter(features, input.boxes, camera_, own_motion(features, input));
     case FilterKind::paper:
-      return paper_filter(features, input.boxes, camera_, own_motion(features, input), options_.paper);
+      return paper_filter(features, input.boxes, camera_, own_motion(features, input), paper_);
     case FilterKind::multiview:
       return multiview_filter(features, input.seen_in_camera, camera_, input.image.depth);
     case FilterKind::none:

@@ -12,11 +12,6 @@
 
 namespace dkb {
 
-struct RivalFilterOptions {
-  PaperFilterOptions paper;
-  OpticalFlowOptions flow;
-};
-
 // What the filters of other systems look at.
 struct RivalFilterInput {
   const OrbFeatures& orb;
@@ -32,7 +27,8 @@ struct RivalFilterInput {
 // The filters that our own is compared with, the paper's among them, each with all it needs. Deterministic.
 class RivalFilter {
  public:
-  RivalFilter(FilterKind kind, const Camera& camera, const RivalFilterOptions& options);
+  RivalFilter(FilterKind kind, const Camera& camera, const PaperFilterOptions& paper)
+      : kind_(kind), camera_(camera), paper_(paper) {}
 
   bool needs_pyramid() const { return kind_ == FilterKind::paper || kind_ == FilterKind::epipolar; }
   int keyframes_looked_at() const { return kind_ == FilterKind::multiview ? kMultiviewKeyframes : 0; }
@@ -45,7 +41,7 @@ class RivalFilter {
 
   FilterKind kind_;
   Camera camera_;
-  RivalFilterOptions options_;
+  PaperFilterOptions paper_;
   OpticalFlow flow_;
 };
 

@@ -30,9 +30,6 @@ void keep_within(const Box& box, const GreyImage& from, GreyImage& to) {
 
 }  // namespace
 
-CarriedObjects::CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options)
-    : camera_(camera), noise_(noise), options_(options), flow_(options.flow) {}
-
 std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const ImagePyramid& to,
                                                  const std::vector<Detection>& boxes) const {
   std::vector<Eigen::Vector2f> points;
@@ -58,7 +55,7 @@ std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const Im
 Detections CarriedObjects::carry_to(const PastFrame& from, const ImagePyramid& to, const Detections& detections,
                                     int frames) const {
   if (frames == 0) return detections;
-  return carry(detections, motions(from, to, detections.boxes), frames, camera_.width, camera_.height, options_.carry);
+  return carry(detections, motions(from, to, detections.boxes), frames, camera_.width, camera_.height);
 }
 
 std::vector<Detection> CarriedObjects::boxes() const {
@@ -73,7 +70,7 @@ void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid)
   const Detections here{boxes(), std::move(mask_)};
   std::vector<size_t> kept;
   Detections there =
-      carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, options_.carry, &kept);
+      carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, {}, &kept);
   std::vector<Carried> moved;
   for (size_t i = 0; i < kept.size(); ++i) moved.push_back({there.boxes[i], carried_[kept[i]].missed});
   carried_ = std::move(moved);
@@ -83,7 +80,7 @@ void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid)
 MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {
   MoverMask wide;
   unite(wide, {1, mask}, camera_.width, camera_.height);
-  dilate(wide, options_.silhouette.rim);
+  dilate(wide, kSilhouetteRim);
   return wide;
 }
 
@@ -98,9 +95,7 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
       if (!p.keyframe || detections.boxes.empty()) continue;
       const Detections there = carry_to(*source, *p.pyramid, detections, std::abs(p.frame - from));
       const auto unmasked = there.mask.empty() ? there.boxes : std::vector<Detection>();
-      LateMask mask{
-          p.frame,
-          without_still(silhouettes(p.image->depth, unmasked, camera_, noise_, options_.silhouette), p.still).mask};
+      LateMask mask{p.frame, without_still(silhouettes(p.image->depth, unmasked, camera_, noise_), p.still).mask};
       unite(mask.mask, with_rim(there.mask), camera_.width, camera_.height);
       late.push_back(std::move(mask));
     }

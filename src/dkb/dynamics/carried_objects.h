@@ -13,12 +13,6 @@
 
 namespace dkb {
 
-struct CarriedObjectsOptions {
-  OpticalFlowOptions flow;
-  CarryOptions carry;
-  SilhouetteOptions silhouette;
-};
-
 // Where movers were in an earlier keyframe, as a detection has shown since.
 struct LateMask {
   FrameIndex frame = 0;
@@ -28,7 +22,7 @@ struct LateMask {
 // What a slow detector has said, carried by optical flow to the newest image. Deterministic.
 class CarriedObjects {
  public:
-  CarriedObjects(const Camera& camera, const SensorNoise& noise, const CarriedObjectsOptions& options);
+  CarriedObjects(const Camera& camera, const SensorNoise& noise) : camera_(camera), noise_(noise) {}
 
   // Works in what was detected in frame `from`, carried to the newest of `past`, where all objects are until follow();
   // of a frame that is not in `past`, where it was. The masks of the keyframes in `past`, which may have let movers
@@ -56,7 +50,6 @@ class CarriedObjects {
 
   Camera camera_;
   SensorNoise noise_;
-  CarriedObjectsOptions options_;
   OpticalFlow flow_;
   std::vector<Carried> carried_;
   GreyImage mask_;

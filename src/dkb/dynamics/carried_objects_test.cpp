@@ -35,7 +35,7 @@ class CarriedObjectsTest : public ::testing::Test {
     PastFrame made;
     made.frame = index;
     made.keyframe = keyframe;
-    auto pyramid = std::make_shared<ImagePyramid>(options.flow.pyramid());
+    auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
     pyramid->build(image->grey);
     std::vector<PixelCorner> corners;
     FastCornerFinder().find(image->grey, 30, 20, corners);
@@ -80,8 +80,7 @@ class CarriedObjectsTest : public ::testing::Test {
 
   SquareWorld world{320, 240, 300, 8};
   Camera camera;
-  CarriedObjectsOptions options;
-  CarriedObjects carried{small_camera(), {}, options};
+  CarriedObjects carried{small_camera(), {}};
   PastFrames past;
   PastFrame now;
 
@@ -123,7 +122,7 @@ TEST_F(CarriedObjectsTest, WhoWalksBeforeSomebodyWhoStandsDoesNotTakeTheOthersBo
     const GreyImage moved = world.render({1, 0, -static_cast<double>(kStep * f), 0}), mask = mask_of(f);
     for (size_t i = 0; i < mask.size(); ++i)
       if (mask.data()[i] != 0) image->grey.data()[i] = moved.data()[i];
-    auto pyramid = std::make_shared<ImagePyramid>(options.flow.pyramid());
+    auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
     pyramid->build(image->grey);
     std::vector<PixelCorner> corners;
     FastCornerFinder().find(image->grey, 30, 20, corners);

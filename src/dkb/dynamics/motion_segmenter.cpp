@@ -83,7 +83,7 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       options_(options),
       simd_(simd),
       rays_(camera, options.cell),
-      smoothing_(camera, noise, options.cell, options.smoothing, simd),
+      smoothing_(camera, noise, options.cell, simd),
       alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();

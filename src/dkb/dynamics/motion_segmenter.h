@@ -23,7 +23,6 @@ struct MotionOptions {
   int cell = 4;            // [px] side of the cells that are judged, 2 ... 32
   double memory = 6;       // [s] time constant in which a mover that stands still is forgotten, > 0
   double threshold = 0.5;  // score from which a cell moves; one frame adds at most 1, (0, 2]
-  MotionSmoothingOptions smoothing;
 };
 
 // Finds what moves against the camera's own motion, of any class, without a model: people, a pushed chair, a carried

@@ -10,19 +10,19 @@
 namespace dkb {
 namespace {
 
+constexpr double kDistance = 0.4;  // [m] along the surface over which cells of one object speak for each other
 // [1/m] second difference of inverse depth in a fold between object and support (noise: 0.005)
 constexpr float kCrease = 0.012f;
 constexpr float kCreaseLink = 0.3f;  // share of what is said that crosses such a fold
 
 }  // namespace
 
-MotionSmoothing::MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell,
-                                 const MotionSmoothingOptions& options, Simd simd)
+MotionSmoothing::MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, Simd simd)
     : noise_(noise),
       simd_(simd),
       focal_(camera.fx),
       cell_(cell),
-      fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * options.distance))) {
+      fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * kDistance))) {
   const int width = (camera.width + cell - 1) / cell, height = (camera.height + cell - 1) / cell;
   for (Image<float>* i : {&inverse_, &damping_, &left_, &up_}) *i = Image<float>(width, height);
 }

@@ -8,18 +8,13 @@
 
 namespace dkb {
 
-struct MotionSmoothingOptions {
-  double distance = 0.4;  // [m] along the surface over which cells of one object speak for each other, > 0
-};
-
 // Averages evidence over a surface, each cell with its weight: normalised convolution (Knutsson and Westin, CVPR 1993)
 // by the recursive edge-aware filter of Gastal and Oliveira (SIGGRAPH 2011), whose edges here are depth jumps and
 // concave folds. A fold is where inverse depth, which is linear in the image on every plane, bends away from the
 // viewer.
 class MotionSmoothing {
  public:
-  MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, const MotionSmoothingOptions& options,
-                  Simd simd = best_simd());
+  MotionSmoothing(const CameraModel& camera, const SensorNoise& noise, int cell, Simd simd = best_simd());
 
   // `depth`: of the cells' middles [m], 0 = none. Sets what smooth() stops at.
   void set_surface(const Image<float>& depth);

@@ -20,7 +20,7 @@ CameraModel camera() {
 
 // What arrives at each cell of a weight of 1 at (20, 30), on a surface of these depths.
 Image<float> spread(const Image<float>& depth) {
-  MotionSmoothing smoothing(camera(), {}, 4, {});
+  MotionSmoothing smoothing(camera(), {}, 4);
   smoothing.set_surface(depth);
   Image<float> weighted(kWidth, kHeight), weights(kWidth, kHeight);
   weighted(20, 30) = -1;

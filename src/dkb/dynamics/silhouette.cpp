@@ -18,7 +18,8 @@ constexpr int kMaskCell = 4;       // [px] grid on which depth is looked at
 constexpr double kCore = 0.5;      // share of the box's width and height around its centre where the object is sought
 constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
 constexpr double kRelativeLayer = 0.15;  // [1] half-width of that layer relative to its depth
-constexpr double kHalfDepth = 0.3;       // [m] and no more than half of what a body takes up along the line of sight
+constexpr float kHalfDepth = 0.3f;       // [m] and no more than half of what a body takes up along the line of sight
+constexpr float kReach = 0.6f;           // [m] parts of the object lie at most so far before or behind its layer
 constexpr double kMiddle = 0.1;          // share of the box's width and height in which its body is sure to be
 constexpr double kWidening = 0.05;       // share of the box's size by which it is widened
 
@@ -118,7 +119,7 @@ float object_depth(const Window& window, const CellBounds& core) {
   const auto depth_of = [&](size_t k) { return 0.001f * static_cast<float>(samples[k] >> 16); };
   // Slide a window of the layer's width from near to far; the first local maximum that is heavy enough wins.
   const float ratio = static_cast<float>((1 + kRelativeLayer) / (1 - kRelativeLayer));
-  const auto far_side = [&](float d) { return std::min(d * ratio, d + static_cast<float>(2 * kHalfDepth)); };
+  const auto far_side = [&](float d) { return std::min(d * ratio, d + 2 * kHalfDepth); };
   const double needed = kMinShare * static_cast<double>(total);
   uint64_t weight = 0, best_weight = 0;
   float best_depth = depth_of(samples.size() / 2);
@@ -137,16 +138,15 @@ float object_depth(const Window& window, const CellBounds& core) {
   return best_depth;
 }
 
-// Per cell of the window, 255: the surfaces within `reach` [m] of the layer that have a cell of it in the core, and
+// Per cell of the window, 255: the surfaces within kReach of the layer that have a cell of it in the core, and
 // limbs. A limb stands before or behind the rest, so that depth steps between them. Unlike the background it ends
 // within the box: surfaces in reach that lie beside the object and do not go on beyond the box are part of it.
-std::vector<uint8_t> find_object(const Window& window, const CellBounds& core, float layer, float half_layer,
-                                 float reach) {
+std::vector<uint8_t> find_object(const Window& window, const CellBounds& core, float layer, float half_layer) {
   const CellBounds& range = window.range;
   std::vector<float> within(window.depth.size());
   for (int y = range.y0; y < range.y1; ++y)
     for (size_t i = window.at(range.x0, y), last = window.at(range.x1, y); i < last; ++i)
-      within[i] = std::fabs(window.depth[i] - layer) <= reach ? window.depth[i] : 0;
+      within[i] = std::fabs(window.depth[i] - layer) <= kReach ? window.depth[i] : 0;
   const std::vector<DepthPart> parts = DepthParts(window.columns, window.rows).find(within, window.jump);
   std::vector<uint8_t> mine(window.depth.size());
   const auto take = [&](const DepthPart& part) {
@@ -179,16 +179,16 @@ std::vector<uint8_t> find_object(const Window& window, const CellBounds& core, f
   return mine;
 }
 
-// Marks the cells of `box` that are reached sooner from its middle, along what is within `half_depth` [m] of the layer,
+// Marks the cells of `box` that are reached sooner from its middle, along what is within kHalfDepth of the layer,
 // than from the cells around it.
-void find_body(const Window& window, const CellBounds& box, const CellBounds& middle, float layer, float half_depth,
+void find_body(const Window& window, const CellBounds& box, const CellBounds& middle, float layer,
                std::vector<uint8_t>& body) {
   enum Owner : uint8_t { nobody, object, surroundings, no_depth };
   std::vector<uint8_t> owners(window.depth.size(), no_depth);
   std::vector<int> reached;
   reached.reserve(owners.size());
   int waiting = 0;  // cells of the object among them that are still to be gone on from
-  const auto near_layer = [&](size_t i) { return std::fabs(window.depth[i] - layer) <= half_depth; };
+  const auto near_layer = [&](size_t i) { return std::fabs(window.depth[i] - layer) <= kHalfDepth; };
   for (int y = box.y0 - 1; y <= box.y1; ++y)
     for (int x = box.x0 - 1; x <= box.x1; ++x) {
       const size_t i = window.at(x, y);
@@ -249,14 +249,13 @@ void add_holes(const Window& window, const std::vector<uint8_t>& mine, Image<uin
 }  // namespace
 
 Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
-                        const SensorNoise& noise, const SilhouetteOptions& options) {
+                        const SensorNoise& noise) {
   Silhouettes made;
   MoverMask& mask = made.mask;
   mask.cell = made.body.cell = kMaskCell;
   if (boxes.empty()) return made;
   const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
   mask.cells = made.body.cells = Image<uint8_t>(columns, rows);
-  const auto reach = static_cast<float>(options.max_depth_offset);
   for (const Detection& detection : boxes) {
     const auto part_of_box = [&](double share) {
       return cells_of(scaled(detection.box, share), kMaskCell, columns, rows);
@@ -269,13 +268,11 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
         std::fill(mask.cells.row(y) + range.x0, mask.cells.row(y) + range.x1, 255);
       continue;
     }
-    const auto half_layer =
-        std::min({static_cast<float>(kRelativeLayer) * layer, static_cast<float>(kHalfDepth), reach});
-    const std::vector<uint8_t> mine = find_object(window, core, layer, half_layer, reach);
+    const float half_layer = std::min(static_cast<float>(kRelativeLayer) * layer, kHalfDepth);
+    const std::vector<uint8_t> mine = find_object(window, core, layer, half_layer);
     add_holes(window, mine, mask.cells);
     std::vector<uint8_t> body(mine.size());
-    find_body(window, part_of_box(1), part_of_box(kMiddle), layer, std::min(static_cast<float>(kHalfDepth), reach),
-              body);
+    find_body(window, part_of_box(1), part_of_box(kMiddle), layer, body);
     for (int y = range.y0; y < range.y1; ++y) {
       const size_t first = window.at(range.x0, y);
       for (int k = 0; k < range.x1 - range.x0; ++k) {
@@ -286,7 +283,7 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
       }
     }
   }
-  dilate(mask, options.rim);
+  dilate(mask, kSilhouetteRim);
   return made;
 }
 

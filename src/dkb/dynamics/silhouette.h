@@ -10,10 +10,7 @@
 
 namespace dkb {
 
-struct SilhouetteOptions {
-  double max_depth_offset = 0.6;  // [m] parts of the object lie at most so far before or behind its layer, > 0
-  int rim = 1;                    // [cells] the silhouette is widened by, >= 0
-};
+constexpr int kSilhouetteRim = 1;  // [cells] that they are widened by
 
 // What in each box belongs to the detected object rather than to what is seen beside it.
 struct Silhouettes {
@@ -27,6 +24,6 @@ struct Silhouettes {
 };
 
 Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxes, const Camera& camera,
-                        const SensorNoise& noise, const SilhouetteOptions& options = {});
+                        const SensorNoise& noise);
 
 }  // namespace dkb

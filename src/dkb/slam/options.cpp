@@ -152,7 +152,7 @@ void bind_experiments(Settings& s, SlamOptions& o) {
 
   s.bind("experiment.mapping.planes", &o.mapping.planes, "flat surfaces take part in bundle adjustment");
 
-  PaperFilterOptions& paper = o.dynamics.rivals.paper;
+  PaperFilterOptions& paper = o.dynamics.paper;
   s.bind("experiment.dynamics.paper.flow_threshold", &paper.flow_threshold, "[px] d_th (DKB eq. 9)", above(0));
   s.bind("experiment.dynamics.paper.compensate", &paper.compensate, "flow against the camera's own motion");
 }

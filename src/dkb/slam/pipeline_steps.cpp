@@ -360,10 +360,8 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
     // People who stand still are fit to track by, but no part of the map.
     MoverMask movers = scene.mask;
     const RgbdImage& image = scene.extracted.image();
-    unite(movers,
-          silhouettes(image.depth, scene.boxes, context_.camera, options_.noise, options_.dynamics.carried.silhouette)
-              .mask,
-          image.depth.width(), image.depth.height());
+    unite(movers, silhouettes(image.depth, scene.boxes, context_.camera, options_.noise).mask, image.depth.width(),
+          image.depth.height());
     dense_->add_keyframe(tracked.index, image, movers);
     record_.add_time("dense_keyframe", watch.ms());
   }

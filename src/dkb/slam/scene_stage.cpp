@@ -24,10 +24,9 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
       prompt_(detectors.prompt),
       slow_(detectors.slow),
       inference_(detectors.inference),
-      objects_(camera, noise, options.carried) {
-  options_.rivals.flow = options_.carried.flow;
+      objects_(camera, noise) {
   if (options_.filter == FilterKind::none) return;
-  if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.rivals);
+  if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.paper);
   segments_motion_ = detectors.motion;
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
@@ -107,7 +106,7 @@ Carried SceneStage::carry(const CarryTask& task) {
   const Stopwatch watch;
   const RgbdImage& image = *task.frame.image();
   Carried made;
-  auto pyramid = std::make_shared<ImagePyramid>(options_.carried.flow.pyramid());
+  auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
   pyramid->build(image.grey);
   const auto receive = [&](bool of_this_frame) {
     for (const DueDetections& d : task.due) {
@@ -161,7 +160,7 @@ MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
 }
 
 Silhouettes SceneStage::silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const {
-  return silhouettes(image.depth, boxes, camera_, noise_, options_.carried.silhouette);
+  return silhouettes(image.depth, boxes, camera_, noise_);
 }
 
 void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid) {

@@ -18,9 +18,8 @@ namespace dkb {
 
 struct DynamicsOptions {
   FilterKind filter = FilterKind::standard;
-  RivalFilterOptions rivals;
+  PaperFilterOptions paper;
   MotionOptions motion;
-  CarriedObjectsOptions carried;
 };
 
 // What tracking knows before it looks at a frame.
