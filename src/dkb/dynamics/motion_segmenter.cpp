@@ -162,12 +162,6 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   update_scores();
 }
 
-MoverMask MotionSegmenter::segment(const RgbdImage& image, const Rigid3& cam_from_world_expected,
-                                   const Matrix6d& step_covariance) {
-  observe(image, cam_from_world_expected, step_covariance);
-  return mask();
-}
-
 // The velocity does not last: what a hand changes it by between slow frames is more than the comparison forgives. The
 // surfaces of the frame before tell where the camera is.
 void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {

@@ -31,18 +31,18 @@ struct MotionOptions {
 // from the first frame is found once his outline has moved by some cells, large things later than small ones.
 //
 // Works on depth alone, on a coarse grid. Deterministic. Keeps its buffers from frame to frame; one object per thread.
-// Calls alternate: segment() or observe() with the expected pose, then commit() with the one that tracking found.
+// Calls alternate: observe() with the expected pose, then commit() with the one that tracking found.
 class MotionSegmenter {
  public:
   MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {},
                   Simd simd = best_simd());
 
-  // What moves in `image`; nothing in the first frame. An error of the pose of some mm and 0.3 degrees does no harm.
-  // Throws InputError when the depth image is not of the camera's size.
-  // `step_covariance`: how far the motion since the frame before may be from what is expected (as MotionPrior's).
-  MoverMask segment(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
-  // The same for those who want score() alone.
+  // An error of the pose of some mm and 0.3 degrees does no harm. `step_covariance`: how far the motion since the frame
+  // before may be from what is expected (as MotionPrior's). Throws InputError when the depth image is not of the
+  // camera's size.
   void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
+  // What moves in the image last given; nothing in the first frame.
+  MoverMask mask();
   // What is known to stand still in the image last given.
   StillCells still() const;
   // Bodies that a detector found in it: they carry a score from which no view of them testifies later that they are
@@ -86,7 +86,6 @@ class MotionSegmenter {
   void find_vacated();
   void weigh();
   void update_scores();
-  MoverMask mask();
   void keep_as_view(const MotionDepthGrid& grid);
 
   CameraModel camera_;

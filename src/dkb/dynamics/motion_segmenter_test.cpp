@@ -111,6 +111,11 @@ Figures judge(const MoverMask& mask, const GreyImage& truth) {
   return {on > 0 ? static_cast<double>(hit) / on : 1.0, static_cast<double>(wrong) / std::max(1, off)};
 }
 
+MoverMask segment(MotionSegmenter& segmenter, const RgbdImage& image, const Rigid3& expected) {
+  segmenter.observe(image, expected, kStepCovariance);
+  return segmenter.mask();
+}
+
 // Runs frames 0 ... frames - 1 with poses off by 2 mm and 0.1 degrees, and hands each frame's figures to `look`.
 void run(const World& world, int frames, const std::function<std::vector<Panel>(int)>& movers,
          const std::function<void(int, const MoverMask&, const Figures&)>& look, MotionOptions options = {}) {
@@ -120,8 +125,7 @@ void run(const World& world, int frames, const std::function<std::vector<Panel>(
     const Picture p = world.render(f, movers(f));
     Vector6d error;
     for (int i = 0; i < 6; ++i) error[i] = (i < 3 ? 0.002 : 0.0017) * random.normal();
-    const MoverMask mask =
-        segmenter.segment(p.image, rigid3_from_tangent(error) * world.cam_from_world(f), kStepCovariance);
+    const MoverMask mask = segment(segmenter, p.image, rigid3_from_tangent(error) * world.cam_from_world(f));
     look(f, mask, judge(mask, p.truth));
     segmenter.commit(world.cam_from_world(f));
   }
@@ -158,7 +162,7 @@ TEST(MotionSegmenter, DoesNotTakeTheRoomForWhoLeftDuringAGap) {
   MotionSegmenter segmenter(world.camera, {}, {});
   const auto see = [&](int frame, const std::vector<Panel>& movers) {
     const Picture p = world.render(frame, movers);
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(frame), kStepCovariance);
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(frame));
     segmenter.commit(world.cam_from_world(frame));
     return judge(mask, p.truth);
   };
@@ -233,7 +237,7 @@ TEST(MotionSegmenter, MarksWhatGetsTooNearForTheSensor) {
       for (int y = 60; y < 180; ++y)
         for (int x = 100; x < 220; ++x)
           if (p.truth(x, y) != 0) p.image.depth(x, y) = 0;
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
     if (f > 36) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
       EXPECT_LT(judge(mask, p.truth).wrong, 0.02) << f;
@@ -257,7 +261,7 @@ TEST(MotionSegmenter, MissingDepthAloneIsNoMover) {
       for (int x = 20; x < 44; ++x)
         for (int y = 20; y < 44; ++y) p.image.depth(x, y) = 0;
     }
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
     if (f > 28) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9) << f;
       EXPECT_LT(judge(mask, p.truth).wrong, 0.002) << f;
@@ -279,7 +283,7 @@ TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
   MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 25; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.05 * f)});
-    const MoverMask mask = segmenter.segment(p.image, world.cam_from_world(f), kStepCovariance);
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
     if (f == 24) {
       EXPECT_GT(judge(mask, p.truth).covered, 0.9);
     }
@@ -287,7 +291,7 @@ TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
   }
   EXPECT_TRUE(segmenter.score().empty());
   const Picture p = world.render(25, {box_at(-0.2)});
-  EXPECT_EQ(judge(segmenter.segment(p.image, Rigid3(), kStepCovariance), p.truth).covered, 0);
+  EXPECT_EQ(judge(segment(segmenter, p.image, Rigid3()), p.truth).covered, 0);
 }
 
 TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
@@ -297,7 +301,7 @@ TEST(MotionSegmenter, FollowsAMoveOfTheWorld) {
   for (int f = 0; f < 40; ++f) {
     const Picture p = world.render(f, {box_at(-1.4 + 0.04 * f)});
     const Rigid3 cam_from_world = f < 30 ? world.cam_from_world(f) : world.cam_from_world(f) * new_from_old.inverse();
-    const Figures figures = judge(segmenter.segment(p.image, cam_from_world, kStepCovariance), p.truth);
+    const Figures figures = judge(segment(segmenter, p.image, cam_from_world), p.truth);
     if (f >= 30) {
       EXPECT_GT(figures.covered, 0.9) << f;
       EXPECT_LT(figures.wrong, 0.01) << f;
@@ -317,7 +321,7 @@ TEST(MotionSegmenter, CorrectsTheGuessesAlone) {
     const bool guess = f >= 27 && f < 30;
     const Rigid3 truth = world.cam_from_world(f), guessed = truth * found_from_guessed;
     const Rigid3& expected = f > 27 && f <= 30 ? guessed : truth;
-    const Figures figures = judge(segmenter.segment(p.image, expected, kStepCovariance), p.truth);
+    const Figures figures = judge(segment(segmenter, p.image, expected), p.truth);
     if (f >= 27) {
       EXPECT_GT(figures.covered, 0.9) << f;
       EXPECT_LT(figures.wrong, 0.01) << f;
@@ -340,7 +344,7 @@ TEST(MotionSegmenter, RefusesDepthOfAnotherSize) {
   MotionSegmenter segmenter(World().camera, {});
   RgbdImage image;
   image.depth = DepthImage(64, 48);
-  EXPECT_THROW(segmenter.segment(image, Rigid3(), kStepCovariance), InputError);
+  EXPECT_THROW(segment(segmenter, image, Rigid3()), InputError);
 }
 
 // Nobody saw empty what he walks into, since the camera turns after him.
@@ -406,7 +410,7 @@ TEST(MotionSegmenter, FindsTheSameScoresWithEveryInstructionSet) {
     const Picture p = world.render(f, {box_at(-0.5 + 0.03 * f), box_at(0.4, 0.5)});
     std::vector<MoverMask> masks;
     for (MotionSegmenter& s : segmenters) {
-      masks.push_back(s.segment(p.image, world.cam_from_world(f), kStepCovariance));
+      masks.push_back(segment(s, p.image, world.cam_from_world(f)));
       ASSERT_EQ(masks.back().cells, masks.front().cells) << f;
       ASSERT_EQ(s.score(), segmenters.front().score()) << f;
       s.commit(world.cam_from_world(f));

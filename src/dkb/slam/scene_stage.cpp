@@ -94,10 +94,8 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
 Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   const Stopwatch watch;
   Segmentation made;
-  if (segments_motion_)
-    made.mask = motion_->segment(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
-  else
-    motion_->observe(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
+  motion_->observe(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
+  if (segments_motion_) made.mask = motion_->mask();
   made.ms = watch.ms();
   return made;
 }
