@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dkb/comparison/dynamic_filter.h"
-#include "dkb/dynamics/past_frame.h"
+#include "dkb/dynamics/carried_objects.h"
 #include "dkb/features/features.h"
 #include "dkb/features/optical_flow.h"
 #include "dkb/features/rgbd_features.h"

@@ -11,7 +11,7 @@
 #include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
-#include "dkb/dynamics/still_cells.h"
+#include "dkb/dynamics/silhouette.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/geometry/sensor_noise.h"
