@@ -76,6 +76,14 @@ std::vector<Box> region_boxes(const GreyImage& mask, int min_pixels) {
   return boxes;
 }
 
+std::vector<Detection> mover_boxes(const GreyImage& mask, int min_pixels, int cell) {
+  std::vector<Detection> boxes;
+  const auto c = static_cast<float>(cell);
+  for (const Box& b : region_boxes(mask, min_pixels))
+    boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1});
+  return boxes;
+}
+
 MaskFolder::MaskFolder(const fs::path& folder, Reader reader, const std::vector<double>& stamps, int width, int height)
     : reader_(std::move(reader)), width_(width), height_(height) {
   std::error_code error;
@@ -120,7 +128,7 @@ Detections MaskFolder::detect(const DetectorInput& image) {
   Detections found;
   if (const fs::path* path = find(seconds_from_ns(image.stamp_ns))) {
     found.mask = read(*path);
-    for (const Box& box : region_boxes(found.mask, min_region)) found.boxes.push_back({"mover", box, 1.0f});
+    found.boxes = mover_boxes(found.mask, min_region);
   }
   return found;
 }

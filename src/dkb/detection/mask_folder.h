@@ -43,5 +43,7 @@ class MaskFolder final : public Detector {
 // Bounding boxes of the connected regions (8-neighbourhood) of pixels >= 128 with at least `min_pixels` of them,
 // largest first, ties in row-major order of their first pixel.
 std::vector<Box> region_boxes(const GreyImage& mask, int min_pixels);
+// The same as detections of class "mover", of a mask whose pixels are `cell` px wide.
+std::vector<Detection> mover_boxes(const GreyImage& mask, int min_pixels, int cell = 1);
 
 }  // namespace dkb

@@ -13,13 +13,6 @@ namespace {
 constexpr size_t kPointsPerBox = 40;  // features followed to carry a box
 constexpr int kMissedResults = 2;     // detector results that may miss an object before its box is dropped
 
-// Boxes to carry a mask by, where the detector gives none.
-void box_regions(Detections& detections) {
-  if (detections.mask.empty() || !detections.boxes.empty()) return;
-  for (const Box& box : region_boxes(detections.mask, MaskFolder::min_region))
-    detections.boxes.push_back({"mover", box, 1.0f});
-}
-
 // What `from` marks in a box is marked in `to` as well, where both are there.
 void keep_within(const Box& box, const GreyImage& from, GreyImage& to) {
   if (from.empty() || to.empty()) return;
@@ -87,7 +80,8 @@ MoverMask CarriedObjects::with_rim(const GreyImage& mask) const {
 std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections& answer, const PastFrames& past) {
   std::vector<LateMask> late;
   Detections detections = answer;
-  box_regions(detections);
+  // Boxes to carry a mask by, where the detector gives none.
+  if (detections.boxes.empty()) detections.boxes = mover_boxes(detections.mask, MaskFolder::min_region);
   Detections here = detections;
   const auto source = std::find_if(past.begin(), past.end(), [&](const PastFrame& p) { return p.frame == from; });
   if (source != past.end()) {

@@ -116,7 +116,8 @@ Carried SceneStage::carry(const CarryTask& task) {
   receive(false);
   if (slow_stage_) objects_.follow(past_, *pyramid);
   receive(true);
-  if (!rival_ && objects_.mask().empty()) made.silhouettes = silhouettes_of(image, objects_.boxes());
+  if (!rival_ && objects_.mask().empty())
+    made.silhouettes = silhouettes(image.depth, objects_.boxes(), camera_, noise_);
   made.mask = objects_.mover_mask();
   made.pyramid = std::move(pyramid);
   made.ms = watch.ms();
@@ -149,16 +150,9 @@ MoverMask SceneStage::take_motion(std::vector<Detection>& boxes) {
   times_.add("motion", watch.ms());
   times_.add("segmentation", segmentation_.ms);
   MoverMask moving = std::move(segmentation_.mask);
-  if (rival_ && !moving.empty())  // the rivals know boxes only
-    for (const Box& b : region_boxes(moving.cells, 4 * 4)) {
-      const float c = static_cast<float>(moving.cell);
-      boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1.0f});
-    }
+  if (rival_)  // the rivals know boxes only
+    for (Detection& d : mover_boxes(moving.cells, 4 * 4, moving.cell)) boxes.push_back(std::move(d));
   return moving;
-}
-
-Silhouettes SceneStage::silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const {
-  return silhouettes(image.depth, boxes, camera_, noise_);
 }
 
 void SceneStage::remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid) {
@@ -205,7 +199,7 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
       if (dynamic[i]) scene.rejected[i] = FeatureReason::moved;
   } else {
     Silhouettes boxed = std::move(carried.silhouettes);
-    const Silhouettes prompt = silhouettes_of(image, unmasked);
+    const Silhouettes prompt = silhouettes(image.depth, unmasked, camera_, noise_);
     unite(boxed.mask, prompt.mask, camera_.width, camera_.height);
     unite(boxed.body, prompt.body, camera_.width, camera_.height);
     if (motion_) motion_->take_bodies(bodies);

@@ -117,7 +117,6 @@ class SceneStage {
   Segmentation segment_motion(const SegmentationTask& task);
   MoverMask take_motion(std::vector<Detection>& boxes);
   Carried carry(const CarryTask& task);
-  Silhouettes silhouettes_of(const RgbdImage& image, const std::vector<Detection>& boxes) const;
   void remember(const ExtractedFrame& frame, std::shared_ptr<const ImagePyramid> pyramid);
 
   Camera camera_;
