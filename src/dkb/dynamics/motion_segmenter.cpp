@@ -42,11 +42,8 @@ constexpr double kWalkInDepth = 2 / std::numbers::pi * kWalk;
 constexpr size_t kBlockCells = 640;  // [cells] worked at together
 
 template <class T>
-std::unique_ptr<T> take_spare(std::vector<std::unique_ptr<T>>& spare) {
-  if (spare.empty()) return std::make_unique<T>();
-  auto taken = std::move(spare.back());
-  spare.pop_back();
-  return taken;
+std::unique_ptr<T> take_spare(std::unique_ptr<T>& spare) {
+  return spare ? std::move(spare) : std::make_unique<T>();
 }
 
 // Visits the cells of `marks` of whose 3 x 3 at least kSupport are marked.
@@ -94,10 +91,9 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
 }
 
 void MotionSegmenter::reset() {
-  for (auto& view : views_) spare_views_.push_back(std::move(view));
   views_.clear();
-  if (previous_) spare_.push_back(std::move(previous_));
-  if (current_) spare_.push_back(std::move(current_));
+  previous_.reset();
+  current_.reset();
   last_.reset();
   guessing_ = false;
 }
@@ -142,7 +138,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   if (previous_ && current_->time - previous_->time > kLongAgo) {
     keep_as_view(*previous_);
-    spare_.push_back(std::move(previous_));
+    spare_ = std::move(previous_);
   }
   find_pose(step_covariance);
   choose_views();
@@ -419,7 +415,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool g
   if (!guessed) told_ = current_->time;
   if (previous_) {
     keep_as_view(*previous_);
-    spare_.push_back(std::move(previous_));
+    spare_ = std::move(previous_);
   }
   previous_ = std::move(current_);
 }
@@ -429,7 +425,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool g
 void MotionSegmenter::keep_as_view(const MotionDepthGrid& grid) {
   const double interval = views_.size() == 1 ? 0.3 * kViewInterval : kViewInterval;
   if (!views_.empty() && grid.time - views_.back()->time < interval) return;
-  auto view = take_spare(spare_views_);
+  auto view = take_spare(spare_view_);
   view->set(grid);
   views_.push_back(std::move(view));
   const double now = views_.back()->time;
@@ -445,7 +441,7 @@ void MotionSegmenter::keep_as_view(const MotionDepthGrid& grid) {
       }
     }
   }
-  spare_views_.push_back(std::move(views_[drop]));
+  spare_view_ = std::move(views_[drop]);
   views_.erase(views_.begin() + static_cast<std::ptrdiff_t>(drop));
 }
 

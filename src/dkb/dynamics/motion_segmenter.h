@@ -97,8 +97,8 @@ class MotionSegmenter {
   DepthAlignment alignment_;
   std::unique_ptr<MotionDepthGrid> current_, previous_;
   std::vector<std::unique_ptr<MotionView>> views_;  // oldest first
-  std::vector<std::unique_ptr<MotionDepthGrid>> spare_;
-  std::vector<std::unique_ptr<MotionView>> spare_views_;
+  std::unique_ptr<MotionDepthGrid> spare_;          // for their buffers
+  std::unique_ptr<MotionView> spare_view_;
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
