@@ -20,11 +20,11 @@ struct AxisMotion {
 
 using Points = std::vector<const PointMotion*>;
 
-template <class From, class To>
-AxisMotion axis_motion(const Points& points, float centre, float scale, From from, To to) {
+// `axis`: 0 = x, 1 = y.
+AxisMotion axis_motion(const Points& points, Eigen::Index axis, float centre, float scale) {
   AxisMotion motion{centre, scale, 0, 0, 0};
   std::vector<float> shifts;
-  for (const PointMotion* p : points) shifts.push_back(to(*p) - motion.at(from(*p), 0));
+  for (const PointMotion* p : points) shifts.push_back(p->to[axis] - motion.at(p->from[axis], 0));
   motion.low = quantile(shifts, 0.25);
   motion.middle = quantile(shifts, 0.5);
   motion.high = quantile(shifts, 0.75);
@@ -33,25 +33,19 @@ AxisMotion axis_motion(const Points& points, float centre, float scale, From fro
 
 // Median ratio of the points' distances to their (median) centre, after and before.
 float scale_change(const Points& points, float limit) {
-  std::vector<float> fx, fy, tx, ty;
-  for (const PointMotion* p : points) {
-    fx.push_back(p->from_x);
-    fy.push_back(p->from_y);
-    tx.push_back(p->to_x);
-    ty.push_back(p->to_y);
-  }
-  const float cfx = quantile(fx, 0.5), cfy = quantile(fy, 0.5), ctx = quantile(tx, 0.5), cty = quantile(ty, 0.5);
+  const auto centre = [&](Eigen::Vector2f PointMotion::*end) {
+    std::vector<float> x, y;
+    for (const PointMotion* p : points) x.push_back((p->*end).x()), y.push_back((p->*end).y());
+    return Eigen::Vector2f(upper_median(x), upper_median(y));
+  };
+  const Eigen::Vector2f from = centre(&PointMotion::from), to = centre(&PointMotion::to);
   constexpr float kNear = 4;  // [px] shorter distances tell more of noise than of scale
   std::vector<float> ratios;
   for (const PointMotion* p : points) {
-    const float before = std::hypot(p->from_x - cfx, p->from_y - cfy);
-    if (before >= kNear) ratios.push_back(std::hypot(p->to_x - ctx, p->to_y - cty) / before);
+    const float before = std::hypot(p->from.x() - from.x(), p->from.y() - from.y());
+    if (before >= kNear) ratios.push_back(std::hypot(p->to.x() - to.x(), p->to.y() - to.y()) / before);
   }
-  return ratios.size() < 3 ? 1.0f : std::clamp(quantile(ratios, 0.5), 1 / limit, limit);
-}
-
-bool finite(const PointMotion& p) {
-  return std::isfinite(p.from_x) && std::isfinite(p.from_y) && std::isfinite(p.to_x) && std::isfinite(p.to_y);
+  return ratios.size() < 3 ? 1.0f : std::clamp(upper_median(ratios), 1 / limit, limit);
 }
 
 // Points of each box: its own (no smaller box holds them), or all inside it where these are too few.
@@ -59,10 +53,10 @@ std::vector<Points> points_of(const std::vector<Detection>& boxes, std::span<con
                               int min_points) {
   std::vector<Points> own(boxes.size()), inside(boxes.size());
   for (const PointMotion& p : motions) {
-    if (!finite(p)) continue;
+    if (!p.from.allFinite() || !p.to.allFinite()) continue;
     size_t smallest = boxes.size();
     for (size_t i = 0; i < boxes.size(); ++i) {
-      if (!boxes[i].box.contains(p.from_x, p.from_y)) continue;
+      if (!boxes[i].box.contains(p.from.x(), p.from.y())) continue;
       inside[i].push_back(&p);
       if (smallest == boxes.size() || boxes[i].box.area() < boxes[smallest].box.area()) smallest = i;
     }
@@ -119,12 +113,8 @@ Detections carry(const Detections& from, std::span<const PointMotion> motions, i
       growth += options.blind_growth * steps * std::max(d.box.w, d.box.h);
     } else {
       const float scale = scale_change(points[i], scale_limit);
-      x_motion = axis_motion(
-          points[i], cx, scale, [](const PointMotion& p) { return p.from_x; },
-          [](const PointMotion& p) { return p.to_x; });
-      y_motion = axis_motion(
-          points[i], cy, scale, [](const PointMotion& p) { return p.from_y; },
-          [](const PointMotion& p) { return p.to_y; });
+      x_motion = axis_motion(points[i], 0, cx, scale);
+      y_motion = axis_motion(points[i], 1, cy, scale);
     }
     const float left = x_motion.at(d.box.x, x_motion.low) - growth;
     const float top = y_motion.at(d.box.y, y_motion.low) - growth;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <span>
 
 #include "dkb/detection/detection.h"
@@ -9,7 +10,7 @@ namespace dkb {
 
 // A point followed from the frame of the detections to the current one [px].
 struct PointMotion {
-  float from_x = 0, from_y = 0, to_x = 0, to_y = 0;
+  Eigen::Vector2f from, to;
 };
 
 struct CarryOptions {

@@ -23,7 +23,7 @@ std::vector<PointMotion> grid(const Box& box, Move move) {
   std::vector<PointMotion> motions;
   for (float y = box.y + 2; y < box.y + box.h; y += 5)
     for (float x = box.x + 2; x < box.x + box.w; x += 5) {
-      PointMotion p{x, y, x, y};
+      PointMotion p{{x, y}, {x, y}};
       move(p);
       motions.push_back(p);
     }
@@ -32,7 +32,7 @@ std::vector<PointMotion> grid(const Box& box, Move move) {
 
 TEST(Carry, BoxesMoveWithTheirPoints) {
   const Box box{100, 50, 40, 80};
-  const auto motions = grid(box, [](PointMotion& p) { p.to_x += 7, p.to_y -= 3; });
+  const auto motions = grid(box, [](PointMotion& p) { p.to.x() += 7, p.to.y() -= 3; });
   const Detections to = carry(one(box), motions, 2, 640, 480, kNoGrowth);
   ASSERT_EQ(to.boxes.size(), 1u);
   EXPECT_EQ(to.boxes[0], (Detection{"person", {107, 47, 40, 80}, 0.5f}));
@@ -42,8 +42,8 @@ TEST(Carry, FalseTracksDoNotMoveTheBox) {
   const Box box{100, 50, 40, 80};
   Random random(1);
   const auto motions = grid(box, [&](PointMotion& p) {
-    p.to_x += 7;
-    if (random.below(10) < 2) p.to_x += static_cast<float>(random.uniform(-60, 60));
+    p.to.x() += 7;
+    if (random.below(10) < 2) p.to.x() += static_cast<float>(random.uniform(-60, 60));
   });
   EXPECT_NEAR(carry(one(box), motions, 1, 640, 480, kNoGrowth).boxes[0].box.x, 107, 1e-3);
 }
@@ -52,8 +52,8 @@ TEST(Carry, BoxesGrowWithWhatComesNear) {
   const Box box{100, 100, 100, 100};
   // Scaled by 1.04 about the box's middle.
   const auto motions = grid(box, [](PointMotion& p) {
-    p.to_x = 150 + 1.04f * (p.from_x - 150);
-    p.to_y = 150 + 1.04f * (p.from_y - 150);
+    p.to.x() = 150 + 1.04f * (p.from.x() - 150);
+    p.to.y() = 150 + 1.04f * (p.from.y() - 150);
   });
   const Box to = carry(one(box), motions, 1, 640, 480, kNoGrowth).boxes[0].box;
   EXPECT_NEAR(to.w, 104, 0.01);
@@ -66,7 +66,7 @@ TEST(Carry, DividedPointsStretchTheBoxOverBothMotions) {
   bool mover = false;
   const auto motions = grid(box, [&](PointMotion& p) {
     mover = !mover;
-    if (mover) p.to_x += 20;
+    if (mover) p.to.x() += 20;
   });
   const Box to = carry(one(box), motions, 1, 640, 480, kNoGrowth).boxes[0].box;
   EXPECT_LE(to.x, 101);
@@ -86,7 +86,7 @@ TEST(Carry, PointsBelongToTheSmallestBoxThatHoldsThem) {
   Detections from = one(large);
   from.boxes.push_back({"dog", small, 1});
   const auto motions = grid(large, [&](PointMotion& p) {
-    if (small.contains(p.from_x, p.from_y)) p.to_x += 10;
+    if (small.contains(p.from.x(), p.from.y())) p.to.x() += 10;
   });
   const Detections to = carry(from, motions, 1, 640, 480, kNoGrowth);
   EXPECT_EQ(to.boxes[0].box, large);
@@ -95,7 +95,7 @@ TEST(Carry, PointsBelongToTheSmallestBoxThatHoldsThem) {
 
 TEST(Carry, BoxesThatLeaveAreDroppedAndOthersClipped) {
   const Box box{0, 50, 20, 40};
-  const auto left = [&](float by) { return grid(box, [=](PointMotion& p) { p.to_x -= by; }); };
+  const auto left = [&](float by) { return grid(box, [=](PointMotion& p) { p.to.x() -= by; }); };
   EXPECT_EQ(carry(one(box), left(5), 1, 640, 480, kNoGrowth).boxes[0].box, (Box{0, 50, 15, 40}));
   EXPECT_TRUE(carry(one(box), left(30), 1, 640, 480, kNoGrowth).boxes.empty());
 }
@@ -106,7 +106,7 @@ TEST(Carry, TheMaskMovesWithItsBox) {
   for (int y = 12; y < 28; ++y)
     for (int x = 12; x < 28; ++x) from.mask(x, y) = 255;
   from.mask(50, 40) = 255;  // in no box
-  const auto motions = grid(from.boxes[0].box, [](PointMotion& p) { p.to_x += 6, p.to_y += 2; });
+  const auto motions = grid(from.boxes[0].box, [](PointMotion& p) { p.to.x() += 6, p.to.y() += 2; });
   const Detections to = carry(from, motions, 1, 64, 48, kNoGrowth);
   int count = 0;
   for (int y = 0; y < 48; ++y)
@@ -124,7 +124,7 @@ TEST(Carry, NoFramesOrNonsenseChangeNothing) {
   const Box box{100, 50, 40, 80};
   auto motions = grid(box, [](PointMotion&) {});
   EXPECT_EQ(carry(one(box), motions, 0, 640, 480), one(box));
-  motions.push_back({110, 60, std::numeric_limits<float>::quiet_NaN(), 0});
+  motions.push_back({{110, 60}, {std::numeric_limits<float>::quiet_NaN(), 0}});
   EXPECT_EQ(carry(one(box), motions, 1, 640, 480, kNoGrowth), one(box));
 }
 

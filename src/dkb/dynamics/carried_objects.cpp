@@ -40,8 +40,7 @@ std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const Im
   std::vector<PointMotion> motions;
   const auto results = flow_.track(*from.pyramid, to, points);
   for (size_t i = 0; i < points.size(); ++i)
-    if (results[i].found)
-      motions.push_back({points[i].x(), points[i].y(), results[i].position.x(), results[i].position.y()});
+    if (results[i].found) motions.push_back({points[i], results[i].position});
   return motions;
 }
 
