@@ -3,24 +3,25 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace dkb {
+namespace {
+
+constexpr std::pair<const char*, bool KeyframeTests::*> kTests[] = {{"waited", &KeyframeTests::waited},
+                                                                    {"parallax", &KeyframeTests::parallax},
+                                                                    {"votes_asked", &KeyframeTests::votes_asked},
+                                                                    {"visibility", &KeyframeTests::visibility},
+                                                                    {"spread", &KeyframeTests::spread},
+                                                                    {"few_points", &KeyframeTests::few_points},
+                                                                    {"close_points", &KeyframeTests::close_points},
+                                                                    {"view_left", &KeyframeTests::view_left}};
+
+}  // namespace
 
 const char* name_of(KeyframeRule rule) {
-  switch (rule) {
-    case KeyframeRule::first:
-      return "first";
-    case KeyframeRule::baseline:
-      return "baseline";
-    case KeyframeRule::adaptive:
-      return "adaptive";
-    case KeyframeRule::floor:
-      return "floor";
-    case KeyframeRule::own:
-      return "own";
-    case KeyframeRule::none:
-      break;
-  }
-  return "none";
+  static constexpr const char* names[] = {"none", "first", "baseline", "adaptive", "floor", "own"};
+  return names[static_cast<size_t>(rule)];
 }
 
 const char* yes_or_no(bool yes) {
@@ -42,22 +43,13 @@ std::string explained(const KeyframeDecision& decision) {
   return result + ": " + decision.explanation;
 }
 
-void KeyframeTestCounts::add(const KeyframeTests& tests) {
-  ++decisions;
-  waited += tests.waited;
-  parallax += tests.parallax;
-  votes_asked += tests.votes_asked;
-  visibility += tests.visibility;
-  spread += tests.spread;
-  few_points += tests.few_points;
-  close_points += tests.close_points;
-  view_left += tests.view_left;
+KeyframeTestCounts::KeyframeTestCounts() : by_name_{{"decisions", 0}} {
+  for (const auto& [name, test] : kTests) by_name_[name] = 0;
 }
 
-std::map<std::string, int> KeyframeTestCounts::by_name() const {
-  return {{"decisions", decisions},   {"waited", waited}, {"parallax", parallax},     {"votes_asked", votes_asked},
-          {"visibility", visibility}, {"spread", spread}, {"few_points", few_points}, {"close_points", close_points},
-          {"view_left", view_left}};
+void KeyframeTestCounts::add(const KeyframeTests& tests) {
+  ++by_name_["decisions"];
+  for (const auto& [name, test] : kTests) by_name_[name] += tests.*test;
 }
 
 }  // namespace dkb

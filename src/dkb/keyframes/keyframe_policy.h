@@ -48,12 +48,14 @@ struct KeyframeTests {
 };
 
 // How often each test spoke for a keyframe.
-struct KeyframeTestCounts {
-  int decisions = 0;
-  int waited = 0, parallax = 0, votes_asked = 0, visibility = 0, spread = 0, few_points = 0, close_points = 0,
-      view_left = 0;
+class KeyframeTestCounts {
+ public:
+  KeyframeTestCounts();
   void add(const KeyframeTests& tests);
-  std::map<std::string, int> by_name() const;
+  const std::map<std::string, int>& by_name() const { return by_name_; }  // and "decisions": how often they were made
+
+ private:
+  std::map<std::string, int> by_name_;
 };
 
 struct KeyframeDecision {

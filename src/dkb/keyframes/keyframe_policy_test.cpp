@@ -19,15 +19,11 @@ TEST(KeyframeTestCounts, CountEachTestThatSpokeForAKeyframe) {
   floor.few_points = floor.close_points = floor.view_left = true;
   counts.add(floor);
   counts.add(floor);
-  EXPECT_EQ(counts.decisions, 5);
-  EXPECT_EQ(counts.waited, 1);
-  EXPECT_EQ(counts.parallax, 2);
-  EXPECT_EQ(counts.votes_asked, 2);
-  EXPECT_EQ(counts.visibility, 1);
-  EXPECT_EQ(counts.spread, 2);
-  EXPECT_EQ(counts.few_points, 2);
-  EXPECT_EQ(counts.close_points, 2);
-  EXPECT_EQ(counts.view_left, 2);
+  const std::map<std::string, int> expected{{"decisions", 5},   {"waited", 1},       {"parallax", 2},
+                                            {"votes_asked", 2}, {"visibility", 1},   {"spread", 2},
+                                            {"few_points", 2},  {"close_points", 2}, {"view_left", 2}};
+  EXPECT_EQ(counts.by_name(), expected);
+  EXPECT_EQ(KeyframeTestCounts().by_name().size(), expected.size()) << "none is left out before it speaks";
 }
 
 TEST(KeyframeDecision, IsExplainedInOneLine) {
