@@ -23,9 +23,7 @@ double median_depth(const KeyframeContext& q) {
 
 AdaptiveKeyframeOptions paper_keyframe_options() {
   AdaptiveKeyframeOptions options;
-  options.parallax.threshold_min = 10;
-  options.parallax.threshold_max = 30;
-  options.parallax.translation_unit = TranslationUnit::centimetre;
+  options.translation_unit = TranslationUnit::centimetre;
   options.similarity = Similarity::printed;
   options.normals = NormalSum::plain;
   options.visibility_levels = 4;
@@ -36,7 +34,7 @@ AdaptiveKeyframeOptions paper_keyframe_options() {
 
 AdaptiveKeyframePolicy::AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width,
                                                int image_height)
-    : options_(options), image_width_(image_width), image_height_(image_height), gate_(options.parallax) {}
+    : options_(options), image_width_(image_width), image_height_(image_height) {}
 
 const AdaptiveKeyframePolicy::KeyframePoint* AdaptiveKeyframePolicy::find(PointId id) const {
   const auto at = std::lower_bound(keyframe_points_.begin(), keyframe_points_.end(), id,
@@ -109,7 +107,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const 
   KeyframeTests& tests = decision.tests;
   tests.waited = q.frame - q.last_keyframe_frame >= options_.min_frames_between;
   const Parallax parallax = parallax_between(q.last_keyframe_cam_from_world, q.cam_from_world,
-                                             units_per_metre(options_.parallax.translation_unit, median_depth(q)));
+                                             units_per_metre(options_.translation_unit, median_depth(q)));
   tests.parallax = gate_.passes(parallax);
 
   MatchCounts counts;

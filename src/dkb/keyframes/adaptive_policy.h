@@ -14,7 +14,7 @@ namespace dkb {
 
 // paper_keyframe_options() has the paper's numbers; docs/benchmarks.md compares both with the baseline rule.
 struct AdaptiveKeyframeOptions {
-  ParallaxGateOptions parallax;
+  TranslationUnit translation_unit = TranslationUnit::depth_percent;  // of the gate                 (DKB eq. 25)
   Similarity similarity = Similarity::pks;  // in the visibility vote                              (DKB eq. 34)
   NormalSum normals = NormalSum::oriented;  // of the map points' surfaces                         (DKB eq. 28)
   int visibility_levels = 9;                // of 10 degrees each, 2 ... 18                        (DKB eq. 32)

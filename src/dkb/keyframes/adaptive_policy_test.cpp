@@ -83,9 +83,7 @@ AdaptiveKeyframeOptions all_levels() {
   options.visibility_levels = 9;
   options.floor_reference_ratio = 0.25;
   options.floor_kept_ratio = 0;
-  options.parallax.threshold_min = 10;
-  options.parallax.threshold_max = 30;
-  options.parallax.translation_unit = TranslationUnit::centimetre;
+  options.translation_unit = TranslationUnit::centimetre;
   return options;
 }
 
@@ -212,12 +210,7 @@ TEST(AdaptiveKeyframes, TheFloorLooksAtWhatIsLeftOfTheReferenceFrame) {
 
 TEST(AdaptiveKeyframes, ThePapersNumbersStayAsPrinted) {
   const AdaptiveKeyframeOptions paper = paper_keyframe_options();
-  EXPECT_EQ(paper.parallax.window, 10);
-  EXPECT_EQ(paper.parallax.threshold_min, 10);
-  EXPECT_EQ(paper.parallax.threshold_max, 30);
-  EXPECT_EQ(paper.parallax.rotation_max, 45);
-  EXPECT_EQ(paper.parallax.translation_max, 10);
-  EXPECT_EQ(paper.parallax.translation_unit, TranslationUnit::centimetre);
+  EXPECT_EQ(paper.translation_unit, TranslationUnit::centimetre);
   EXPECT_EQ(paper.similarity, Similarity::printed);
   EXPECT_EQ(paper.visibility_levels, 4);
   EXPECT_EQ(paper.normals, NormalSum::plain);
@@ -228,7 +221,7 @@ TEST(AdaptiveKeyframes, ThePapersNumbersStayAsPrinted) {
 TEST(AdaptiveKeyframes, MayMeasureTheWayByTheDepth) {
   Wall wall;  // without depths a percent of the depth is a centimetre; with depths of 4 m the same way counts a quarter
   AdaptiveKeyframeOptions options = all_levels();
-  options.parallax.translation_unit = TranslationUnit::depth_percent;
+  options.translation_unit = TranslationUnit::depth_percent;
   const KeyframeContext unknown = wall.query(1, moved_by(0.4));
   EXPECT_NE(AdaptiveKeyframePolicy(options, 640, 480).decide(unknown, wall.map()).explanation.find("deg + 40.00"),
             std::string::npos);

@@ -5,17 +5,16 @@
 #include <cmath>
 
 namespace dkb {
+namespace {
+
+constexpr size_t kWindow = 10;                             // [frames] parallaxes averaged (DKB eqs. 17, 18)
+constexpr double kRotationMax = 45, kTranslationMax = 10;  // [deg, unit] Theta_max and t_max (DKB eq. 24)
+constexpr double kThresholdMin = 10, kThresholdMax = 30;   // [deg + unit] T in fast motion and at rest (DKB eq. 25)
+
+}  // namespace
 
 double units_per_metre(TranslationUnit unit, double median_depth) {
-  switch (unit) {
-    case TranslationUnit::metre:
-      return 1;
-    case TranslationUnit::centimetre:
-      return 100;
-    case TranslationUnit::depth_percent:
-      break;
-  }
-  return median_depth > 0 ? 100 / median_depth : 100;
+  return unit == TranslationUnit::depth_percent && median_depth > 0 ? 100 / median_depth : 100;
 }
 
 Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, double units_in_metre) {
@@ -31,24 +30,22 @@ ParallaxWeights parallax_weights(const Parallax& mean) {
   return {mean.rotation_deg / sum, mean.translation / sum};
 }
 
-double parallax_factor(const Parallax& mean, double rotation_max, double translation_max) {
+double parallax_factor(const Parallax& mean) {
   const ParallaxWeights w = parallax_weights(mean);
   const double motion = std::log(1 + w.rotation * mean.rotation_deg) + std::log(1 + w.translation * mean.translation);
-  const double largest = std::log(1 + w.rotation * rotation_max) + std::log(1 + w.translation * translation_max);
+  const double largest = std::log(1 + w.rotation * kRotationMax) + std::log(1 + w.translation * kTranslationMax);
   return largest < 1e-9 ? 0.0 : std::clamp(motion / largest, 0.0, 1.0);
 }
 
-double parallax_threshold(double factor, double threshold_min, double threshold_max) {
-  return threshold_max - factor * (threshold_max - threshold_min);
+double parallax_threshold(double factor) {
+  return kThresholdMax - factor * (kThresholdMax - kThresholdMin);
 }
-
-ParallaxGate::ParallaxGate(const ParallaxGateOptions& options) : options_(options), threshold_(options.threshold_max) {}
 
 bool ParallaxGate::passes(const Parallax& parallax) {
   window_.push_back(parallax);
-  if (static_cast<int>(window_.size()) > options_.window) window_.pop_front();
-  factor_ = parallax_factor(mean(), options_.rotation_max, options_.translation_max);
-  threshold_ = parallax_threshold(factor_, options_.threshold_min, options_.threshold_max);
+  if (window_.size() > kWindow) window_.pop_front();
+  factor_ = parallax_factor(mean());
+  threshold_ = parallax_threshold(factor_);
   return parallax.sum() >= threshold_;
 }
 

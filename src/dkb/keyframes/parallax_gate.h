@@ -9,19 +9,8 @@ namespace dkb {
 
 // What a translation of 1 is in the gate. The paper gives no unit; in metres only rotations would count.
 enum class TranslationUnit {
-  metre,
   centimetre,
   depth_percent,  // 1/100 of the median depth of the tracked points: the same change of view counts alike near and far
-};
-
-// The gate before the votes: a frame that moved little since the last keyframe is none (DKB section 3.2, eqs. 14-25).
-struct ParallaxGateOptions {
-  int window = 10;                // [frames] parallaxes averaged, >= 1                              (DKB eqs. 17, 18)
-  double threshold_min = 10.0;    // [deg + unit] parallax that opens the gate in fast motion, >= 0  (DKB eq. 25)
-  double threshold_max = 30.0;    // [deg + unit] the same at rest, >= threshold_min
-  double rotation_max = 45.0;     // [deg] Theta_max, > 0                                            (DKB eq. 24)
-  double translation_max = 10.0;  // [unit] t_max, > 0
-  TranslationUnit translation_unit = TranslationUnit::depth_percent;
 };
 
 // Motion of a frame since a keyframe.
@@ -45,16 +34,15 @@ struct ParallaxWeights {
 ParallaxWeights parallax_weights(const Parallax& mean);
 
 // DKB eqs. 21-24, clamped to 0 ... 1. A still camera, for which eq. 24 is 0/0, gives 0.
-double parallax_factor(const Parallax& mean, double rotation_max, double translation_max);
+double parallax_factor(const Parallax& mean);
 
-// DKB eq. 25: threshold_max at rest, threshold_min in fast motion.
-double parallax_threshold(double factor, double threshold_min, double threshold_max);
+// DKB eq. 25: the larger the less a camera moves.
+double parallax_threshold(double factor);
 
-// The gate with its window. Deterministic: depends on the parallaxes alone.
+// The gate before the votes: a frame that moved little since the last keyframe is none (DKB section 3.2, eqs. 14-25).
+// Deterministic: depends on the parallaxes alone.
 class ParallaxGate {
  public:
-  explicit ParallaxGate(const ParallaxGateOptions& options);
-
   // Takes the parallax of the next frame, against whichever keyframe was the last at that frame. True when it reaches
   // the threshold. Means are over the frames that are there (DKB eqs. 17, 18), this one included.
   bool passes(const Parallax& parallax);
@@ -64,9 +52,8 @@ class ParallaxGate {
   double threshold() const { return threshold_; }  // T of the last frame
 
  private:
-  ParallaxGateOptions options_;
   std::deque<Parallax> window_;
-  double factor_ = 0, threshold_;
+  double factor_ = 0, threshold_ = parallax_threshold(0);
 };
 
 }  // namespace dkb

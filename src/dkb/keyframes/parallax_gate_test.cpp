@@ -31,8 +31,7 @@ TEST(ParallaxBetween, StaysDefinedAtBothEndsOfTheArcCosine) {
   EXPECT_NEAR(parallax_between(camera_at({0, 0, 0}, 0), camera_at({0, 0, 0}, 180), 1).rotation_deg, 180, 1e-5);
 }
 
-TEST(TranslationUnits, AreMetresCentimetresOrPercentOfTheDepth) {
-  EXPECT_EQ(units_per_metre(TranslationUnit::metre, 4), 1);
+TEST(TranslationUnits, AreCentimetresOrPercentOfTheDepth) {
   EXPECT_EQ(units_per_metre(TranslationUnit::centimetre, 4), 100);
   EXPECT_EQ(units_per_metre(TranslationUnit::depth_percent, 4), 25);   // 1 m is 25% of 4 m
   EXPECT_EQ(units_per_metre(TranslationUnit::depth_percent, 0), 100);  // unknown
@@ -49,56 +48,45 @@ TEST(ParallaxWeights, ShareOutTheMotion) {  // DKB eqs. 19, 20
 TEST(ParallaxFactor, IsTheLogarithmicShareOfTheLargestMotion) {  // DKB eqs. 21-24
   // Means 3 deg and 1 cm: w = 0.75 and 0.25, M = ln(1 + 2.25) + ln(1 + 0.25) = 1.178655 + 0.223144 = 1.401799,
   // the largest is ln(1 + 0.75 * 45) + ln(1 + 0.25 * 10) = 3.548180 + 1.252763 = 4.800943, F = 0.291984.
-  EXPECT_NEAR(parallax_factor({3, 1}, 45, 10), 0.291984, 1e-5);
+  EXPECT_NEAR(parallax_factor({3, 1}), 0.291984, 1e-5);
   // A turn alone: ln(1 + 9) / ln(1 + 45) = 2.302585 / 3.828641.
-  EXPECT_NEAR(parallax_factor({9, 0}, 45, 10), 0.601411, 1e-5);
-  EXPECT_NEAR(parallax_factor({45, 0}, 45, 10), 1, 1e-5);
+  EXPECT_NEAR(parallax_factor({9, 0}), 0.601411, 1e-5);
+  EXPECT_NEAR(parallax_factor({45, 0}), 1, 1e-5);
 }
 
 TEST(ParallaxFactor, IsZeroAtRestAndAtMostOne) {
-  EXPECT_EQ(parallax_factor({0, 0}, 45, 10), 0);  // eq. 24 is 0/0
-  EXPECT_EQ(parallax_factor({90, 50}, 45, 10), 1);
+  EXPECT_EQ(parallax_factor({0, 0}), 0);  // eq. 24 is 0/0
+  EXPECT_EQ(parallax_factor({90, 50}), 1);
 }
 
 TEST(ParallaxThreshold, FallsFromTheLargestToTheSmallest) {  // DKB eq. 25
-  EXPECT_EQ(parallax_threshold(0, 10, 30), 30);
-  EXPECT_EQ(parallax_threshold(0.25, 10, 30), 25);
-  EXPECT_EQ(parallax_threshold(1, 10, 30), 10);
-}
-
-ParallaxGateOptions paper() {
-  ParallaxGateOptions options;
-  options.threshold_min = 10;
-  options.threshold_max = 30;
-  return options;
+  EXPECT_EQ(parallax_threshold(0), 30);
+  EXPECT_EQ(parallax_threshold(0.25), 25);
+  EXPECT_EQ(parallax_threshold(1), 10);
 }
 
 TEST(ParallaxGate, AveragesOverTheFramesThatAreThere) {  // DKB eqs. 17, 18
-  ParallaxGateOptions options;
-  options.window = 3;
-  ParallaxGate gate(options);
+  ParallaxGate gate;
   EXPECT_EQ(gate.mean().sum(), 0);
   gate.passes({3, 6});
   EXPECT_EQ(gate.mean().rotation_deg, 3);  // one frame: the window is not yet full
   gate.passes({5, 0});
   EXPECT_EQ(gate.mean().rotation_deg, 4);
   EXPECT_EQ(gate.mean().translation, 3);
-  gate.passes({7, 0});
-  gate.passes({9, 3});  // the first frame has left
+  for (int i = 0; i < 8; ++i) gate.passes({7, 0});
+  gate.passes({9, 10});  // of eleven frames the first has left: 5 + 8 * 7 + 9 = 70
   EXPECT_EQ(gate.mean().rotation_deg, 7);
   EXPECT_EQ(gate.mean().translation, 1);
 }
 
 TEST(ParallaxGate, OpensAtTheThreshold) {
-  ParallaxGateOptions options;
-  options.threshold_min = options.threshold_max = 20;
-  ParallaxGate gate(options);
-  EXPECT_FALSE(gate.passes({12, 7.9}));
-  EXPECT_TRUE(gate.passes({12, 8}));
+  // A turn alone: T = 30 - 20 ln(1 + 15) / ln(46) = 15.52, and 15.20 for 16 degrees.
+  EXPECT_FALSE(ParallaxGate().passes({15, 0}));
+  EXPECT_TRUE(ParallaxGate().passes({16, 0}));
 }
 
 TEST(ParallaxGate, IsWiderInFastMotion) {
-  ParallaxGate slow(paper()), fast(paper());
+  ParallaxGate slow, fast;
   for (int i = 0; i < 10; ++i) {
     slow.passes({0.1, 0.1});
     fast.passes({30, 30});
@@ -109,7 +97,7 @@ TEST(ParallaxGate, IsWiderInFastMotion) {
 }
 
 TEST(ParallaxGate, AStillCameraKeepsItShut) {
-  ParallaxGate gate(paper());
+  ParallaxGate gate;
   EXPECT_FALSE(gate.passes({0, 0}));
   EXPECT_EQ(gate.factor(), 0);
   EXPECT_EQ(gate.threshold(), 30);

@@ -125,18 +125,8 @@ void bind_experiments(Settings& s, SlamOptions& o) {
   s.bind("experiment.depth.model_rolling_shutter", &o.depth.model_rolling_shutter, "undo the rolling shutter");
 
   AdaptiveKeyframeOptions& a = o.adaptive_keyframes;
-  s.bind("experiment.keyframes.window", &a.parallax.window, "[frames] parallaxes averaged (DKB eqs. 17, 18)",
-         at_least(1));
-  s.bind("experiment.keyframes.threshold_min", &a.parallax.threshold_min,
-         "parallax that opens the gate in fast motion (DKB eq. 25)", at_least(0));
-  s.bind("experiment.keyframes.threshold_max", &a.parallax.threshold_max, "the same at rest, not below threshold_min",
-         at_least(0));
-  s.bind("experiment.keyframes.rotation_max", &a.parallax.rotation_max, "[deg] Theta_max (DKB eq. 24)", above(0));
-  s.bind("experiment.keyframes.translation_max", &a.parallax.translation_max, "[unit] t_max (DKB eq. 24)", above(0));
-  s.bind("experiment.keyframes.translation_unit", &a.parallax.translation_unit, "of translations in the gate",
-         {{"metre", TranslationUnit::metre},
-          {"centimetre", TranslationUnit::centimetre},
-          {"depth_percent", TranslationUnit::depth_percent}});
+  s.bind("experiment.keyframes.translation_unit", &a.translation_unit, "of translations in the gate",
+         {{"centimetre", TranslationUnit::centimetre}, {"depth_percent", TranslationUnit::depth_percent}});
   s.bind("experiment.keyframes.similarity", &a.similarity, "S as the paper prints it or as its source has it (eq. 34)",
          {{"printed", Similarity::printed}, {"pks", Similarity::pks}});
   s.bind("experiment.keyframes.normals", &a.normals, "turned toward the camera or summed as printed (DKB eq. 28)",
@@ -172,7 +162,10 @@ constexpr GoneSection kGone[] = {
      " candidates neighbours min_matches min_ransac_inliers radius radius_fine min_inliers min_share min_similarity "
      "min_similarity_far max_distance max_speed max_position_sd ambiguity clear_lead "},
     {"tracking.local_map", " voted_keyframes neighbours_of_each keyframes "},
-    {"keyframes", " visibility_levels floor_min_tracked floor_few_close floor_many_creatable "},
+    {"keyframes",
+     " visibility_levels floor_min_tracked floor_few_close floor_many_creatable window threshold_min threshold_max "
+     "rotation_max translation_max "},
+    {"experiment.keyframes", " window threshold_min threshold_max rotation_max translation_max "},
     {"keyframes.baseline", " frames_between min_tracked reference_ratio few_close many_creatable "},
     {"mapping",
      " min_shared_points min_found_ratio probation_keyframes min_observers redundant_observers fusion_keyframes "
@@ -353,9 +346,6 @@ void Options::check() const {
                  dense.truncation, "2 ... 20 times dense.voxel");
   require_option(dense.obstacle_high > dense.obstacle_low, "dense.obstacle_high", dense.obstacle_high,
                  "above dense.obstacle_low");
-  const ParallaxGateOptions gate = expand(*this).adaptive_keyframes.parallax;
-  require_option(gate.threshold_max >= gate.threshold_min, "experiment.keyframes.threshold_max", gate.threshold_max,
-                 "at least experiment.keyframes.threshold_min");
 }
 
 }  // namespace dkb
