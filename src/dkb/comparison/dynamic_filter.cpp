@@ -2,9 +2,14 @@
 #include "dkb/comparison/dynamic_filter.h"
 
 #include <cmath>
+#include <limits>
 
 namespace dkb {
 namespace {
+
+// DKB eq. 13.
+constexpr double kSpreadLimit = 8.0;          // s below which the narrow threshold holds
+constexpr double kNarrow = 2.8, kWide = 9.0;  // delta there, and elsewhere
 
 constexpr double kMaxEpipolarDistance = 1.0;  // [px] of what stands still
 constexpr double kDepthJump = 0.4;  // [m] before what was seen there: something moved in (DynaSLAM, RA-L 2018)
@@ -45,10 +50,42 @@ std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<
   return box;
 }
 
-std::vector<uint8_t> box_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes) {
-  std::vector<uint8_t> dynamic(features.size(), 0);
-  const auto box = box_of_each(features, boxes);
-  for (size_t i = 0; i < features.size(); ++i) dynamic[i] = box[i] >= 0;
+DepthSpread depth_spread(std::span<const double> depths) {
+  DepthSpread s;
+  if (depths.size() < 5) return s;
+  for (double d : depths) s.mean += d;
+  s.mean /= static_cast<double>(depths.size());
+  double all = 0, high = 0, low = 0;
+  size_t highs = 0, lows = 0;
+  for (double d : depths) {
+    const double square = (d - s.mean) * (d - s.mean);
+    all += square;
+    if (d > s.mean) {
+      high += square;
+      ++highs;
+    } else if (d < s.mean) {
+      low += square;
+      ++lows;
+    }
+  }
+  s.sigma = std::sqrt(all / static_cast<double>(depths.size()));
+  if (!(s.sigma > 1e-12)) return s;
+  const double sigma_h = highs > 0 ? std::sqrt(high / static_cast<double>(highs)) : 0;
+  const double sigma_l = lows > 0 ? std::sqrt(low / static_cast<double>(lows)) : 0;
+  s.ratio = sigma_l > 0 ? sigma_h / sigma_l : std::numeric_limits<double>::infinity();
+  s.delta = s.ratio < kSpreadLimit ? kNarrow : kWide;
+  s.usable = true;
+  return s;
+}
+
+std::vector<uint8_t> depth_test(std::span<const double> depths) {
+  std::vector<uint8_t> dynamic(depths.size(), 0);
+  const DepthSpread s = depth_spread(depths);
+  if (!s.usable) return dynamic;
+  for (size_t i = 0; i < depths.size(); ++i) {
+    const double th = (depths[i] - s.mean) / s.sigma;
+    dynamic[i] = th * th > s.delta;
+  }
   return dynamic;
 }
 

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "dkb/comparison/paper_filter.h"
 #include "dkb/detection/detection.h"
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
@@ -27,12 +26,27 @@ struct FilterFeature {
 // Index of the smallest box that holds each feature, -1 = none.
 std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<const Detection> boxes);
 
-// 1 = dynamic, per feature.
-std::vector<uint8_t> box_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes);
+// Statistics of the depths of one box (DKB eqs. 10, 11 and the text before 12).
+struct DepthSpread {
+  double mean = 0;      // [m] mu
+  double sigma = 0;     // [m]
+  double ratio = 0;     // s = sigma_h / sigma_l, about mu; infinity when sigma_l = 0
+  double delta = 0;     // eq. 13
+  bool usable = false;  // false: fewer than 5 depths or sigma = 0, the test says nothing
+};
+DepthSpread depth_spread(std::span<const double> depths);
 
-// The paper's filter (eqs. 9-13): flow residual against the camera's motion, then the depth test on what is left in
-// each box. `current_from_previous`: motion of the camera between the two images. Without depth, distance to the
-// epipolar line.
+// 1 = dynamic for each depth, by ((d - mu) / sigma)^2 > delta (DKB eqs. 12, 13).
+std::vector<uint8_t> depth_test(std::span<const double> depths);
+
+struct PaperFilterOptions {
+  double flow_threshold = 1.0;  // [px] d_th of DKB eq. 9, > 0
+  bool compensate = true;       // flow against the camera's own motion; false: raw eq. 9, for ablation only
+};
+
+// Filters give 1 = dynamic for each feature. The paper's (eqs. 9-13): flow residual against the camera's motion, then
+// the depth test on what is left in each box. `current_from_previous`: motion of the camera between the two images.
+// Without depth, distance to the epipolar line.
 std::vector<uint8_t> paper_filter(std::span<const FilterFeature> features, std::span<const Detection> boxes,
                                   const CameraModel& camera, const Rigid3& current_from_previous,
                                   const PaperFilterOptions& options);

@@ -71,9 +71,13 @@ Rigid3 RivalFilter::own_motion(const std::vector<FilterFeature>& features, const
 
 std::vector<uint8_t> RivalFilter::dynamic(const RivalFilterInput& input) const {
   const std::vector<FilterFeature> features = describe(input);
+  std::vector<uint8_t> dynamic(features.size(), 0);
   switch (kind_) {
-    case FilterKind::box:
-      return box_filter(features, input.boxes);
+    case FilterKind::box: {
+      const std::vector<int> box = box_of_each(features, input.boxes);
+      std::transform(box.begin(), box.end(), dynamic.begin(), [](int b) { return b >= 0; });
+      break;
+    }
     case FilterKind::epipolar:
       return epipolar_filter(features, input.boxes, camera_, own_motion(features, input));
     case FilterKind::paper:
@@ -84,7 +88,7 @@ std::vector<uint8_t> RivalFilter::dynamic(const RivalFilterInput& input) const {
     case FilterKind::standard:
       break;
   }
-  return std::vector<uint8_t>(features.size(), 0);
+  return dynamic;
 }
 
 }  // namespace dkb
