@@ -66,9 +66,8 @@ class PlaneSums {
   Eigen::Matrix4f places_ = Eigen::Matrix4f::Zero();
 };
 
-// How much more the distances of a block's cells vary together than they would if each had the sensor's noise of its
-// own: 1 for such noise, more where the surfaces differ by more than that, where the noise hangs together and where
-// somebody moves (the design effect of cluster samples; Kish, Survey Sampling, 1965, section 5.4).
+// How much more the distances of a block's cells vary together than if each had the sensor's noise of its own, which
+// gives 1 (the design effect of cluster samples; Kish, Survey Sampling, 1965, section 5.4).
 class HangingTogether {
  public:
   HangingTogether(int width, int height)
@@ -104,8 +103,7 @@ class HangingTogether {
 };
 
 // Takes the part of noise out of the information. A direction of which more than half is noise is left to the
-// expectation: along a corridor the noise of a thousand normals would hold the camera where it was. Directions are
-// those of the information in units of the expectation's standard deviations.
+// expectation. Directions are those of the information in units of the expectation's standard deviations.
 void keep_what_is_known(const Matrix6d& expected_covariance, const Matrix6d& noise, Matrix6d* information,
                         Vector6d* gradient) {
   const Matrix6d unit = cholesky_root(expected_covariance), whitened = inverse(unit);

@@ -25,10 +25,8 @@ struct MotionOptions {
   double threshold = 0.5;  // score from which a cell moves; one frame adds at most 1, (0, 2]
 };
 
-// Finds what moves against the camera's own motion, of any class, without a model: people, a pushed chair, a carried
-// box. A surface in space that an earlier view saw empty has come in; its evidence is shared with what it hangs
-// together with, and carried along with the surface, so that who stops moving stays marked for seconds. Who is there
-// from the first frame is found once his outline has moved by some cells, large things later than small ones.
+// Finds what moves against the camera's own motion, of any class, without a model: surfaces in space that an earlier
+// view saw empty, with what they hang together with (docs/method.md). Who stops moving stays marked for seconds.
 //
 // Works on depth alone, on a coarse grid. Deterministic. Keeps its buffers from frame to frame; one object per thread.
 // Calls alternate: observe() with the expected pose, then commit() with the one that tracking found.
