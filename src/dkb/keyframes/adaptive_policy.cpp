@@ -10,6 +10,8 @@
 namespace dkb {
 namespace {
 
+constexpr int kFewTracked = 50;  // [points] fewer tracked ones call for a keyframe
+
 // Median depth [m] of the features that show a map point; 0 when none has a depth.
 double median_depth(const KeyframeContext& q) {
   std::vector<float> depths;
@@ -124,9 +126,8 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const 
     tests.visibility = visibility.votes;
     tests.spread = spread.votes;
   }
-  tests.few_points = q.tracked_points < options_.floor_min_tracked;
-  tests.close_points =
-      q.tracked_close_points < options_.floor_few_close && q.creatable_close_points >= options_.floor_many_creatable;
+  tests.few_points = q.tracked_points < kFewTracked;
+  tests.close_points = q.tracked_close_points < kFewClose && q.creatable_close_points >= kManyCreatable;
   tests.view_left = q.tracked_points < options_.floor_reference_ratio * q.reference_points ||
                     q.tracked_points < options_.floor_kept_ratio * reference_.tracked_points;
 
@@ -156,10 +157,9 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const 
   decision.explanation += fmt::format(
       "tracked {} (at least {}: {}), at least {} of the reference's {} and {} of {} after the last keyframe: {}; close "
       "{} (+{}), not below {} with +{}: {}",
-      q.tracked_points, options_.floor_min_tracked, yes_or_no(!tests.few_points), options_.floor_reference_ratio,
-      q.reference_points, options_.floor_kept_ratio, reference_.tracked_points, yes_or_no(!tests.view_left),
-      q.tracked_close_points, q.creatable_close_points, options_.floor_few_close, options_.floor_many_creatable,
-      yes_or_no(!tests.close_points));
+      q.tracked_points, kFewTracked, yes_or_no(!tests.few_points), options_.floor_reference_ratio, q.reference_points,
+      options_.floor_kept_ratio, reference_.tracked_points, yes_or_no(!tests.view_left), q.tracked_close_points,
+      q.creatable_close_points, kFewClose, kManyCreatable, yes_or_no(!tests.close_points));
   return decision;
 }
 

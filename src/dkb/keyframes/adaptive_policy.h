@@ -19,11 +19,9 @@ struct AdaptiveKeyframeOptions {
   NormalSum normals = NormalSum::oriented;  // of the map points' surfaces                         (DKB eq. 28)
   int visibility_levels = 9;                // of 10 degrees each, 2 ... 18                        (DKB eq. 32)
   int min_frames_between = 2;               // [frames] from a keyframe to the next, whoever asks for it, >= 1
-  // The safety floor: keyframes are made, whatever the votes, while tracking is in danger.
-  int floor_min_tracked = 50;          // [points] fewer tracked points, >= 0
-  int floor_few_close = 100;           // [points] fewer tracked close points ..., >= 0
-  int floor_many_creatable = 70;       // [points] ... while at least so many could be made, >= 0
-  double floor_reference_ratio = 0.7;  // or a smaller share of the reference keyframe's points, 0 ... 1
+  // The safety floor: keyframes are made, whatever the votes, while tracking is in danger: with few points, few close
+  // ones while many could be made, or ...
+  double floor_reference_ratio = 0.7;  // a smaller share of the reference keyframe's points, 0 ... 1
   double floor_kept_ratio = 0.5;       // or of the points tracked in the first frame after the last keyframe, 0 ... 1
 };
 

@@ -160,18 +160,14 @@ TEST(AdaptiveKeyframes, LeaveItToTheFloorUntilTheLastKeyframeIsMapped) {
 
 TEST(AdaptiveKeyframes, HaveNoVoteWithoutMatches) {
   Wall wall;
-  AdaptiveKeyframeOptions options = all_levels();
-  options.floor_min_tracked = 0;
-  options.floor_few_close = 0;
-  options.floor_reference_ratio = 0;
-  AdaptiveKeyframePolicy policy(options, 640, 480);
+  AdaptiveKeyframePolicy policy(all_levels(), 640, 480);
   policy.decide(wall.query(1, {}), wall.map());
   const KeyframeDecision d = policy.decide(wall.query(2, moved_by(0.6), 0), wall.map());  // n_matches = 0
   EXPECT_TRUE(d.tests.parallax);
   EXPECT_FALSE(d.tests.visibility);
   EXPECT_FALSE(d.tests.spread);
-  EXPECT_FALSE(d.insert);
-  AdaptiveKeyframePolicy blind(options, 640, 480);
+  EXPECT_EQ(d.rule, KeyframeRule::floor);
+  AdaptiveKeyframePolicy blind(all_levels(), 640, 480);
   blind.decide(wall.query(1, {}, 0), wall.map());  // r = C = 0
   EXPECT_FALSE(blind.decide(wall.query(2, moved_by(0.6)), wall.map()).tests.visibility);
 }

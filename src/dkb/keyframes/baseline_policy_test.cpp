@@ -23,7 +23,7 @@ KeyframeContext due() {
 
 KeyframeDecision decide(const KeyframeContext& q) {
   const Map map;
-  return BaselineKeyframePolicy({}).decide(q, map);
+  return BaselineKeyframePolicy().decide(q, map);
 }
 
 TEST(BaselineKeyframes, AreMadeWhenTheReferencesViewIsLeft) {
@@ -85,21 +85,6 @@ TEST(BaselineKeyframes, NeedEnoughTrackedPoints) {
   EXPECT_TRUE(decide(q).insert);
   q.tracked_points = 49;
   EXPECT_FALSE(decide(q).insert);
-}
-
-TEST(BaselineKeyframes, EveryNumberIsAnOption) {
-  BaselineKeyframeOptions options;
-  options.reference_ratio = 0.5;
-  const Map map;
-  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);  // 169 of 200 is more than half
-  options = {};
-  options.min_tracked = 170;
-  EXPECT_FALSE(BaselineKeyframePolicy(options).decide(due(), map).insert);
-  options = {};
-  options.frames_between = 5;
-  KeyframeContext q = due();
-  q.mapper_idle = false;
-  EXPECT_TRUE(BaselineKeyframePolicy(options).decide(q, map).insert);  // 10 frames since the last one
 }
 
 }  // namespace

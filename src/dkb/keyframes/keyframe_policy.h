@@ -38,6 +38,10 @@ enum class KeyframeRule { none, first, baseline, adaptive, floor, own };
 const char* name_of(KeyframeRule rule);
 const char* yes_or_no(bool yes);  // for explanations
 
+// [points] Fewer tracked close points, while at least so many could be made, call for a keyframe: as published with
+// ORB-SLAM2 for RGB-D cameras.
+constexpr int kFewClose = 100, kManyCreatable = 70;
+
 // Which tests spoke for a keyframe. The baseline rule has no gate and no votes, and its few_points speaks against one.
 struct KeyframeTests {
   bool waited = false;       // long enough since the last keyframe
@@ -79,21 +83,9 @@ class KeyframeDecider {
 };
 
 // The rule published with ORB-SLAM2 (T-RO 2017) for RGB-D cameras, as restated in DKB section 3.2.
-struct BaselineKeyframeOptions {
-  int frames_between = 20;  // [frames] longest wait while mapping is busy; also the wait after a relocalisation, >= 1
-  int min_tracked = 50;     // [points] fewer tracked points make no keyframe, >= 0
-  // Insert when fewer points are tracked than this share of the reference keyframe's, 0 ... 1. Published: 0.9, for
-  // another matcher; with ours 0.85 gives as many keyframes as ORB-SLAM3 makes (35 to 39 on fr1_xyz's first 9 s).
-  double reference_ratio = 0.85;
-};
-
 class BaselineKeyframePolicy final : public KeyframeDecider {
  public:
-  explicit BaselineKeyframePolicy(BaselineKeyframeOptions options);
   KeyframeDecision decide(const KeyframeContext& query, const Map& map) override;
-
- private:
-  BaselineKeyframeOptions options_;
 };
 
 }  // namespace dkb

@@ -36,7 +36,6 @@ struct SlamOptions {
   TrackingOptions tracking;
   KeyframePolicyKind keyframe_policy = KeyframePolicyKind::adaptive;
   AdaptiveKeyframeOptions adaptive_keyframes;
-  BaselineKeyframeOptions baseline_keyframes;
   MappingOptions mapping;
   LoopStageOptions loop_closing;
   ReadoutOptions readout;

@@ -19,7 +19,7 @@ std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
   if (context.options.keyframe_policy == KeyframePolicyKind::adaptive)
     return std::make_unique<AdaptiveKeyframePolicy>(context.options.adaptive_keyframes, context.camera.width,
                                                     context.camera.height);
-  return std::make_unique<BaselineKeyframePolicy>(context.options.baseline_keyframes);
+  return std::make_unique<BaselineKeyframePolicy>();
 }
 
 ReadoutOptions readout_options(const SlamOptions& options) {
