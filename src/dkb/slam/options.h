@@ -13,7 +13,6 @@
 #include "dkb/keyframes/keyframe_policy.h"
 #include "dkb/mapping/local_mapper.h"
 #include "dkb/slam/loop_stage.h"
-#include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/scene_stage.h"
 #include "dkb/tracking/tracker.h"
 #include "dkb_slam/options.h"
@@ -38,7 +37,7 @@ struct SlamOptions {
   AdaptiveKeyframeOptions adaptive_keyframes;
   MappingOptions mapping;
   LoopStageOptions loop_closing;
-  ReadoutOptions readout;
+  bool estimate_readout = true;   // of the rolling shutter, when the camera's file does not tell it
   bool final_ba = false;          // adjust the whole map once more at the end
   bool smooth_trajectory = true;  // let the poses of the final trajectory smooth each other
   DynamicsOptions dynamics;

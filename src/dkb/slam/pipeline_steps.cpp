@@ -22,12 +22,6 @@ std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
   return std::make_unique<BaselineKeyframePolicy>();
 }
 
-ReadoutOptions readout_options(const SlamOptions& options) {
-  ReadoutOptions readout = options.readout;
-  readout.estimate = readout.estimate && options.depth.model_rolling_shutter;
-  return readout;
-}
-
 Optics optics_of(const PipelineContext& context) {
   const SlamOptions& o = context.options;
   return {context.camera, o.noise, o.features.scale, o.features.levels};
@@ -46,7 +40,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       decider_(make_decider(context)),
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
-      readout_(optics_of(context), readout_options(options_)),
+      readout_(optics_of(context), options_.estimate_readout && options_.depth.model_rolling_shutter),
       movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),

@@ -16,9 +16,9 @@ constexpr double kExpectedReadout = kMaxReadout / 2;
 constexpr double kExpectedVariance = kMaxReadout * kMaxReadout / 12;
 }  // namespace
 
-ReadoutCalibration::ReadoutCalibration(const Optics& optics, const ReadoutOptions& options)
+ReadoutCalibration::ReadoutCalibration(const Optics& optics, bool estimate)
     : optics_(optics),
-      known_(optics.camera.readout > 0 || !options.estimate),
+      known_(optics.camera.readout > 0 || !estimate),
       readout_(known_ ? optics.camera.readout : kExpectedReadout),
       information_(1 / kExpectedVariance) {}
 

@@ -10,10 +10,6 @@
 
 namespace dkb {
 
-struct ReadoutOptions {
-  bool estimate = true;  // when the camera's file does not tell the readout
-};
-
 // Learns how long a rolling shutter takes from the first row to the last, while the camera is in use. Rows that are
 // exposed early or late show their points off by the image's motion times the row's delay; what a pose cannot explain
 // of that pattern tells the delay. Recursive least squares with the pose of each frame eliminated. The map was made
@@ -21,7 +17,8 @@ struct ReadoutOptions {
 // Deterministic.
 class ReadoutCalibration {
  public:
-  ReadoutCalibration(const Optics& optics, const ReadoutOptions& options);
+  // `estimate`: when the camera's file does not tell the readout.
+  ReadoutCalibration(const Optics& optics, bool estimate);
 
   // [s] to be used for the next frame; the camera file's own where it has one.
   double readout() const { return readout_; }

@@ -14,12 +14,11 @@ namespace {
 // Frames of a scene under motion that changes, with rows exposed late by `readout`, of which what is known was taken
 // out. `outlines`: every second corner lies beside a depth step and slides with the camera, the lower in the image the
 // more.
-double calibrated(double readout, ReadoutOptions options = {}, double file = 0, int frames = 60,
-                  bool outlines = false) {
+double calibrated(double readout, bool estimate = true, double file = 0, int frames = 60, bool outlines = false) {
   const TestScene scene(500);
   Optics optics = scene.optics();
   optics.camera.readout = file;
-  ReadoutCalibration calibration(optics, options);
+  ReadoutCalibration calibration(optics, estimate);
   for (int n = 0; n < frames; ++n) {
     Vector6d velocity;
     velocity << 0.3 * std::sin(0.3 * n), 0.1, 0.2 * std::cos(0.2 * n), 0.2 * std::sin(0.5 * n), 0.7 * std::cos(0.4 * n),
@@ -54,23 +53,23 @@ TEST(ReadoutCalibration, FindsTheReadoutWithinAMillisecond) {
 }
 
 TEST(ReadoutCalibration, KnowsMostOfItAfterHalfASecond) {
-  EXPECT_NEAR(calibrated(0.02, {}, 0, 15), 0.02, 3e-3);
+  EXPECT_NEAR(calibrated(0.02, true, 0, 15), 0.02, 3e-3);
 }
 
 TEST(ReadoutCalibration, CornersThatSlideAlongOutlinesTellNothing) {
-  EXPECT_NEAR(calibrated(0.012, {}, 0, 60, true), 0.012, 1e-3);
+  EXPECT_NEAR(calibrated(0.012, true, 0, 60, true), 0.012, 1e-3);
 }
 
 TEST(ReadoutCalibration, BeforeAnythingIsSeenAllReadoutsAreAsLikely) {
-  EXPECT_DOUBLE_EQ(calibrated(0.02, {}, 0, 0), 0.0165);
+  EXPECT_DOUBLE_EQ(calibrated(0.02, true, 0, 0), 0.0165);
 }
 
 TEST(ReadoutCalibration, ACameraThatTellsItsReadoutIsBelieved) {
-  EXPECT_EQ(calibrated(0.02, {}, 0.01), 0.01);
+  EXPECT_EQ(calibrated(0.02, true, 0.01), 0.01);
 }
 
 TEST(ReadoutCalibration, StaysOutWhenItIsNotWanted) {
-  EXPECT_EQ(calibrated(0.02, {.estimate = false}), 0.0);
+  EXPECT_EQ(calibrated(0.02, false), 0.0);
 }
 
 TEST(ReadoutCalibration, NeverLeavesWhatIsBelievable) {
