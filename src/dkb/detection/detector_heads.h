@@ -25,7 +25,7 @@ struct Prediction {
 // The predictions that are asked for.
 struct Wanted {
   std::vector<bool> classes;  // by number
-  float min_score = 0.25f;
+  float min_score = 0.25f;    // of objectness x class score
   bool takes(int class_id, float score) const {
     return score >= min_score && static_cast<size_t>(class_id) < classes.size() &&
            classes[static_cast<size_t>(class_id)];

@@ -17,8 +17,9 @@
 namespace dkb {
 namespace {
 
-constexpr int kStep = 32;            // [px] sizes are chosen in steps of the largest stride of YOLO heads
-constexpr int kMaxInputSize = 4096;  // [px] 200 MB of floats
+constexpr int kStep = 32;             // [px] sizes are chosen in steps of the largest stride of YOLO heads
+constexpr int kMaxInputSize = 4096;   // [px] 200 MB of floats
+constexpr float kMaxOverlap = 0.45f;  // intersection over union: the weaker of two boxes of a class is dropped above
 // [px] Inputs that open graphs are tried at. 96, since a smaller one has as many cells as a head may have channels: 84
 // at 64 px, where YOLOv8 has 4 + 80. 640, since transformers often keep to the size they were trained for.
 constexpr int kProbes[] = {96, 640};
@@ -133,38 +134,18 @@ std::pair<int, int> declared_input(const OnnxInput& input, const std::string& na
 
 }  // namespace
 
-void OnnxOptions::check() const {
-  require_option(input_size == 0 || (input_size >= kStep && input_size <= kMaxInputSize && input_size % kStep == 0),
-                 "input_size", input_size, "0 or a multiple of 32 up to 4096");
-  require_option(min_score > 0 && min_score < 1, "min_score", min_score, "within (0, 1)");
-  require_option(max_overlap > 0 && max_overlap <= 1, "max_overlap", max_overlap, "within (0, 1]");
-}
-
 OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : options_(options) {
-  options_.check();
   require_option(width > 0, "width", width, "positive");
   require_option(height > 0, "height", height, "positive");
   const std::string name = options_.model.string();
   const std::string bytes = read_file(options_.model);
   const OnnxInput input = read_onnx_input(bytes, name);
-  const auto declared = declared_input(input, name);
+  std::tie(input_width_, input_height_) = declared_input(input, name);
   if (!options_.labels.empty()) labels_ = read_labels(options_.labels);
   network_ = open_network(options_.inference, bytes, input, name);
   model_bytes_ = bytes.size();
-  if (options_.input_size != 0)
-    std::tie(input_width_, input_height_) = input_for(options_.input_size, width, height);
-  else if (declared.first != 0)
-    std::tie(input_width_, input_height_) = declared;
-  else
-    std::tie(input_width_, input_height_) = usual_input(*network_, width, height);
-  const auto outputs = [&] {
-    try {
-      return try_out(*network_, input_width_, input_height_);
-    } catch (const InputError& e) {
-      if (options_.input_size == 0) throw;
-      throw InputError(std::string(e.what()) + "; or leave input_size at 0");
-    }
-  }();
+  if (input_width_ == 0) std::tie(input_width_, input_height_) = usual_input(*network_, width, height);
+  const auto outputs = try_out(*network_, input_width_, input_height_);
   const auto layout = recognise_head(outputs, input_width_, input_height_);
   const bool whole = input_width_ % kStep == 0 && input_height_ % kStep == 0;
   if (!layout)
@@ -172,8 +153,7 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
                      std::to_string(input_width_) + " x " + std::to_string(input_height_) + " px" +
                      (whole ? "" : ", where YOLO heads need multiples of 32") +
                      "); export it without NMS as one of: " + known_heads() +
-                     (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : "") +
-                     (options_.input_size == 0 ? "" : ", or leave input_size at 0"));
+                     (inference() == Inference::opencv ? ", transformers (DETR) for ONNX Runtime alone" : ""));
   layout_ = *layout;
   const bool as_in_coco = layout_.head->numbered_as_in_coco, own_labels = !options_.labels.empty();
   if (!own_labels) labels_ = as_in_coco ? numbered_coco_labels() : coco_labels();
@@ -185,7 +165,7 @@ OnnxDetector::OnnxDetector(const OnnxOptions& options, int width, int height) : 
                                std::to_string(classes) + " classes of " + name + "; write one per class and line"
                          : name + ": the graph scores " + std::to_string(classes) + " classes, COCO has " +
                                std::to_string(labels_.size()) + "; give a file with its labels");
-  wanted_ = {movable_classes(options_, labels_), options_.min_score};
+  wanted_.classes = movable_classes(options_, labels_);
 }
 
 int OnnxDetector::frames_per_detection(double frames_per_second) const {
@@ -211,7 +191,7 @@ Detections OnnxDetector::detect(const DetectorInput& image) {
                      "); export it with outputs of fixed size");
   std::vector<Prediction> predictions = head.decode(layout_, outputs, input_width_, input_height_, wanted_);
   Detections found;
-  for (const Prediction& p : suppress_overlaps(std::move(predictions), head.transformer ? 1 : options_.max_overlap)) {
+  for (const Prediction& p : suppress_overlaps(std::move(predictions), head.transformer ? 1 : kMaxOverlap)) {
     const Box box = clip(letterbox.to_image(p.box), image.grey.width, image.grey.height);
     if (!(box.w > 0 && box.h > 0)) continue;
     found.boxes.push_back({labels_[static_cast<size_t>(p.class_id)], box, p.score});

@@ -21,16 +21,7 @@ struct OnnxOptions {
   std::filesystem::path model;            // ONNX file
   std::filesystem::path labels;           // class names, one per line, in the graph's order; empty = COCO's
   std::string classes = kMovableClasses;  // classes that may move, by comma
-  // [px] longer side of the network's input, multiple of 32, <= 4096; the other side follows the images' shape. 0 = as
-  // the graph says, or where it leaves the size open what is usual for its head (DetectorHead::usual_input). Many
-  // graphs run at other sizes than they say; one that does not is an error. ONNX Runtime holds a graph to the size that
-  // it says.
-  int input_size = 0;
-  float min_score = 0.25f;  // objectness x class score that a detection must reach, in (0, 1)
-  float max_overlap =
-      0.45f;  // intersection over union above which the weaker of two boxes of a class is dropped, (0, 1]
   Inference inference = Inference::automatic;
-  void check() const;
 };
 
 // Detector `yolo`, alias `network`: an ONNX graph with one of detector_heads(), told by its outputs, whose masks go
@@ -39,10 +30,10 @@ struct OnnxOptions {
 // count to 1 and silences its log, so that runs are repeatable.
 class OnnxDetector final : public Detector {
  public:
-  // `width` x `height` [px]: size of the images to come; a graph with open input size gets their shape. Throws
-  // InputError, one line naming the file, when the model is missing, truncated or no ONNX, when one of its layers
-  // cannot be run (named), when it has no known head, when labels do not match it, and when nothing is here that runs
-  // networks.
+  // `width` x `height` [px]: size of the images to come; a graph with open input size gets their shape, in the size
+  // that is usual for its head (DetectorHead::usual_input). Throws InputError, one line naming the file, when the model
+  // is missing, truncated or no ONNX, when one of its layers cannot be run (named), when it has no known head, when
+  // labels do not match it, and when nothing is here that runs networks.
   OnnxDetector(const OnnxOptions& options, int width, int height);
 
   // Throws InputError for an image without pixels and when the network fails.

@@ -98,28 +98,6 @@ TEST_P(OnnxDetectorTest, OpenYoloxGraphsTakeTheImagesShapeAt416) {
   EXPECT_NEAR(found.boxes[129].box.h, 24 * 480.0 / 312, 1e-2);
 }
 
-TEST_P(OnnxDetectorTest, InputSizeOverridesWhatTheGraphSays) {
-  std::vector<float> cell(85, 0.0f);
-  OnnxOptions options = write(yolox_graph(416, 416, cell));
-  EXPECT_EQ(OnnxDetector(options, 640, 480).input_height(), 416);
-  options.input_size = 320;
-  if (GetParam() == Inference::onnxruntime) {  // holds a graph to what it says
-    EXPECT_NE(error_of(options).find("leave input_size at 0"), std::string::npos);
-    return;
-  }
-  const OnnxDetector detector(options, 480, 640);
-  EXPECT_EQ(detector.input_width(), 256);  // 320 x 480 / 640 = 240, rounded up
-  EXPECT_EQ(detector.input_height(), 320);
-  options.input_size = 100;
-  EXPECT_THROW(OnnxDetector(options, 640, 480), InvalidOption);
-}
-
-TEST_P(OnnxDetectorTest, SizesThatTheGraphCannotRunAreRefused) {
-  OnnxOptions options = write(one_box(3, 80, 1.0f));  // always puts out the head of 96 x 64
-  options.input_size = 128;
-  EXPECT_NE(error_of(options).find("leave input_size at 0"), std::string::npos);
-}
-
 TEST_P(OnnxDetectorTest, OnlyMovableClassesAreGiven) {
   OnnxOptions options = write(one_box(3, 80, 1.0f));
   options.classes = "chair, dog";
