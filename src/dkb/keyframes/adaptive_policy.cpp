@@ -145,7 +145,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const 
   if (!tests.votes_asked)
     decision.explanation +=
         tests.parallax && tests.waited ? "no votes before the last keyframe is in the map; " : "votes not asked; ";
-  else if (counts.matches == 0 || counts.reference_matches == 0 || counts.reference_points == 0)
+  else if (!visibility.defined)
     decision.explanation += "no votes without matches; ";
   else
     decision.explanation += fmt::format(

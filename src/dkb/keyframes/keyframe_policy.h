@@ -29,9 +29,8 @@ struct KeyframeContext {
   // Inliers: what was matched and where.
   const std::vector<PointId>* points = nullptr;  // per feature; kNoPoint where nothing was matched
   const RgbdFeatures* features = nullptr;
-  const std::vector<std::optional<Eigen::Vector3d>>* positions =
-      nullptr;           // per feature: of its point [m]; a user's rule alone gets them
-  bool explain = false;  // fill KeyframeDecision::explanation
+  std::vector<std::optional<Eigen::Vector3d>> positions;  // [m] per feature: of its point; for a user's rule alone
+  bool explain = false;                                   // fill KeyframeDecision::explanation
 };
 
 enum class KeyframeRule { none, first, baseline, adaptive, floor, own };

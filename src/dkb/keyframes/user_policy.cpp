@@ -23,18 +23,14 @@ KeyframeDecision UserKeyframeDecider::decide(const KeyframeContext& context, con
   std::sort(in_last.begin(), in_last.end());
   for (size_t f = 0; f < context.points->size(); ++f) {
     const PointId id = (*context.points)[f];
-    if (id == kNoPoint || !(*context.positions)[f]) continue;
+    if (id == kNoPoint || !context.positions[f]) continue;
     const MapPoint* p = map.point(id);
-    q.points.push_back({context.features->keypoints[f].pixel, *(*context.positions)[f],
+    q.points.push_back({context.features->keypoints[f].pixel, *context.positions[f],
                         p == nullptr ? 0 : static_cast<int>(p->observations.size()),
                         std::binary_search(in_last.begin(), in_last.end(), id)});
   }
   KeyframeAnswer answer = policy_->decide(q);
-  KeyframeDecision decision;
-  decision.insert = answer.insert;
-  decision.rule = answer.insert ? KeyframeRule::own : KeyframeRule::none;
-  decision.explanation = std::move(answer.explanation);
-  return decision;
+  return {answer.insert, answer.insert ? KeyframeRule::own : KeyframeRule::none, std::move(answer.explanation)};
 }
 
 }  // namespace dkb

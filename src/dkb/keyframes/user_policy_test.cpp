@@ -39,7 +39,7 @@ class UserPolicyTest : public ::testing::Test {
     map.add_point(p);
     map.observe(p.id, 0, 0);
     points = {kNoPoint, make_point_id(0, 0), make_point_id(0, 1), make_point_id(0, 2)};
-    positions = {std::nullopt, Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(1, 0, 2), std::nullopt};
+    context.positions = {std::nullopt, Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(1, 0, 2), std::nullopt};
     context.frame = 25;
     context.last_keyframe_frame = 20;
     context.stamp_ns = 1'500'000'000;
@@ -53,13 +53,11 @@ class UserPolicyTest : public ::testing::Test {
     context.last_keyframe_cam_from_world.translation = {-2, 0, 0};
     context.points = &points;
     context.features = features.get();
-    context.positions = &positions;
   }
 
   Map map;
   std::shared_ptr<RgbdFeatures> features;
   std::vector<PointId> points;
-  std::vector<std::optional<Eigen::Vector3d>> positions;
   KeyframeContext context;
   std::shared_ptr<ScriptedPolicy> policy = std::make_shared<ScriptedPolicy>();
 };

@@ -290,9 +290,7 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     c.points = &tracked.points;
     c.features = tracked.features.get();
     c.explain = explain_keyframes_;
-    const auto positions =
-        context_.policy ? tracker_.positions(tracked.points) : std::vector<std::optional<Eigen::Vector3d>>();
-    c.positions = &positions;
+    if (context_.policy) c.positions = tracker_.positions(tracked.points);
     decision = decider_->decide(c, tracker_.map().view());
     record_.add(decision.tests);
     if (options_.pipeline.realtime && static_cast<int>(mapping_.outstanding()) >= options_.pipeline.mapper_queue) {
