@@ -63,19 +63,6 @@ BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height)
   return parse_boxes(read_file(path), path.string(), width, height);
 }
 
-std::string boxes_to_text(const BoxesByTime& boxes) {
-  std::string out = "# rgb_timestamp class x y w h score\n";
-  for (const TimedBoxes& at : boxes)
-    for (const Detection& d : at.boxes) {
-      std::string class_name = d.class_name.empty() ? "object" : d.class_name;
-      std::replace_if(
-          class_name.begin(), class_name.end(), [](unsigned char c) { return c <= 0x20; }, '_');
-      out += fmt::format("{:.6f} {} {:.2f} {:.2f} {:.2f} {:.2f} {:.3f}\n", at.timestamp, class_name, d.box.x, d.box.y,
-                         d.box.w, d.box.h, d.score);
-    }
-  return out;
-}
-
 FileDetector::FileDetector(const std::filesystem::path& path, int width, int height)
     : boxes_(read_boxes(path, width, height)) {}
 

@@ -24,9 +24,6 @@ using BoxesByTime = std::vector<TimedBoxes>;
 BoxesByTime parse_boxes(std::string_view text, const std::string& name, int width, int height);
 BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height);
 
-// The same format. Stamps are written with 6 decimals, scores with 3. Class names must hold no white space.
-std::string boxes_to_text(const BoxesByTime& boxes);
-
 // The detector `file`: boxes recorded or simulated earlier. All boxes are taken, whatever the last column says. An
 // image gets the boxes of the nearest stamp within 2 ms, or none.
 class FileDetector final : public Detector {

@@ -44,19 +44,6 @@ TEST(BoxesFile, MissingFilesAreNamed) {
   EXPECT_THROW(read_boxes("/nowhere/b.txt", 640, 480), InputError);
 }
 
-TEST(BoxesFile, WhatIsWrittenIsReadBack) {
-  const BoxesByTime boxes = {{1.25, {{"person", {1.5f, 2, 3, 4}, 0.5f}}},
-                             {2.5, {{"dog", {5, 6, 7, 8.25f}, 1}, {"cat", {9, 8, 7, 6}, 0.125f}}}};
-  const BoxesByTime read = parse_boxes(boxes_to_text(boxes), "b.txt", 640, 480);
-  ASSERT_EQ(read.size(), boxes.size());
-  for (size_t i = 0; i < boxes.size(); ++i) {
-    EXPECT_EQ(read[i].timestamp, boxes[i].timestamp);
-    EXPECT_EQ(read[i].boxes, boxes[i].boxes);
-  }
-  const BoxesByTime spaced = {{1, {{"cell phone", {1, 2, 3, 4}, 1}}}};
-  EXPECT_EQ(parse_boxes(boxes_to_text(spaced), "b.txt", 640, 480)[0].boxes[0].class_name, "cell_phone");
-}
-
 TEST(BoxesFile, AnyMutationIsReadOrRefused) {
   const std::string whole =
       "# t c x y w h s\n1305031102.175304 person 0 119 107 236 0.389\n1305031102.211214 person 0 115 109 237\n";
