@@ -68,7 +68,7 @@ class Pipeline {
   std::vector<Event> take_events();
 
  private:
-  // When what mapping is given now becomes visible. It must not fall, also when the rate has just become known.
+  // When what mapping is given now becomes visible.
   FrameIndex mapping_due() const { return next_frame_ + rate_.frames(options_.pipeline.mapper_latency); }
   void shed_load();
   bool late_for_features() const { return load_ && load_->level() >= LoadShedding::kFeatures; }
@@ -120,7 +120,6 @@ class Pipeline {
     Scene scene;
     UsableFeatures usable;
     KeyframePacket packet;
-    FrameIndex due;
   };
   std::optional<MapStart> start_;
   TrackingState last_state_ = TrackingState::initialising;

@@ -321,7 +321,7 @@ void Pipeline::push_start(const TrackedFrame* next) {
   start_.reset();
   if (next != nullptr && next->start_features) tracker_.remake(*next, start.packet);
   if (options_.mapping.planes) start.packet.planes = find_planes(start.scene);
-  mapping_.push(std::move(start.packet), start.due);
+  mapping_.push(std::move(start.packet), mapping_due());
 }
 
 void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked) {
@@ -342,7 +342,7 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
   recent_keyframes_.push_back({tracked.index, id, tracked.features});
   while (recent_keyframes_.front().frame < tracked.index - 2 * scenes_.memory()) recent_keyframes_.pop_front();
   if (tracked.starts_map)
-    start_ = MapStart{scene, usable, std::move(packet), mapping_due()};
+    start_ = MapStart{scene, usable, std::move(packet)};
   else
     mapping_.push(std::move(packet), mapping_due());
   tracked.reference = id;
