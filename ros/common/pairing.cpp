@@ -75,10 +75,9 @@ void Pairing::drop_first(Stream* stream) {
 }
 
 std::vector<ImagePair> Pairing::add(Stream* stream, ImageMessage image) {
-  if (hold(stream, &image)) return {};
-  enter(stream, std::move(image));
+  if (!hold(stream, &image)) enter(stream, std::move(image));
   std::vector<ImagePair> pairs = match();
-  if (stream->waiting.size() > capacity_) drop_first(stream);
+  while (stream->waiting.size() > capacity_) drop_first(stream);
   return pairs;
 }
 

@@ -131,6 +131,24 @@ TEST(Pairing, APauseLosesNoImage) {
   EXPECT_EQ(pairing.unpaired() + pairing.late(), 0);
 }
 
+TEST(Pairing, SingleImagesAfterABurstComeOneImageLateAtMost) {
+  Pairing pairing(20 * kMs, 10);
+  size_t pairs = 0;
+  for (int64_t i = 0; i < 20; ++i) {
+    const int64_t t = i < 12 ? 33 * i : 5000 * i;
+    pairs += pairing.add_depth(image(t)).size() + pairing.add_colour(image(t)).size();
+    if (i >= 13) {
+      EXPECT_GE(pairs, static_cast<size_t>(i)) << i;
+    }
+  }
+}
+
+TEST(Pairing, OneStreamAloneWithPausesKeepsToTheQueue) {
+  Pairing pairing(20 * kMs, 4);
+  for (int64_t i = 0; i < 40; ++i) pairing.add_colour(image(33 * i + 5000 * (i / 4)));
+  EXPECT_GE(pairing.unpaired(), 40 - 4 - 1);
+}
+
 TEST(Pairing, ImagesEveryTwoSecondsPair) {
   Pairing pairing(20 * kMs, 10);
   size_t pairs = 0;

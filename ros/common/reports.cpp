@@ -95,8 +95,9 @@ void SlamCore::run_grids() {
             grid.frame_id = parameters_.map_frame;
             middleware_.publish(grid);
           } else {
-            const std::string why =
-                dense.views == 0 ? "no keyframes yet; localize_only makes none" : "the floor has not been seen";
+            const std::string why = dense.views > 0             ? "the floor has not been seen"
+                                    : parameters_.localize_only ? "localize_only makes no keyframes"
+                                                                : "no keyframes yet";
             if (std::exchange(said, why) != why) middleware_.log(LogLevel::warning, "no grid: " + why);
           }
         } catch (const std::exception& error) {

@@ -394,7 +394,6 @@ void SlamCore::begin_after_jump() {
       loaded = true;
     } catch (const std::exception& error) {
       complain(LogLevel::error, error.what());
-      loaded_map_.clear();
     }
   }
   if (slam_ && !loaded) slam_->reset();

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "dkb/util/errors.h"
@@ -55,7 +56,8 @@ double fit_inverse_lens(Camera* camera) {
   for (const Ray& ray : rays) {
     const Eigen::Vector2d pixel(inverse.fx * ray.image.x() + inverse.cx, inverse.fy * ray.image.y() + inverse.cy);
     const double error = (camera->distort(camera->project({ray.ideal.x(), ray.ideal.y(), 1})) - pixel).norm();
-    if (!(error <= largest)) largest = error;
+    if (!std::isfinite(error)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, error);
   }
   return largest;
 }

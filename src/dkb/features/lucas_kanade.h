@@ -8,8 +8,8 @@
 
 namespace dkb {
 
-// Kernels of Lucas-Kanade alignment, of optical flow. Intensities are in 1/16 grey levels
-// and all sums are integers, so that every implementation gives the same bits.
+// Kernels of Lucas-Kanade alignment, of optical flow. Intensities are in 1/16 grey levels and all sums are integers, so
+// that every implementation gives the same bits.
 //
 // A window of `size` x `size` samples at (x, y) covers x - size / 2 + i, i = 0 ... size - 1 (integer division), so that
 // for odd sizes (x, y) is its middle.

@@ -16,17 +16,18 @@ struct Triple {
   float low, mid, high;
 };
 
-// Three depths from `p` on in order, what is not valid as 0.
-inline Triple sorted(const float* p) {
-  const auto valid = [](float d) { return d > 0 ? d : 0.0f; };
+// Three depths from `p` on in order, what lies no farther than `beyond` as 0.
+inline Triple sorted(const float* p, float beyond) {
+  const auto valid = [beyond](float d) { return d > beyond ? d : 0.0f; };
   const float a = valid(p[0]), b = valid(p[1]), c = valid(p[2]);
   const float low = std::min(a, b), high = std::max(a, b);
   return {std::min(low, c), std::max(low, std::min(high, c)), std::max(high, c)};
 }
 
-// The median of the valid 3 x 3 neighbours of a pixel; 0 where one of them is farther than `limit`.
-float median_around(const DepthImage& depth, int x, int y, float limit) {
-  const Triple a = sorted(&depth(x - 1, y - 1)), b = sorted(&depth(x - 1, y)), c = sorted(&depth(x - 1, y + 1));
+// The median of the 3 x 3 neighbours of a pixel that lie beyond `beyond`; 0 where one of them is farther than `limit`.
+float median_around(const DepthImage& depth, int x, int y, float beyond, float limit) {
+  const Triple a = sorted(&depth(x - 1, y - 1), beyond), b = sorted(&depth(x - 1, y), beyond),
+               c = sorted(&depth(x - 1, y + 1), beyond);
   if (std::max({a.high, b.high, c.high}) > limit) return 0;
   if ((a.low > 0) & (b.low > 0) & (c.low > 0)) {
     // The median of nine: of the greatest low, the middle mid and the least high.
@@ -47,7 +48,7 @@ float median_around(const DepthImage& depth, int x, int y, float limit) {
 
 constexpr int kAcross = 2 * CornerDepths::kReach + 1;
 constexpr int kSurface = 4;      // [px] fewer are no surface but noise
-constexpr int kMaxSurfaces = 3;  // asked one behind the other
+constexpr int kMaxSurfaces = 4;  // asked one behind the other: up to three of noise at depths of their own
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -63,7 +64,8 @@ CornerDepths::Depth CornerDepths::at(float x, float y) const {
     const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
     const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
     if (centre > beyond && centre <= limit)
-      if (const float median = median_around(depth_, cx, cy, limit + jump(1)); median > 0) return {median, 0, {}};
+      if (const float median = median_around(depth_, cx, cy, beyond, limit + jump(1)); median > 0)
+        return {median, 0, {}};
     if (const Depth found = nearest_pixel(cx, cy, beyond, limit); found.lent > 0) return found;
     beyond = limit;
   }

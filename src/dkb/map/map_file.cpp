@@ -29,7 +29,7 @@
 //         that of the keyframe that it is since varint, rotation only u8, previous_from_current 7 x f64, covariance
 //         36 x f64
 //   PLAN  count varint, then per keyframe whose flat surfaces are known: id varint as in MOTN, surfaces varint, per
-//         surface: plane varint (numbered from 0 as they come), normal over distance 3 x f64, covariance 6 x f64,
+//         surface: plane varint (numbered from 0 as they come), normal over distance 3 x f64, covariance 9 x f64,
 //         centre 3 x f64; then the surface that each block of 16 x 16 px shows, from 1, 0 = none: u8 each, row by row,
 //         packed
 //

@@ -399,8 +399,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   bool followed = has_map && (track_from_last(frame, input) || (predicted && track_expected(*predicted, frame)));
   bool found_again = has_map && !followed && confirm_relocalisation(frame, input);
   if (has_map && !followed && !found_again && relocalise(frame, input.appearance, expected)) {
-    // At once where it was expected, or where it is but a step from the frame before and nothing else is expected; else
-    // when the next frame agrees.
+    // At once where it was expected, or where it is but a step from the frame before, if that one was seen; else when
+    // the next frame agrees.
     const bool near = last_ && last_->index + 1 == frame.index && state_ == TrackingState::tracking &&
                       plausible_motion(frame.cam_from_world, frame.timestamp);
     followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world));

@@ -47,7 +47,6 @@ class Tracker {
   Rigid3 take_view(MapView view);
   const TrackingMap& map() const { return map_; }
 
-  // Expected motion of the camera over `seconds`: later_cam_from_earlier_cam; identity while unknown.
   // Motion from the last frame to one at `timestamp`: what `prior` tells, and for what it does not tell the velocity.
   // Nothing without a last frame.
   std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
