@@ -37,7 +37,7 @@ std::vector<FeatureReport> report_features(const Scene& scene, const UsableFeatu
   for (size_t f = 0; f < tracked.points.size(); ++f) {
     const size_t feature = tracked.source.empty() ? f : static_cast<size_t>(tracked.source[f]);
     FeatureReport& report = reports[static_cast<size_t>(usable.corner[feature])];
-    if (tracked.outlier[f] == kRejected) {
+    if (tracked.outlier[f]) {
       if (report.state == FeatureState::unused)
         report.state = FeatureState::outlier, report.reason = FeatureReason::disagrees;
     } else if (tracked.points[f] != kNoPoint || tracked.odometry[f] ||

@@ -39,9 +39,6 @@ struct PosePrediction {
   bool agrees(const Rigid3& found_cam_from_world) const;
 };
 
-// Matched, but not by the robust pose; or followed from frame to frame, and farther off than such points are.
-inline constexpr uint8_t kRejected = 1, kStrays = 2;
-
 // A frame with its pose, as tracking leaves it. The pose hangs on a keyframe, since the world may move under the
 // tracker.
 struct TrackedFrame {
@@ -58,7 +55,7 @@ struct TrackedFrame {
   std::vector<FeatureMotion> motion;  // per feature
   std::vector<PointId> matched;  // per feature: the map point it matched, also where the pose rejects it; in tracking
   std::vector<PointId> points;   // per feature: the map point it shows (inliers of the pose), else kNoPoint
-  std::vector<uint8_t> outlier;  // per feature: 0, or why it makes no map point now
+  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
   std::vector<uint8_t> makes_point;  // per feature: 1 = it made a map point, when the frame became a keyframe
   std::vector<int> source;           // per feature: its index among the features that tracking was given

@@ -82,7 +82,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
   for (size_t f = 0; f < frame.points.size(); ++f) {
     const Keypoint& k = frame.features->keypoints[f];
     const auto& before = frame.odometry[f];
-    const bool left_out = frame.outlier[f] == kRejected && !(before && before->moves);
+    const bool left_out = frame.outlier[f] && !(before && before->moves);
     if (frame.points[f] != kNoPoint || left_out || frame.matchable().on_mover(f)) continue;
     Point p;
     p.feature = static_cast<int>(f);

@@ -262,13 +262,12 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   for (size_t i = 0; i < pairs.size(); ++i) {
     const auto f = static_cast<size_t>(pairs[i].feature);
     if (!pose.inlier[i]) {
-      frame.outlier[f] = kRejected;
+      frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
       found.push_back(points[f]);
     } else {
       frame.odometry[f] = followed[f];
-      frame.outlier[f] = followed[f] ? 0 : kStrays;
     }
   }
   // A guessed depth is let pass more by the pose: the ray of the first sighting tells.
@@ -278,7 +277,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     if (!shown || !shown->guessed) continue;
     shown->moves =
         shown->moves || odometry_.has_moved(*shown, features.keypoints[f], pose.cam_from_world, pose.covariance, limit);
-    frame.outlier[f] = shown->moves ? kRejected : 0;
+    frame.outlier[f] = shown->moves;
   }
   visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
@@ -338,7 +337,7 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
     frame.inliers -= frame.points[f] != kNoPoint;
     frame.points[f] = kNoPoint;
     frame.odometry[f].reset();
-    frame.outlier[f] = kRejected;
+    frame.outlier[f] = 1;
   }
   frame.features = std::move(features);
   frame.cam_from_world = pose.cam_from_world;

@@ -121,7 +121,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   if (by_still.predicted) by_still.predicted->weighs = false;  // the surfaces that it comes from are his as well
   for (size_t i = 0; i < matched.size(); ++i) {
     by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
-    by_still.outlier[matched[i]] = (*moves)[i] ? kRejected : 0;
+    by_still.outlier[matched[i]] = (*moves)[i];
   }
   // So are some of the points that are followed from frame to frame: those that fit are the room's.
   const auto followed =

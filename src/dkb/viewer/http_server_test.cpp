@@ -126,14 +126,20 @@ TEST_F(HttpServerTest, ServesBesideAThousandIdleConnections) {
 }
 
 TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
-  const auto busy_ms = [this] {
+  // Sanitizers need a descriptor to look at an object that they do not know yet: none is looked at below.
+  const pthread_t thread = thread_.native_handle();
+  const auto busy_ms = [thread] {
     clockid_t clock{};
     timespec used{};
-    pthread_getcpuclockid(thread_.native_handle(), &clock);
+    pthread_getcpuclockid(thread, &clock);
     clock_gettime(clock, &used);
     return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
   };
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<uint16_t>(server_.port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   rlimit before{};
   getrlimit(RLIMIT_NOFILE, &before);
   rlimit few = before;
@@ -141,16 +147,14 @@ TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
   std::vector<int> taken;
   for (int copy = 0; (copy = dup(fd)) >= 0;) taken.push_back(copy);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<uint16_t>(server_.port()));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  const int connected = connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address);
   const double at_first = busy_ms();
   poll(nullptr, 0, 300);
-  EXPECT_LT(busy_ms() - at_first, 50) << "[ms] of 300";
+  const double busy = busy_ms() - at_first;
   for (const int copy : taken) close(copy);
   setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_EQ(connected, 0);
+  EXPECT_LT(busy, 50) << "[ms] of 300";
   const std::string request = "GET /b HTTP/1.1\r\nHost: localhost\r\n\r\n";
   send(fd, request.data(), request.size(), MSG_NOSIGNAL);
   EXPECT_TRUE(all_of(fd).starts_with("HTTP/1.1 200 "));
