@@ -16,18 +16,17 @@ struct Triple {
   float low, mid, high;
 };
 
-// Three depths from `p` on in order, what lies no farther than `beyond` as 0.
-inline Triple sorted(const float* p, float beyond) {
-  const auto valid = [beyond](float d) { return d > beyond ? d : 0.0f; };
+// Three depths from `p` on in order, what is not valid as 0.
+inline Triple sorted(const float* p) {
+  const auto valid = [](float d) { return d > 0 ? d : 0.0f; };
   const float a = valid(p[0]), b = valid(p[1]), c = valid(p[2]);
   const float low = std::min(a, b), high = std::max(a, b);
   return {std::min(low, c), std::max(low, std::min(high, c)), std::max(high, c)};
 }
 
-// The median of the 3 x 3 neighbours of a pixel that lie beyond `beyond`; 0 where one of them is farther than `limit`.
-float median_around(const DepthImage& depth, int x, int y, float beyond, float limit) {
-  const Triple a = sorted(&depth(x - 1, y - 1), beyond), b = sorted(&depth(x - 1, y), beyond),
-               c = sorted(&depth(x - 1, y + 1), beyond);
+// The median of the valid 3 x 3 neighbours of a pixel; 0 where one of them is farther than `limit`.
+float median_around(const DepthImage& depth, int x, int y, float limit) {
+  const Triple a = sorted(&depth(x - 1, y - 1)), b = sorted(&depth(x - 1, y)), c = sorted(&depth(x - 1, y + 1));
   if (std::max({a.high, b.high, c.high}) > limit) return 0;
   if ((a.low > 0) & (b.low > 0) & (c.low > 0)) {
     // The median of nine: of the greatest low, the middle mid and the least high.
@@ -47,8 +46,7 @@ float median_around(const DepthImage& depth, int x, int y, float beyond, float l
 }
 
 constexpr int kAcross = 2 * CornerDepths::kReach + 1;
-constexpr int kSurface = 4;      // [px] fewer are no surface but noise
-constexpr int kMaxSurfaces = 4;  // asked one behind the other: up to three of noise at depths of their own
+constexpr int kSurface = 4;  // [px] fewer are no surface but noise
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -56,57 +54,49 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 CornerDepths::Depth CornerDepths::at(float x, float y) const {
   const int cx = static_cast<int>(std::lround(x)), cy = static_cast<int>(std::lround(y));
   if (cx < kReach || cy < kReach || cx >= depth_.width() - kReach || cy >= depth_.height() - kReach) return {};
-  // What is only noise hides nothing: the surface behind it is asked.
-  float beyond = 0;
-  for (int surface = 0; surface < kMaxSurfaces; ++surface) {
-    const float nearest = nearest_around(cx, cy, beyond);
-    if (nearest == kFar) return {};
-    const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
-    const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
-    if (centre > beyond && centre <= limit)
-      if (const float median = median_around(depth_, cx, cy, beyond, limit + jump(1)); median > 0)
-        return {median, 0, {}};
-    if (const Depth found = nearest_pixel(cx, cy, beyond, limit); found.lent > 0) return found;
-    beyond = limit;
-  }
-  return {};
+  const float nearest = nearest_around(cx, cy);
+  if (nearest == kFar) return {};
+  const auto jump = [&](double pixels) { return static_cast<float>(noise_.max_depth_jump(nearest, pixels, focal_)); };
+  const float limit = nearest + jump(kReach), centre = depth_(cx, cy);
+  if (centre > 0 && centre <= limit)
+    if (const float median = median_around(depth_, cx, cy, limit + jump(1)); median > 0) return {median, 0, {}};
+  return nearest_pixel(cx, cy, limit);
 }
 
-// The least depth beyond `beyond`.
-float CornerDepths::nearest_around(int cx, int cy, float beyond) const {
+float CornerDepths::nearest_around(int cx, int cy) const {
   float nearest = kFar;
-  run_vectorised(simd_, [first = &depth_(cx - kReach, cy - kReach), stride = depth_.width(), beyond, to = &nearest]()
-                            DKB_KERNEL_BODY {
-                              // Nine columns as two times eight, so that a row is two registers.
-                              static_assert(kAcross == 9);
-                              using Eight = float __attribute__((vector_size(32)));
-                              const Eight far = Eight{} + kFar;
-                              Eight left = far, right = far;
-                              for (int y = 0; y < kAcross; ++y) {
-                                Eight here, beside;
-                                __builtin_memcpy(&here, first + y * stride, sizeof here);
-                                __builtin_memcpy(&beside, first + y * stride + 1, sizeof beside);
-                                here = here > beyond ? here : far;
-                                beside = beside > beyond ? beside : far;
-                                left = here < left ? here : left;
-                                right = beside < right ? beside : right;
-                              }
-                              left = left < right ? left : right;
-                              float least = left[0];
-                              for (int k = 1; k < 8; ++k) least = left[k] < least ? left[k] : least;
-                              *to = least;
-                            });
+  run_vectorised(simd_,
+                 [first = &depth_(cx - kReach, cy - kReach), stride = depth_.width(), to = &nearest]() DKB_KERNEL_BODY {
+                   // Nine columns as two times eight, so that a row is two registers.
+                   static_assert(kAcross == 9);
+                   using Eight = float __attribute__((vector_size(32)));
+                   const Eight far = Eight{} + kFar;
+                   Eight left = far, right = far;
+                   for (int y = 0; y < kAcross; ++y) {
+                     Eight here, beside;
+                     __builtin_memcpy(&here, first + y * stride, sizeof here);
+                     __builtin_memcpy(&beside, first + y * stride + 1, sizeof beside);
+                     here = here > 0 ? here : far;
+                     beside = beside > 0 ? beside : far;
+                     left = here < left ? here : left;
+                     right = beside < right ? beside : right;
+                   }
+                   left = left < right ? left : right;
+                   float least = left[0];
+                   for (int k = 1; k < 8; ++k) least = left[k] < least ? left[k] : least;
+                   *to = least;
+                 });
   return nearest;
 }
 
-// The depth beyond `beyond`, up to `limit`, that lies nearest in the image.
-CornerDepths::Depth CornerDepths::nearest_pixel(int cx, int cy, float beyond, float limit) const {
+// The depth, up to `limit`, that lies nearest in the image.
+CornerDepths::Depth CornerDepths::nearest_pixel(int cx, int cy, float limit) const {
   int least = std::numeric_limits<int>::max(), count = 0;
   Depth found;
   for (int v = -kReach; v <= kReach; ++v)
     for (int u = -kReach; u <= kReach; ++u) {
       const float d = depth_(cx + u, cy + v);
-      if (!(d > beyond) || d > limit) continue;
+      if (!(d > 0) || d > limit) continue;
       ++count;
       if (u * u + v * v >= least) continue;
       least = u * u + v * v;

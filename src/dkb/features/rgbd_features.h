@@ -81,8 +81,8 @@ class CornerDepths {
   static constexpr int kReach = 4;
 
  private:
-  float nearest_around(int cx, int cy, float beyond) const;
-  Depth nearest_pixel(int cx, int cy, float beyond, float limit) const;
+  float nearest_around(int cx, int cy) const;
+  Depth nearest_pixel(int cx, int cy, float limit) const;
 
   const DepthImage& depth_;
   const double focal_;
