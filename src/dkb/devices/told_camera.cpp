@@ -25,18 +25,14 @@ ToldCamera untold(Camera camera, const std::string& reason) {
 double fit_inverse_lens(Camera* camera) {
   const Camera inverse = *camera;
   struct Ray {
-    Eigen::Vector2d ideal, image;  // tangents
+    Eigen::Vector2d ideal, image;  // [px]
   };
   std::vector<Ray> rays;
   for (int row = 0; row < kRows; ++row)
     for (int column = 0; column < kColumns; ++column) {
-      const double x = (column * (inverse.width - 1.0) / (kColumns - 1) - inverse.cx) / inverse.fx;
-      const double y = (row * (inverse.height - 1.0) / (kRows - 1) - inverse.cy) / inverse.fy;
-      const double r2 = x * x + y * y;
-      const double radial = 1 + r2 * (inverse.k1 + r2 * (inverse.k2 + r2 * inverse.k3));
-      rays.push_back({{x * radial + 2 * inverse.p1 * x * y + inverse.p2 * (r2 + 2 * x * x),
-                       y * radial + 2 * inverse.p2 * x * y + inverse.p1 * (r2 + 2 * y * y)},
-                      {x, y}});
+      const Eigen::Vector2d image(column * (inverse.width - 1.0) / (kColumns - 1),
+                                  row * (inverse.height - 1.0) / (kRows - 1));
+      rays.push_back({inverse.distort(image), image});  // the same polynomial, the other way round
     }
   // The distorting model is linear in its coefficients k1, k2, k3, p1, p2.
   const auto count = static_cast<Eigen::Index>(rays.size());
@@ -44,18 +40,18 @@ double fit_inverse_lens(Camera* camera) {
   Eigen::VectorXd offsets(2 * count);
   for (Eigen::Index i = 0; i < count; ++i) {
     const Ray& ray = rays[static_cast<size_t>(i)];
-    const double x = ray.ideal.x(), y = ray.ideal.y(), r2 = ray.ideal.squaredNorm();
+    const Eigen::Vector3d ideal = inverse.unproject(ray.ideal, 1), image = inverse.unproject(ray.image, 1);
+    const double x = ideal.x(), y = ideal.y(), r2 = x * x + y * y;
     factors.row(2 * i) << x * r2, x * r2 * r2, x * r2 * r2 * r2, 2 * x * y, r2 + 2 * x * x;
     factors.row(2 * i + 1) << y * r2, y * r2 * r2, y * r2 * r2 * r2, r2 + 2 * y * y, 2 * x * y;
-    offsets.segment<2>(2 * i) = ray.image - ray.ideal;
+    offsets.segment<2>(2 * i) = (image - ideal).head<2>();
   }
   const Eigen::VectorXd fitted = factors.colPivHouseholderQr().solve(offsets);
   camera->k1 = fitted[0], camera->k2 = fitted[1], camera->k3 = fitted[2];
   camera->p1 = fitted[3], camera->p2 = fitted[4];
   double largest = 0;
   for (const Ray& ray : rays) {
-    const Eigen::Vector2d pixel(inverse.fx * ray.image.x() + inverse.cx, inverse.fy * ray.image.y() + inverse.cy);
-    const double error = (camera->distort(camera->project({ray.ideal.x(), ray.ideal.y(), 1})) - pixel).norm();
+    const double error = (camera->distort(ray.ideal) - ray.image).norm();
     if (!std::isfinite(error)) return std::numeric_limits<double>::infinity();
     largest = std::max(largest, error);
   }

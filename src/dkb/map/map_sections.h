@@ -26,6 +26,7 @@ MapSections write_sections(const Map& map, const MapFileContext& context);
 // they are empty then.
 MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections);
 
+bool sound(const Rigid3& pose);  // finite, its quaternion of unit norm
 void write_pose(ByteWriter& out, const Rigid3& pose);
 Rigid3 read_pose(ByteReader& in);
 

@@ -26,9 +26,7 @@ bool is_covariance(const Matrix& m) {
 }
 
 bool sound(const MotionPrior& motion) {
-  const Rigid3& pose = motion.previous_from_current;
-  return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
-         std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6 && is_covariance(motion.covariance);
+  return sound(motion.previous_from_current) && is_covariance(motion.covariance);
 }
 
 bool sound(const PlanePatch& patch) {

@@ -14,11 +14,6 @@ namespace {
 // Far beyond any image, near enough to be turned into an integer.
 constexpr float kMaxPixel = 1e6f;
 
-bool sound(const Rigid3& pose) {
-  return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
-         std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
-}
-
 bool sound(const Eigen::Vector2f& pixel) {
   return std::abs(pixel.x()) <= kMaxPixel && std::abs(pixel.y()) <= kMaxPixel;  // false for NaN
 }
@@ -212,6 +207,11 @@ std::string point_section(const Map& map) {
 }
 
 }  // namespace
+
+bool sound(const Rigid3& pose) {
+  return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
+         std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
+}
 
 void write_pose(ByteWriter& out, const Rigid3& pose) {
   for (int i = 0; i < 4; ++i) out.f64(pose.rotation.coeffs()[i]);
