@@ -34,10 +34,12 @@ class PoseProblem {
       array(kZ)[i] = o.point_in_world.z();
       array(kU)[i] = o.pixel.x();
       array(kV)[i] = o.pixel.y();
-      array(kInvSigma)[i] = 1.0 / o.pixel_sigma;
+      array(kGiven)[i] = o.weight;
+      const double share = std::sqrt(o.weight);
+      array(kInvSigma)[i] = share / o.pixel_sigma;
       if (o.depth > 0) {
         array(kDepth)[i] = o.depth;
-        array(kInvDepthSigma)[i] = 1.0 / o.depth_sigma;
+        array(kInvDepthSigma)[i] = share / o.depth_sigma;
       }
     }
     input_.camera = {camera.fx, camera.fy, camera.cx, camera.cy, {}, {}, options.depth_in_front};
@@ -63,19 +65,20 @@ class PoseProblem {
       array(kUsedInvDepthSigma)[i] = inlier[i] ? array(kInvDepthSigma)[i] : 0.0;
     }
   }
-  // The same, each weighed by how it fits at a pose, all `times` as much.
+  // The same, each weighed by how it fits at a pose by its own sigmas, all `times` as much.
   void weigh(const std::vector<uint8_t>& inlier, const Rigid3& pose, double times = 1) {
     use(inlier);
     compute_chi2(pose);
     double* const fits = array(kFits);
     double* end = fits;
     for (size_t i = 0; i < count_; ++i)
-      if (inlier[i]) *end++ = array(kChi2)[i];
+      if (inlier[i]) *end++ = array(kChi2)[i] / array(kGiven)[i];
     if (end == fits) return;
     const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
-      const double weight = times * (kStudentFreedom + 2) / (kStudentFreedom + array(kChi2)[i] / variance);
+      const double fit = array(kChi2)[i] / array(kGiven)[i];
+      const double weight = times * (kStudentFreedom + 2) / (kStudentFreedom + fit / variance);
       array(kWeight)[i] = weight;
       array(kUsedInvDepthSigma)[i] = array(kInvDepthSigma)[i] * std::sqrt(weight);
     }
@@ -129,6 +132,7 @@ class PoseProblem {
     kWeight,
     kChi2,
     kFits,
+    kGiven,
     kArrays
   };
 

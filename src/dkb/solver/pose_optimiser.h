@@ -30,6 +30,7 @@ struct PoseObservation {
   double pixel_sigma = 1.0;        // [px] > 0, standard deviation of each coordinate
   double depth = 0.0;              // [m] along the optical axis; 0 = none
   double depth_sigma = 0.01;       // [m] > 0 where depth is given
+  double weight = 1.0;             // > 0, of what the sigmas say; one that counts less may also be off by more
 };
 
 struct PoseOptions {
@@ -67,7 +68,8 @@ struct PoseEstimate {
 
 // Pose that minimises sum rho(e^T Sigma^-1 e), e = [reprojection px, depth m], by Levenberg-Marquardt on 6 numbers;
 // observations are classified anew after each round, all of them, so that an outlier may come back, until a round
-// changes no classification. Then what fits is weighed by how well it does: rho is Student's t about the scale at hand.
+// changes no classification. Then what fits is weighed by how well it does by its own sigmas: rho is Student's t about
+// the scale at hand.
 // Deterministic; never throws but for options out of range.
 PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_world_initial,
                            std::span<const PoseObservation> observations, const PoseOptions& options = {},

@@ -30,6 +30,28 @@ TEST(PoseOptimiser, FindsTheExactPoseWithoutNoise) {
   EXPECT_EQ(estimate.inliers, static_cast<int>(observations.size()));
 }
 
+// What counts little may be off by more, but what it is off by is told by its own sigma.
+TEST(PoseOptimiser, WhatCountsLittlePullsTheLessTheWorseItFits) {
+  const TestWorld world({.cameras = 1, .pixel_noise = 0.3, .depth_noise = 1e-3});
+  const auto error_with = [&](double weight, double sigma) {
+    auto observations = world.pose_observations(0);
+    for (size_t i = 0; i < observations.size(); ++i) {
+      PoseObservation& o = observations[i];
+      o.depth = 0;
+      o.pixel_sigma = 1;
+      if (i % 3 != 0) continue;
+      o.pixel.x() += 3;  // within the limit of what weighs a quarter
+      o.weight = weight;
+      o.pixel_sigma = sigma;
+    }
+    const PoseEstimate estimate = optimise_pose(world.problem.camera, world.cam_from_world[0], observations);
+    EXPECT_TRUE(estimate.ok);
+    EXPECT_GT(estimate.inliers, 0.95 * static_cast<double>(observations.size()));
+    return distance(estimate.cam_from_world, world.cam_from_world[0]);
+  };
+  EXPECT_LT(error_with(0.25, 1), 0.9 * error_with(1, 2));
+}
+
 TEST(PoseOptimiser, ReachesTheMinimumThatCeresReachesOnItsInliers) {
   int to_the_digit = 0;
   for (uint64_t seed = 1; seed <= 12; ++seed) {

@@ -18,8 +18,8 @@ namespace {
 constexpr double kEstablishedAfter = 0.5;
 constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map points is renewed at least so often
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
-constexpr double kOdometryFactor = 2.0;      // on the noise of what shows visual-odometry points
-constexpr double kGuessFactor = 2.0;         // beside it on that of points at a guessed depth, which err together
+constexpr double kOdometryWeight = 1.0 / 4;  // of visual-odometry points beside map points
+constexpr double kGuessWeight = 1.0 / 4;     // beside it of points at a guessed depth, which err together
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
 double square(double a) {
@@ -109,9 +109,9 @@ void Tracker::reset_motion() {
 }
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const {
-  Pair pair{feature, match.point_in_world, kOdometryFactor, !match.guessed};
+  Pair pair{feature, match.point_in_world, kOdometryWeight, !match.guessed};
   if (!match.guessed) return pair;
-  pair.sigma_factor *= kGuessFactor;
+  pair.weight *= kGuessWeight;
   pair.parallax_sigma = odometry_.parallax_sigma(match, last_->cam_from_world, cam_from_world);
   return pair;
 }
@@ -123,8 +123,8 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   for (const Pair& pair : pairs) {
     const Keypoint& k = features.keypoints[static_cast<size_t>(pair.feature)];
     PoseObservation o = pose_observation(k, pair.point_in_world, optics_);
-    o.pixel_sigma = std::sqrt(optics_.corner_variance(k) * square(pair.sigma_factor) + square(pair.parallax_sigma));
-    o.depth_sigma *= pair.sigma_factor;
+    o.pixel_sigma = std::sqrt(optics_.corner_variance(k) + square(pair.parallax_sigma));
+    o.weight = pair.weight;
     if (!pair.use_depth) o.depth = 0;
     observations.push_back(o);
   }

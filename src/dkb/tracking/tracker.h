@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -83,13 +85,12 @@ class Tracker {
 
  private:
   static constexpr int kMatchDistance = 90;       // [bits] largest Hamming distance of a match with a map point
-  static constexpr double kMaxSearchRadius = 60;  // [px] beyond, nearly everything is a candidate of everything
   static constexpr double kRadiusLocalMap = 4.0;  // [px] search for local map points under the first pose
 
   struct Pair {
     int feature = -1;
     Eigen::Vector3d point_in_world;
-    double sigma_factor = 1;
+    double weight = 1;  // in a pose
     bool use_depth = true;
     double parallax_sigma = 0;  // [px] by not knowing the depth
   };
@@ -100,6 +101,8 @@ class Tracker {
                        const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
                       const std::optional<PosePrediction>& expected) const;
+  // [px] search around the motion model's prediction: 19 mrad, whatever the camera's resolution.
+  double radius_last_frame() const { return std::max(kRadiusLocalMap, std::round(10 * optics_.camera.fx / 525)); }
   std::vector<Candidate> points_shown_last() const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
