@@ -176,6 +176,7 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
 
 // Not all views speak in each frame: they take turns.
 void MotionSegmenter::choose_views() {
+  std::erase_if(views_, [this](const auto& view) { return current_->time - view->time > kViewAge; });
   const Rigid3 world_from_cam = current_->cam_from_world.inverse();
   const auto first =
       std::find_if(views_.begin(), views_.end(), [&](const auto& view) { return !guessing_ || view->time > told_; });
@@ -428,17 +429,15 @@ void MotionSegmenter::keep_as_view(const MotionDepthGrid& grid) {
   auto view = take_spare(spare_view_);
   view->set(grid);
   views_.push_back(std::move(view));
+  if (views_.size() <= kMaxViews) return;
   const double now = views_.back()->time;
   size_t drop = 0;
-  if (now - views_.front()->time <= kViewAge) {
-    if (views_.size() <= kMaxViews) return;
-    double smallest = 0;
-    for (size_t i = 1; i + 1 < views_.size(); ++i) {
-      const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (now - views_[i]->time + kViewInterval);
-      if (drop == 0 || gap < smallest) {
-        smallest = gap;
-        drop = i;
-      }
+  double smallest = 0;
+  for (size_t i = 1; i + 1 < views_.size(); ++i) {
+    const double gap = (views_[i + 1]->time - views_[i - 1]->time) / (now - views_[i]->time + kViewInterval);
+    if (drop == 0 || gap < smallest) {
+      smallest = gap;
+      drop = i;
     }
   }
   spare_view_ = std::move(views_[drop]);

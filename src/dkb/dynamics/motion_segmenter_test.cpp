@@ -131,6 +131,24 @@ void run(const World& world, int frames, const std::function<std::vector<Panel>(
   }
 }
 
+TEST(MotionSegmenter, WhatWasSeenLongAgoSaysNothingOfWhatStandsThereNow) {
+  World world;
+  world.still_camera = true;
+  // A gap of 16 s in which a box was put down.
+  MotionSegmenter segmenter(world.camera, {}, {});
+  for (int f = 0; f < 30; ++f) {
+    segment(segmenter, world.render(f, {}).image, world.cam_from_world(f));
+    segmenter.commit(world.cam_from_world(f));
+  }
+  Panel box = box_at(0);
+  for (int f = 30 + 16 * 30; f < 30 + 16 * 30 + 10; ++f) {
+    const Picture p = world.render(f, {box});
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
+    EXPECT_LT(judge(mask, p.truth).covered, 0.02) << f;
+    segmenter.commit(world.cam_from_world(f));
+  }
+}
+
 TEST(MotionSegmenter, MarksNothingInTheFirstFrame) {
   run(
       World(), 1, [](int) { return std::vector{box_at(0)}; },

@@ -11,9 +11,10 @@ namespace dkb {
 namespace {
 
 constexpr double kDistance = 0.4;  // [m] along the surface over which cells of one object speak for each other
-// [1/m] second difference of inverse depth in a fold between object and support (noise: 0.005)
-constexpr float kCrease = 0.012f;
-constexpr float kCreaseLink = 0.3f;  // share of what is said that crosses such a fold
+constexpr int kArm = 3;  // [cells] far enough for a fold to rise above the noise, near enough for a foot or a hand
+constexpr float kCrease = 0.525f;       // difference of slopes, of inverse depth over the ray, in a fold ...
+constexpr float kCreaseNoise = 0.005f;  // [1/m] ... that stands out of the noise of second differences of inverse depth
+constexpr float kCreaseLink = 0.3f;     // share of what is said that crosses such a fold
 
 }  // namespace
 
@@ -22,13 +23,13 @@ MotionSmoothing::MotionSmoothing(const CameraModel& camera, const SensorNoise& n
       simd_(simd),
       focal_(camera.fx),
       cell_(cell),
-      fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * kDistance))) {
+      fade_(static_cast<float>(std::sqrt(2.0) * cell / (camera.fx * kDistance))),
+      crease_(std::max(kCrease * kArm * static_cast<float>(cell / camera.fx), kCreaseNoise)) {
   const int width = (camera.width + cell - 1) / cell, height = (camera.height + cell - 1) / cell;
   for (Image<float>* i : {&inverse_, &damping_, &left_, &up_}) *i = Image<float>(width, height);
 }
 
 void MotionSmoothing::find_creases(const Image<float>& depth) {
-  constexpr int kArm = 3;  // [cells] far enough for a fold to rise above the noise, near enough for a foot or a hand
   const int width = depth.width(), height = depth.height();
   for (size_t i = 0; i < depth.size(); ++i) inverse_.data()[i] = depth.data()[i] > 0 ? 1.0f / depth.data()[i] : 0.0f;
   for (int y = 0; y < height; ++y) {
@@ -39,7 +40,7 @@ void MotionSmoothing::find_creases(const Image<float>& depth) {
       for (int x = begin; x < end; ++x) {
         const float bend = before[x] + after[x] - 2.0f * here[x];
         const bool known = (before[x] > 0) & (after[x] > 0);
-        out[x] = (known & (bend > kCrease)) ? kCreaseLink : out[x];
+        out[x] = (known & (bend > crease_)) ? kCreaseLink : out[x];
       }
     };
     mark(here - kArm, here + kArm, kArm, width - kArm);

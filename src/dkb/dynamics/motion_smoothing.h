@@ -29,6 +29,7 @@ class MotionSmoothing {
   double focal_;
   int cell_;                        // [px]
   float fade_ = 0;                  // [1 / m of depth] of a link per cell
+  float crease_ = 0;                // [1/m] second difference of inverse depth in a fold between object and support
   Image<float> inverse_, damping_;  // 1 / depth; crease_link in folds, else 1
   Image<float> left_, up_;          // link to the neighbour, 0 ... 1
 };

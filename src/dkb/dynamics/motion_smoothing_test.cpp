@@ -49,11 +49,11 @@ TEST(MotionSmoothing, StopsAtDepthSteps) {
 }
 
 TEST(MotionSmoothing, IsDampedWhereABodyMeetsTheFloorButNotOnASlantedPlane) {
-  // Inverse depth falls by 0.008 per cell and metre on the floor: it is a plane, slanted.
+  // Inverse depth falls by 0.012 per cell and metre on a floor 1.3 m below the camera: it is a plane, slanted.
   Image<float> slanted(kWidth, kHeight), folded(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
-      slanted(x, y) = 1.0f / (0.8f + 0.008f * static_cast<float>(y));
+      slanted(x, y) = 1.0f / (0.8f + 0.012f * static_cast<float>(y));
       folded(x, y) = y < 35 ? slanted(x, 35) : slanted(x, y);  // upright above row 35, where the floor begins
     }
   const float over_plane = spread(slanted)(20, 45), over_fold = spread(folded)(20, 45);
