@@ -14,7 +14,7 @@ constexpr size_t kMaxUnplaced = 30;  // [frames] that wait for the robot's odome
 }  // namespace
 
 void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
-  publish_odometry(result);
+  if (parameters_.publish_odom_tf) publish_odometry(result);  // else `odom` is the robot's
   const double out_ms =
       1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
   {
@@ -35,7 +35,8 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
   }
   publish_transforms(result);
-  if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
+  const bool placed = in_map_frame(result) || !result.tracked();
+  if (placed && (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array))) {
     MoversOutput movers = movers_of(result);
     movers.frame_id = parameters_.map_frame;
     middleware_.publish(movers);
@@ -73,15 +74,21 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
   middleware_.publish(odometry);
 }
 
+// A map that was loaded is what others plan in: one begun beside it lies nobody knows where.
+bool SlamCore::in_map_frame(const dkb::FrameResult& result) const {
+  return result.tracked() && (result.map == 0 || loaded_map_.empty());
+}
+
 void SlamCore::publish_transforms(const dkb::FrameResult& result) {
   const Rigid3 cam_from_base = base_from_cam_.inverse();
   std::vector<TransformOutput> transforms;
-  if (result.tracked()) {
+  if (result.tracked() && parameters_.publish_odom_tf)
+    transforms.push_back(
+        {result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, *result.odom_from_cam * cam_from_base});
+  if (in_map_frame(result)) {
     const Rigid3 map_from_base = *result.world_from_cam * cam_from_base;
     if (parameters_.publish_odom_tf) {
       map_from_odom_ = result.world_from_odom;
-      transforms.push_back(
-          {result.stamp_ns, parameters_.odom_frame, parameters_.base_frame, *result.odom_from_cam * cam_from_base});
     } else {
       place_robots_odometry(result.stamp_ns, map_from_base);
     }
@@ -90,7 +97,7 @@ void SlamCore::publish_transforms(const dkb::FrameResult& result) {
           result.stamp_ns, parameters_.map_frame, map_from_base,
           ros_covariance(result.covariance.value_or(Matrix6d::Identity()), base_from_cam_, map_from_base.rotation)});
   }
-  // While the camera is lost, the last one holds.
+  // While nobody knows where in the map the camera is, the last one holds.
   if (parameters_.publish_map_tf && map_from_odom_)
     transforms.push_back({result.stamp_ns, parameters_.map_frame, parameters_.odom_frame, *map_from_odom_});
   if (!transforms.empty()) middleware_.publish(transforms);

@@ -229,7 +229,7 @@ void SlamCore::process(const ImagePair& pair) {
   const dkb::FrameInput input = input_of(pair);
   const dkb::Frame frame(slam_->camera(), input);
   dkb::FrameResult result = slam_->process(frame);
-  if (result.state != dkb::TrackingState::paused) last_stamp_ns_ = pair.colour.stamp_ns;
+  last_stamp_ns_ = pair.colour.stamp_ns;  // paused too: the motions of frames that were skipped are joined
   publish(pair, input, result);
   std::vector<dkb::Event> events = tell_events();
   if (!viewer_) return;
@@ -280,6 +280,7 @@ bool SlamCore::start(const ImagePair& pair) {
   camera_frame_ = frame;
   dkb::Options options = parameters_.options;
   options.base_from_cam = base_from_cam_;
+  options.set("experiment.smooth_trajectory", "false");  // the path is sent once a second: by the map is near enough
   // What failed once fails again, after seconds that a network may take.
   if (!failed_start_.empty()) throw dkb::InputError(failed_start_);
   std::shared_ptr<dkb::Slam> slam;

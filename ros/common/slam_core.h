@@ -85,6 +85,7 @@ class SlamCore final : public RosCore {
   std::optional<Rigid3> cam_from(const std::string& frame);
   void publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result);
   void publish_odometry(const dkb::FrameResult& result);
+  bool in_map_frame(const dkb::FrameResult& result) const;
   void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_anew();

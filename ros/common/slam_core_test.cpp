@@ -336,12 +336,15 @@ TEST_F(SlamCoreTest, MapToOdomGoesOnTopOfTheRobotsOdometry) {
   core->camera_info(info_of(source_camera()));
   const Rigid3 odom_from_base(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {3, 1, 0});
   out.known_transforms["odom base_link"] = odom_from_base;
-  feed_all(*core, 0, 3);
-  ASSERT_TRUE(out.wait([&] { return out.transforms.size() == 3; }));
+  for (size_t i = 0; i < 3; ++i) {
+    feed(*core, i);
+    ASSERT_TRUE(out.wait([&] { return out.transforms.size() == i + 1; }));
+  }
   ASSERT_EQ(out.transforms.back().size(), 1u);
   EXPECT_EQ(out.transforms.back()[0].child, "odom");
   const Rigid3 error = out.poses.back().pose.inverse() * (out.transforms.back()[0].parent_from_child * odom_from_base);
   EXPECT_LT(error.translation.norm(), 1e-9);
+  EXPECT_TRUE(out.odometry.empty()) << "that is the robot's";
 }
 
 TEST_F(SlamCoreTest, StampsThatGoBackBeginANewWorld) {
@@ -392,6 +395,42 @@ TEST_F(SlamCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
     feed_all(*core, i, 1);
   }
   ASSERT_TRUE(out.wait([&] { return out.last_value("with prior") == "5"; }));
+}
+
+// The library joins what is told of the frames that are skipped.
+TEST_F(SlamCoreTest, MotionsOfPausedFramesCountOnce) {
+  const auto core = start({{"queue_size", int64_t{20}}});
+  core->camera_info(info_of(source_camera()));
+  const auto drive_to = [&](size_t i, double x) {
+    OdometryMessage odometry;
+    odometry.stamp_ns = frames()[i].stamp_ns();
+    odometry.child_frame_id = "base_link";
+    odometry.pose.translation.x() = x;
+    core->odometry(odometry);
+  };
+  for (size_t i = 0; i < 4; ++i) {
+    drive_to(i, 0);
+    feed_all(*core, i, 1);
+  }
+  const Rigid3 before = out.odometry.back().pose.pose;
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(true, done); }).success);
+  for (size_t i = 4; i < 10; ++i) {
+    drive_to(i, 0.02 * static_cast<double>(i - 3));
+    feed(*core, i);
+  }
+  ASSERT_TRUE(out.wait([&] { return out.last_value("frames") == "10"; }));
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(false, done); }).success);
+  drive_to(10, 0.14);
+  ImageMessage colour = message_of(frames()[10], false), depth = message_of(frames()[10], true);
+  for (ImageMessage* dark : {&colour, &depth}) {
+    const auto nothing = std::make_shared<std::vector<uint8_t>>(dark->size);
+    dark->data = nothing->data();
+    dark->owner = nothing;
+  }
+  core->colour(std::move(colour));
+  core->depth(std::move(depth));
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));
+  EXPECT_NEAR((out.odometry.back().pose.pose.translation - before.translation).norm(), 0.14, 0.02);
 }
 
 }  // namespace
