@@ -19,9 +19,7 @@ void check_detector(const DetectorChoice& choice) {
     throw InputError(std::string(option) + ": --detector " + choice.kinds + " has no " + reader +
                      "; leave it out, or add a detector that has one");
   };
-  if (!choice.model.empty() && !yolo) refuse("--model", "network");
-  if (!choice.labels.empty() && !yolo) refuse("--labels", "network");
-  if (!choice.classes.empty() && !yolo) refuse("--classes", "network");
+  if (!yolo) check_no_network(choice);
   if (choice.every > 0 && !slow) refuse("--detect-every", "network or command");
   if (choice.latency > 0 && !slow) refuse("--detect-latency", "network or command");
 }

@@ -42,6 +42,8 @@ struct ViewerOptions {
 ///
 ///     const auto viewer = dkb::open_viewer(options);
 ///     ...
+///     while (!viewer->wait_turn(std::chrono::seconds(1))) continue;  // a visitor has paused
+///     if (viewer->take_save_order()) slam.save_map("map.dkb");
 ///     dkb::FrameResult result = slam.process(frame);
 ///     viewer->show(result, frame, slam.map(), slam.take_events());
 ///

@@ -142,6 +142,9 @@ frame a to frame b. Camera axes: x right, y down, z forward. World: the first tr
           "reference_keyframe", [](const PyResult& p) { return p.r.reference_keyframe; },
           "int: the keyframe that shows most of them; -1 = none.")
       .def_property_readonly(
+          "map", [](const PyResult& p) { return p.r.map; },
+          "int: 0 = the first map. Another one that was never joined with it has a world of its own.")
+      .def_property_readonly(
           "movers", [](const PyResult& p) { return p.r.movers; },
           "list of Mover: what moves by itself in this frame, by id.")
       .def_property_readonly(

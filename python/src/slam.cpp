@@ -305,9 +305,11 @@ std::string repr_of(const PySlam& slam) {
 }
 
 DenseMap dense_map(PySlam& slam) {
-  DenseMap map;
-  slam.feed([&](Slam& s) { map = s.dense_map(); });
-  return map;
+  std::function<DenseMap()> task;
+  slam.feed([&](Slam& s) { task = s.dense_map_task(); });
+  // It takes seconds, in which frames may be processed.
+  const py::gil_scoped_release other_threads;
+  return task();
 }
 
 }  // namespace
@@ -386,7 +388,8 @@ have worlds of their own. online: as each frame was published.)")
           },
           "map_points() -> (xyz, rgb)\n\nxyz: float64 [M, 3], [m] in the world; rgb: uint8 [M, 3]. From any thread.")
       .def("dense_map", &dense_map,
-           "dense_map() -> DenseMap\n\nThe still world from the keyframes so far; takes seconds. Raises InputError "
+           "dense_map() -> DenseMap\n\nThe still world from the keyframes so far; takes seconds, in which other "
+           "threads may go on. Raises InputError "
            "without Slam(dense=True).")
       .def("events", &PySlam::take_events,
            "events() -> list[Event]\n\nWhat happened since the last call, oldest first; at most the newest 10,000.")

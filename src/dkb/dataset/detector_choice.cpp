@@ -53,6 +53,16 @@ std::filesystem::path model_of(const DetectorChoice& choice) {
   return choice.model.empty() && model != nullptr ? model : choice.model;
 }
 
+void check_no_network(const DetectorChoice& choice) {
+  const auto refuse = [&](const char* option) {
+    throw InputError(std::string(option) + ": --detector " + choice.kinds +
+                     " has no network; leave it out, or add a detector that has one");
+  };
+  if (!choice.model.empty()) refuse("--model");
+  if (!choice.labels.empty()) refuse("--labels");
+  if (!choice.classes.empty()) refuse("--classes");
+}
+
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
   if (options.dynamics.filter != FilterKind::none) return choice;
   const bool asked_for = ("," + disabled + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
@@ -68,6 +78,7 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   const std::filesystem::path model = model_of(choice);
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model.empty());
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
+  if (!kinds.empty() && !has("yolo")) check_no_network(choice);
   if (has("yolo")) {
     if (model.empty())
       throw InputError(

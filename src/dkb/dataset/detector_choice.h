@@ -17,6 +17,9 @@ std::vector<std::string> detector_kinds(const std::string& kinds, bool has_model
 // The model that is named, else that of $DKB_SLAM_MODEL; may be empty.
 std::filesystem::path model_of(const DetectorChoice& choice);
 
+// Throws InputError where a choice without a network names what only networks have.
+void check_no_network(const DetectorChoice& choice);
+
 // What of the choice holds beside the options: without a filter nothing is detected.
 // `disabled`: the parts given to Options::disable(); without `dr` masks are not read either.
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice);
