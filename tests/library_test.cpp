@@ -191,6 +191,7 @@ TEST_F(Library, EventsTellWhatHappened) {
   for (const Frame& frame : eventful(world)) {
     const FrameResult r = slam.process(frame);
     if (r.keyframe) keyframes.push_back(r.frame);
+    EXPECT_EQ(r.map, r.tracked() && r.frame >= 53 ? 1 : 0) << r.frame;
     for (const Event& e : slam.take_events()) {
       EXPECT_EQ(e.frame, r.frame);
       EXPECT_EQ(e.stamp_ns, r.stamp_ns);
@@ -208,6 +209,8 @@ TEST_F(Library, EventsTellWhatHappened) {
   EXPECT_EQ(announced, keyframes);
   EXPECT_GE(announced.size(), 5U);
   EXPECT_EQ(slam.statistics().maps, 2);
+  EXPECT_EQ(slam.trajectory().front().map, 0);
+  EXPECT_EQ(slam.trajectory().back().map, 1);
   EXPECT_TRUE(slam.take_events().empty()) << "they were taken";
 }
 
@@ -245,6 +248,39 @@ TEST_F(Library, AnEmptyCallbackEndsItAndWhatACallbackThrowsLeavesProcess) {
   EXPECT_TRUE(slam.process(world.frame(1, {})).tracked()) << "the system goes on";
   slam.process(world.frame(2, {.dark = true}));
   EXPECT_EQ(told(slam.take_events()), "2:lost ");
+}
+
+TEST_F(Library, ACallbackMaySetAnother) {
+  Slam slam = slam_with();
+  int first = 0, second = 0;
+  slam.on_event([&](const Event&) {
+    ++first;
+    slam.on_event([&](const Event&) { ++second; });
+  });
+  slam.process(world.frame(0, {}));  // a new map, and its first keyframe
+  EXPECT_EQ(first, 2);
+  EXPECT_EQ(second, 0) << "from the next frame on";
+  slam.process(world.frame(1, {.dark = true}));
+  EXPECT_EQ(first, 2);
+  EXPECT_EQ(second, 1);
+}
+
+TEST_F(Library, AKeyframeRuleIsToldPlainNumbers) {
+  struct Counting final : KeyframePolicy {
+    KeyframeAnswer decide(const KeyframeQuery& q) override {
+      close = std::max(close, q.tracked_close_points);
+      EXPECT_LE(q.tracked_close_points, static_cast<int>(q.points.size()));
+      EXPECT_LE(q.reference_points, 300);
+      return {};
+    }
+    int close = 0;
+  };
+  const auto rule = std::make_shared<Counting>();
+  Options few;
+  few.set("features.count", "300");
+  Slam slam(world.camera(), few, {}, rule);
+  for (int i = 0; i < 8; ++i) slam.process(world.frame(i, {.shift = i}));
+  EXPECT_GT(rule->close, 50);
 }
 
 TEST_F(Library, WhatACallbackThrowsCostsNoOtherEvent) {

@@ -144,8 +144,9 @@ struct FrameResult {
   /// Of world_from_cam: right perturbation, [translation m, rotation rad]. The frame's in the map, and the map's own
   /// there against the world's origin; a map that was loaded is taken for the truth.
   std::optional<Matrix6d> covariance;
-  Rigid3 world_from_odom;               ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
-  int inliers = 0;                      ///< map points that the pose rests on
+  int map = 0;             ///< as TrajectoryFrame::map: other than 0, how its world lies to the first's is not known
+  Rigid3 world_from_odom;  ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
+  int inliers = 0;         ///< map points that the pose rests on
   int reference_keyframe = -1;          ///< the keyframe that shows most of them
   std::vector<Mover> movers;            ///< seen in this frame, by id
   std::vector<Detection> detections;    ///< boxes of the detectors, carried to this image

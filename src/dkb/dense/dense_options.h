@@ -7,7 +7,7 @@ namespace dkb {
 struct DenseOptions {
   double voxel = 0.02;          // [m] side of a voxel, 0.005 ... 0.2
   double truncation = 0.06;     // [m] distances to a surface are kept up to here, 2 ... 20 voxels
-  double max_depth = 4.0;       // [m] depths beyond tell of free space only, 0.5 ... 20
+  double max_depth = 4.0;       // [m] depths beyond tell of free space only, 0.5 ... 16
   int pixel_step = 2;           // [px] every how many pixels, in x and y, depth is kept of a keyframe, 1 ... 8
   int mover_margin = 10;        // [px] around movers that is left out as well, 0 ... 100
   double edge_fraction = 0.05;  // [1] depths beside a step of this share are left out, > 0

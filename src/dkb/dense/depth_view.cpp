@@ -72,10 +72,10 @@ DepthView DepthViewMaker::make(FrameIndex frame, const RgbdImage& image, const M
     const uint8_t grey = image.grey.data()[s];
     view.colour.data()[i] = image.colour.empty() ? Rgb{grey, grey, grey} : image.colour.data()[s];
     const float z = image.depth.data()[s];
-    if (!(z > 0) || z * DepthView::kUnitsPerMetre > 65535) continue;
+    if (!(z > 0)) continue;
     const int u = source_[i] % camera_.width, v = source_[i] / camera_.width;
     if (on_one_surface(image.depth, u, v, static_cast<float>(options_.edge_fraction)))
-      view.depth.data()[i] = static_cast<uint16_t>(z * DepthView::kUnitsPerMetre + 0.5F);
+      view.depth.data()[i] = static_cast<uint16_t>(std::min(z * DepthView::kUnitsPerMetre + 0.5F, 65535.0F));
   }
   remove(movers, &view);
   return view;

@@ -19,6 +19,9 @@ inline constexpr int kPointFeatureBits = 13;
 inline constexpr int kMaxFeaturesPerFrame = 1 << kPointFeatureBits;
 inline constexpr PointId kNoPoint = 0xffffffffu;
 
+// The last one that can name points other than kNoPoint.
+inline constexpr KeyframeId kLastKeyframe = static_cast<KeyframeId>(kNoPoint >> kPointFeatureBits) - 1;
+
 constexpr PointId make_point_id(KeyframeId birth, int feature) {
   return (static_cast<PointId>(birth) << kPointFeatureBits) | static_cast<PointId>(feature);
 }

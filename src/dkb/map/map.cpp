@@ -165,7 +165,8 @@ void Map::add_keyframe(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   const std::vector<PointId> points = std::move(keyframe.points);
   keyframe.points.assign(keyframe.features->size(), kNoPoint);
-  places_.add(id, keyframe.features->descriptors);
+  // Beyond that the place of a keyframe is found by those around it.
+  if (!places_.full()) places_.add(id, keyframe.features->descriptors);
   keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_.value()});
   ++live_keyframe_count_;
   for (size_t i = 0; i < points.size(); ++i) {
@@ -320,8 +321,9 @@ KeyframeId Map::moved_on_from(KeyframeId id) const {
 void Map::hand_on_motion(KeyframeId id) {
   const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
   for (KeyframeId next = id + 1; next < keyframe_count(); ++next) {
-    const std::shared_ptr<const KeyframeMotion> after = keyframe(next)->motion;
-    if (keyframe(next)->culled || !after || after->previous != id) continue;
+    const Keyframe& k = *keyframe(next);
+    if (k.culled || k.motion == nullptr || k.motion->previous != id) continue;
+    const std::shared_ptr<const KeyframeMotion> after = k.motion;
     edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
                                      KeyframeMotion{before->previous, joined(before->since, after->since)})
                                : nullptr;

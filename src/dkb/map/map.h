@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -186,5 +187,11 @@ class Map {
 };
 
 using MapView = std::shared_ptr<const Map>;
+
+// Maps that are not joined are numbered by the age of their roots, from 0. A root that is not among these is newer than
+// all.
+inline int map_number(const std::vector<KeyframeId>& roots, KeyframeId root) {
+  return static_cast<int>(std::lower_bound(roots.begin(), roots.end(), root) - roots.begin());
+}
 
 }  // namespace dkb

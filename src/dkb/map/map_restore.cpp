@@ -113,7 +113,7 @@ Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, 
       observations.push_back({k.id, static_cast<int32_t>(f)});
     }
     map.live_keyframe_count_ += !k.culled;
-    if (!k.culled) map.places_.add(k.id, k.features->descriptors);
+    if (!k.culled && !map.places_.full()) map.places_.add(k.id, k.features->descriptors);
     map.keyframes_.push_back({std::make_shared<Keyframe>(std::move(k)), map.epoch_.value()});
   }
   PlaneId planes = 0;

@@ -125,9 +125,10 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   k.cam_from_world = packet.reference == kNoKeyframe
                          ? packet.cam_from_reference
                          : packet.cam_from_reference * map_.cam_from_world(packet.reference);
-  // A motion ties nothing together where the map begins, and that from a keyframe culled since is that from what this
-  // rides on.
-  if (packet.motion && packet.reference != kNoKeyframe && map_.keyframe(packet.motion->previous) != nullptr) {
+  // A motion ties nothing together where the map begins, or between maps whose worlds are not joined. That from a
+  // keyframe culled since is that from what this rides on.
+  if (packet.motion && packet.reference != kNoKeyframe && map_.keyframe(packet.motion->previous) != nullptr &&
+      map_.root(packet.motion->previous) == map_.root(packet.reference)) {
     const Map::Ancestor from = map_.live_ancestor(packet.motion->previous);
     MotionPrior since = packet.motion->since;
     since.previous_from_current = from.cam_from_ancestor.inverse() * since.previous_from_current;

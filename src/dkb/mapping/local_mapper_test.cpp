@@ -179,6 +179,27 @@ TEST_F(Mapping, AKeyframeMayHangOnACulledOne) {
   EXPECT_NE(view->live_keyframe(view->keyframe(late.id)->parent), nullptr);
 }
 
+TEST_F(Mapping, MotionsTieNothingBetweenMapsThatAreNotJoined) {
+  const auto motion_from = [](KeyframeId id) {
+    return std::make_shared<const KeyframeMotion>(KeyframeMotion{id, {{}, false, Matrix6d::Identity()}});
+  };
+  LocalMapper mapper = make();
+  mapper.process(packet(at(0)));
+  const auto nothing_known = [](int) { return false; };
+  KeyframePacket other = packet(at(1), at(1), {}, nothing_known);
+  other.reference = kNoKeyframe;  // a map of its own
+  other.cam_from_reference = at(1);
+  mapper.process(other);
+  KeyframePacket found = packet(at(2), at(2), {}, nothing_known);
+  found.motion = motion_from(0);  // the way here was told, and led into the other map
+  mapper.process(found);
+  EXPECT_EQ(mapper.map().keyframe(2)->motion, nullptr);
+  KeyframePacket next = packet(at(3), at(3), {}, nothing_known);
+  next.motion = motion_from(2);
+  mapper.process(next);
+  EXPECT_NE(mapper.map().keyframe(3)->motion, nullptr);
+}
+
 TEST_F(Mapping, RetractedPointsLeaveTheMap) {
   LocalMapper mapper = make();
   const MapView first = mapper.process(packet(at(0)));

@@ -31,13 +31,13 @@ std::vector<Candidate> candidates_of(const Map& map, const std::vector<PointId>&
 }
 
 Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
-                       double scale_factor) {
+                       const Optics& optics) {
   const Keypoint& k = features.keypoints[feature];
   Candidate c;
   c.position = position;
   c.normal.setZero();
   c.reference_distance = static_cast<float>(distance);
-  c.reference_scale = static_cast<float>(std::pow(scale_factor, k.octave));
+  c.reference_scale = optics.scale(k.octave);
   c.angle = k.angle;
   c.descriptor = features.descriptors[feature];
   return c;
@@ -57,8 +57,6 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
   const float cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
   const bool distorted = camera.distorted();
   const float width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
-  std::array<float, 32> scales{};
-  for (int l = 0; l < 32; ++l) scales[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l));
   std::array<float, 32> boundary{};  // level l is the nearest while the scale is below boundary[l]
   for (int l = 0; l < 32; ++l) boundary[static_cast<size_t>(l)] = static_cast<float>(std::pow(scale_factor, l + 0.5));
   const float nearest_scale = 1.0f / static_cast<float>(std::pow(scale_factor, 1.5));
@@ -82,7 +80,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;
     for (int l = 0; l < optics.levels - 1; ++l) level += scale > boundary[static_cast<size_t>(l)] ? 1 : 0;
-    const float radius = options.radius * scales[static_cast<size_t>(level)];
+    const float radius = options.radius * optics.scale(level);
     int best = 256, second = 256, best_feature = -1, best_level = -1, second_level = -1;
     features.grid.for_each_near({u, v, radius, level - 1, level + 1}, [&](int f) {
       const Keypoint& k = features.keypoints[static_cast<size_t>(f)];

@@ -29,7 +29,7 @@ std::vector<Candidate> candidates_of(const Map& map, const std::vector<PointId>&
 // What feature `feature` shows, to be found again in another frame: it stands at `position` [m] in the world,
 // `distance` [m] from the camera that saw it.
 Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen::Vector3d& position, double distance,
-                       double scale_factor);
+                       const Optics& optics);
 
 struct ProjectionMatchOptions {
   float radius = 4.0f;           // [px] search radius at the finest level, > 0; grows with the predicted scale

@@ -18,6 +18,7 @@ struct Optics {
     for (size_t octave = 0; octave < variances_.size(); ++octave) {
       const double sigma = noise.corner_sigma(static_cast<int>(octave), scale_factor);
       variances_[octave] = sigma * sigma;
+      scales_[octave] = static_cast<float>(std::pow(scale_factor, octave));
     }
   }
 
@@ -32,10 +33,13 @@ struct Optics {
     const double own = corner.place_sigma;
     return variances_[corner.octave] + own * own;
   }
+  // Size of a level over that of the finest.
+  float scale(int level) const { return scales_[static_cast<size_t>(level)]; }
   double corner_sigma(const Keypoint& corner) const { return std::sqrt(corner_variance(corner)); }
 
  private:
   std::array<double, SensorNoise::kMaxLevels> variances_;
+  std::array<float, SensorNoise::kMaxLevels> scales_;
 };
 
 }  // namespace dkb

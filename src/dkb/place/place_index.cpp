@@ -13,7 +13,6 @@ namespace dkb {
 namespace {
 
 constexpr size_t kTrees = 2;
-constexpr size_t kMaxSlots = 1 << 16;
 
 // Each tree has bits of its own, drawn once and for all.
 std::vector<DescriptorTree> make_trees() {
@@ -40,14 +39,14 @@ std::vector<PlaceIndex::IdSlot>::const_iterator PlaceIndex::find(int32_t id) con
 }
 
 uint16_t PlaceIndex::take_slot() {
-  if (free_.empty() && slots_.size() == kMaxSlots) sweep();
+  if (free_.empty() && slots_.size() == kMaxKeyframes) sweep();
   if (!free_.empty()) {
     const uint16_t slot = free_.back();
     free_.pop_back();
     return slot;
   }
-  if (slots_.size() == kMaxSlots)
-    throw std::length_error("place index: more than " + std::to_string(kMaxSlots) + " keyframes");
+  if (slots_.size() == kMaxKeyframes)
+    throw std::length_error("place index: more than " + std::to_string(kMaxKeyframes) + " keyframes");
   slots_.emplace_back();
   return static_cast<uint16_t>(slots_.size() - 1);
 }

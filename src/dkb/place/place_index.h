@@ -27,10 +27,11 @@ struct PlaceMatch {
 // results.
 class PlaceIndex {
  public:
+  static constexpr size_t kMaxKeyframes = size_t{1} << 16;  // slots are 16-bit numbers
+
   PlaceIndex();
 
-  // `id` >= 0. Throws std::logic_error for a negative id or one that is there, std::length_error beyond 65536
-  // keyframes.
+  // `id` >= 0. Throws std::logic_error for a negative id or one that is there, std::length_error when full.
   void add(int32_t id, std::span<const Descriptor> descriptors);
   // An id that is not there is ignored.
   void remove(int32_t id);
@@ -38,6 +39,8 @@ class PlaceIndex {
   // The most similar keyframes first, at most `max_results`; equal ones by id. Only keyframes with votes are listed.
   std::vector<PlaceMatch> query(std::span<const Descriptor> descriptors, size_t max_results) const;
 
+  // Another keyframe would be one too many.
+  bool full() const { return size() >= kMaxKeyframes; }
   bool contains(int32_t id) const { return find(id) != slot_of_id_.end(); }
   size_t size() const { return slot_of_id_.size(); }
   // [bytes] in all, parts shared with copies included.

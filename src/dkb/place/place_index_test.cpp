@@ -82,6 +82,21 @@ TEST(PlaceIndex, FindsAPlaceByItsOwnDescriptors) {
   EXPECT_GE(matches[0].votes, 200);  // each descriptor finds itself in both trees
 }
 
+TEST(PlaceIndex, SaysWhenItIsFull) {
+  PlaceIndex index;
+  const Descriptors place = random_place(1, 1);
+  for (size_t id = 0; id < PlaceIndex::kMaxKeyframes; ++id) {
+    ASSERT_FALSE(index.full());
+    index.add(static_cast<int32_t>(id), id % 1000 == 0 ? place : Descriptors{});
+  }
+  EXPECT_TRUE(index.full());
+  EXPECT_THROW(index.add(70000, place), std::length_error);
+  index.remove(7);
+  EXPECT_FALSE(index.full());
+  index.add(70000, place);
+  EXPECT_TRUE(index.full());
+}
+
 TEST(PlaceIndex, AnswersAreOrderedByScoreThenId) {
   PlaceIndex index;
   const Descriptors place = random_place(1, 200);

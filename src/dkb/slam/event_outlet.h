@@ -17,7 +17,10 @@ class EventOutlet {
  public:
   void deliver(std::vector<Event> events) {
     if (events.empty()) return;
-    if (!callback_) {
+    // Copied, since a callback may set another one.
+    const auto callback = callback_;
+    const auto executor = executor_;
+    if (!callback) {
       const std::lock_guard lock(mutex_);
       for (Event& e : events) waiting_.push_back(std::move(e));
       while (waiting_.size() > kMaxEvents) waiting_.pop_front();
@@ -27,10 +30,10 @@ class EventOutlet {
     std::exception_ptr thrown;
     for (const Event& e : events) {
       try {
-        if (executor_)
-          executor_([callback = callback_, e] { callback(e); });
+        if (executor)
+          executor([callback, e] { callback(e); });
         else
-          callback_(e);
+          callback(e);
       } catch (...) {
         if (!thrown) thrown = std::current_exception();
       }

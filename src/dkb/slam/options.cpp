@@ -97,7 +97,7 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
   visit("dense.truncation", p.dense.truncation, o.dense.truncation,
         "[m] distances to a surface are kept up to here, 2 to 20 voxels", above(0));
   visit("dense.max_depth", p.dense.max_depth, o.dense.max_depth, "[m] depths beyond tell of free space only",
-        Range{0.5, 20});
+        Range{0.5, 16});
   visit("dense.grid_cell", p.dense.grid_cell, o.dense.grid_cell, "[m] side of a cell of the occupancy grid",
         Range{0.01, 1});
   visit("dense.obstacle_low", p.dense.obstacle_low, o.dense.obstacle_low,

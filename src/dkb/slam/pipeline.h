@@ -87,6 +87,8 @@ class Pipeline {
   std::shared_ptr<const PlaneView> find_planes(const Scene& scene);
   void insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked);
   void push_start(const TrackedFrame* next);
+  int map_number(KeyframeId reference);
+  bool may_make_keyframes() const { return !localize_only_ && next_keyframe_ <= kLastKeyframe; }
   void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
   void note(Event::Kind kind, std::string text = "", int keyframe = -1);
   void note_changes(const TrackedFrame& tracked);
@@ -130,6 +132,12 @@ class Pipeline {
   };
   KeyframeId next_keyframe_ = 0;
   LastKeyframe last_keyframe_;
+  // Looked up where the view or the reference changes.
+  struct MapNumber {
+    KeyframeId reference = kNoKeyframe;
+    int number = 0;
+  };
+  MapNumber map_number_;
   std::optional<KeyframeMotion> since_keyframe_;  // nothing where a frame since then had no motion
   FrameIndex last_relocalisation_ = -1000000;
   struct RecentKeyframe {

@@ -108,7 +108,15 @@ void Pipeline::take_view(const MapView& view) {
   odometry_.move_world(moved);
   movers_.rebase(moved);
   scenes_.move_world(moved);
+  map_number_ = {};
   record_.set_map(tracker_.map());
+}
+
+int Pipeline::map_number(KeyframeId reference) {
+  const TrackingMap& map = tracker_.map();
+  if (map_number_.reference != reference)
+    map_number_ = {reference, dkb::map_number(map.view().roots(), map.root(reference))};
+  return map_number_.number;
 }
 
 void Pipeline::correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due) {
@@ -211,7 +219,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .step = scene.step ? &*scene.step : nullptr,
                                          .start = start ? &*start : nullptr,
                                          .movers = scenes_.compares_depth(),
-                                         .may_start_map = !localize_only_});
+                                         .may_start_map = may_make_keyframes()});
   if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
@@ -261,6 +269,8 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     decision = {true, KeyframeRule::first, "the map starts here"};
   } else if (localize_only_) {
     decision = {false, KeyframeRule::none, "the map is not changed"};
+  } else if (!may_make_keyframes()) {
+    decision = {false, KeyframeRule::none, "the map is full"};
   } else {
     KeyframeContext c;
     c.frame = tracked.index;
@@ -270,7 +280,10 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     c.last_relocalisation_frame = last_relocalisation_;
     c.last_keyframe = last_keyframe_.id;
     c.mapper_idle = mapping_.outstanding() == 0;
-    const auto as_usual = [](int count, int of) { return static_cast<int>(std::lround(kUsualFeatures * count / of)); };
+    // A user's rule is told the plain numbers.
+    const auto as_usual = [this](int count, int of) {
+      return context_.policy ? count : static_cast<int>(std::lround(kUsualFeatures * count / of));
+    };
     const int wanted = features_wanted();
     int tracked_close = 0, creatable_close = 0;
     for (size_t f = 0; f < tracked.points.size(); ++f) {
@@ -326,6 +339,9 @@ void Pipeline::push_start(const TrackedFrame* next) {
 
 void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked) {
   const KeyframeId id = next_keyframe_++;
+  if (!may_make_keyframes())
+    note(Event::Kind::warning, "the map is full, " + std::to_string(id) +
+                                   " keyframes were made: tracking goes on in it; save it, and begin a new one");
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);
   if (since_keyframe_) {
@@ -388,6 +404,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     result.covariance =
         tracked.covariance + to_camera * tracker_.map().covariance(tracked.reference) * to_camera.transpose();
     result.reference_keyframe = tracked.reference;
+    result.map = map_number(tracked.reference);
   }
   if (tracked.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();

@@ -2,19 +2,26 @@
 #include "dkb/slam/run_record.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "dkb/solver/pose_smoother.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
-namespace {
 
-// Maps are numbered by the age of their roots. A root that is not among them is newer than all.
-int rank_of(const std::vector<KeyframeId>& roots, KeyframeId root) {
-  return static_cast<int>(std::lower_bound(roots.begin(), roots.end(), root) - roots.begin());
+void RunRecord::Records::add(const Record& record) {
+  constexpr size_t kBlock = 256;
+  if (last_.empty()) last_.reserve(kBlock);
+  last_.push_back(record);
+  if (last_.size() == kBlock) full_.push_back(std::make_shared<const std::vector<Record>>(std::exchange(last_, {})));
 }
 
-}  // namespace
+size_t RunRecord::Records::size() const {
+  size_t size = last_.size();
+  for (const auto& block : full_) size += block->size();
+  return size;
+}
 
 void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const TrackingMap& map) {
   const std::lock_guard lock(mutex_);
@@ -26,8 +33,8 @@ void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const 
   ++counts_.tracked;
   counts_.predicted += result.state == TrackingState::predicted;
   counts_.relocalisations += result.state == TrackingState::relocalised;
-  records_.push_back({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam,
-                      frame.covariance.cast<float>()});
+  records_.add({frame.index, result.stamp_ns, frame.reference, frame.cam_from_reference, *result.world_from_cam,
+                frame.covariance.cast<float>()});
 }
 
 void RunRecord::add(const KeyframeTests& tests) {
@@ -76,26 +83,38 @@ MapSnapshot RunRecord::map() const {
 }
 
 std::vector<TrajectoryFrame> RunRecord::trajectory(TrajectoryKind kind) const {
-  std::vector<TrajectoryFrame> frames;
-  std::map<int, std::vector<MeasuredPose>> by_map;
+  Records records;
+  TrackingMap map;
   {
+    // Tracking waits for this mutex: what takes time in a long run is done without it.
     const std::lock_guard lock(mutex_);
-    const std::vector<KeyframeId> roots = map_.view().roots();
-    frames.reserve(records_.size());
-    for (const Record& r : records_) {
-      const Rigid3 by_keyframe = (r.cam_from_reference * map_.cam_from_world(r.reference)).inverse();
-      frames.push_back({r.frame, r.stamp_ns, kind == TrajectoryKind::online ? r.world_from_cam_online : by_keyframe,
-                        rank_of(roots, map_.root(r.reference))});
-      if (kind == TrajectoryKind::smoothed)
-        by_map[frames.back().map].push_back(
-            {seconds_from_ns(r.stamp_ns - records_[0].stamp_ns), by_keyframe, r.covariance.cast<double>()});
-    }
+    records = records_;
+    map = map_;
   }
-  for (const auto& [map, measured] : by_map) {
+  std::vector<TrajectoryFrame> frames;
+  frames.reserve(records.size());
+  std::map<int, std::vector<MeasuredPose>> by_map;
+  const std::vector<KeyframeId> roots = map.view().roots();
+  struct Place {
+    Rigid3 cam_from_world;
+    int map = 0;
+  };
+  std::map<KeyframeId, Place> places;
+  records.for_each([&](const Record& r) {
+    auto [at, unknown] = places.try_emplace(r.reference);
+    if (unknown) at->second = {map.cam_from_world(r.reference), map_number(roots, map.root(r.reference))};
+    const Rigid3 by_keyframe = (r.cam_from_reference * at->second.cam_from_world).inverse();
+    frames.push_back(
+        {r.frame, r.stamp_ns, kind == TrajectoryKind::online ? r.world_from_cam_online : by_keyframe, at->second.map});
+    if (kind == TrajectoryKind::smoothed)
+      by_map[frames.back().map].push_back(
+          {seconds_from_ns(r.stamp_ns - frames.front().stamp_ns), by_keyframe, r.covariance.cast<double>()});
+  });
+  for (const auto& [number, measured] : by_map) {
     const std::vector<Rigid3> poses = smoothed_poses(measured);
     auto pose = poses.begin();
     for (TrajectoryFrame& f : frames)
-      if (f.map == map) f.world_from_cam = *pose++;
+      if (f.map == number) f.world_from_cam = *pose++;
   }
   return frames;
 }
@@ -151,7 +170,7 @@ std::vector<KeyframeInfo> MapSnapshot::keyframes() const {
   for (KeyframeId id : map_->live_keyframes()) {
     const Keyframe& k = *map_->keyframe(id);
     KeyframeInfo info{id, ns_from_seconds(k.timestamp), k.frame, k.cam_from_world.inverse(), {}, 0};
-    info.map = rank_of(roots, map_->root(id));
+    info.map = map_number(roots, map_->root(id));
     for (const Covisible& c : k.covisible) info.covisible.push_back({c.keyframe, c.shared_points});
     keyframes.push_back(std::move(info));
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -46,8 +47,24 @@ class RunRecord {
     Rigid3 cam_from_reference, world_from_cam_online;
     Eigen::Matrix<float, 6, 6> covariance;  // as in TrackedFrame
   };
+  // Grows without ever being copied as a whole: readers share the blocks that are full.
+  class Records {
+   public:
+    void add(const Record& record);
+    size_t size() const;
+    template <class Use>
+    void for_each(const Use& use) const {
+      for (const auto& block : full_)
+        for (const Record& r : *block) use(r);
+      for (const Record& r : last_) use(r);
+    }
+
+   private:
+    std::vector<std::shared_ptr<const std::vector<Record>>> full_;
+    std::vector<Record> last_;
+  };
   mutable std::mutex mutex_;  // guards what follows
-  std::vector<Record> records_;
+  Records records_;
   std::vector<LoopInfo> loops_;
   TrackingMap map_;
   Statistics counts_;

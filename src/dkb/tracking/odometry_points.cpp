@@ -23,8 +23,8 @@ std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) con
   result.reserve(points_.size());
   for (const Point& p : points_) {
     const Eigen::Vector3d position = world_from_cam * p.point_in_cam;
-    result.push_back(candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(),
-                                  optics_.scale_factor));
+    result.push_back(
+        candidate_of(*frame.features, static_cast<size_t>(p.feature), position, p.point_in_cam.norm(), optics_));
   }
   return result;
 }

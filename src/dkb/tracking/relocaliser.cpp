@@ -13,8 +13,9 @@ namespace {
 constexpr size_t kCandidates = 6;  // look-alike keyframes that are tried
 constexpr size_t kNeighbours = 4;  // covisible keyframes whose points are matched along with each one's
 
-constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place
-constexpr double kAmbiguity = 0.5;       // poses elsewhere with this share of the most inliers rival the best ...
+constexpr double kMaxPositionSd = 0.01;  // [m] standard deviation of the camera's place ...
+constexpr double kMaxSdInView = 2;  // [px] ... or what shifts the view by so much, where it is far or the image small
+constexpr double kAmbiguity = 0.5;  // poses elsewhere with this share of the most inliers rival the best ...
 const double kClearLead = std::log(20);  // ... unless its log odds are so much less
 
 bool same_place(const Rigid3& a, const Rigid3& b) {
@@ -23,11 +24,6 @@ bool same_place(const Rigid3& a, const Rigid3& b) {
 }
 
 }  // namespace
-
-bool PoseProposal::verified() const {
-  return fit.inliers >= kMinRelocalisationInliers &&
-         std::sqrt(fit.covariance.topLeftCorner<3, 3>().trace()) <= kMaxPositionSd;
-}
 
 Relocaliser::Relocaliser(const Optics& optics, uint64_t seed) : optics_(optics), seed_(seed) {}
 
@@ -49,7 +45,7 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
   // Of look-alike places the true one differs least from what is seen.
   const auto better = [](const PoseProposal& a, const PoseProposal& b) { return a.log_odds > b.log_odds; };
   std::stable_sort(proposals.begin(), proposals.end(), better);
-  const auto verified = std::find_if(proposals.begin(), proposals.end(), [](const auto& p) { return p.verified(); });
+  const auto verified = std::find_if(proposals.begin(), proposals.end(), [](const auto& p) { return p.verified; });
   if (verified == proposals.end()) return std::nullopt;
   PoseProposal& best = *verified;
   for (const PoseProposal& other : proposals)
@@ -68,7 +64,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
     // A keyframe that sees what an earlier one led to would lead there again.
     const auto& points = map.keyframe(like.id)->points;
     const bool explained = std::any_of(proposals.begin(), proposals.end(), [&](const PoseProposal& p) {
-      if (!p.verified()) return false;
+      if (!p.verified) return false;
       const auto shared = std::count_if(p.fit.points.begin(), p.fit.points.end(), [&](PointId id) {
         return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
       });
@@ -123,6 +119,15 @@ std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, const std::v
   auto fit = fit_by_projection(proposal.around, features, optics_, expected_cam_from_world, radii);
   if (!fit) return std::nullopt;
   proposal.fit = std::move(*fit);
+  std::vector<double> depths;
+  for (size_t i = 0; i < proposal.around.size(); ++i)
+    if (proposal.fit.sightings[i] == Sighting::found)
+      depths.push_back((proposal.fit.cam_from_world * proposal.around[i].position).z());
+  if (proposal.fit.inliers < kMinRelocalisationInliers || depths.empty()) return proposal;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  const double limit = std::max(kMaxPositionSd, kMaxSdInView * *middle / optics_.camera.fx);
+  proposal.verified = std::sqrt(proposal.fit.covariance.topLeftCorner<3, 3>().trace()) <= limit;
   return proposal;
 }
 

@@ -23,7 +23,7 @@ struct PoseProposal {
   double log_odds = 0;           // of all that was seen there, against a place that only looks like it
   bool ambiguous = false;        // another place in the map explains the view nearly as well
 
-  bool verified() const;  // enough of the map is found from there, and tells where the camera is
+  bool verified = false;  // enough of the map is found from there, and tells where the camera is
 };
 
 // Where in the map is this frame? Asks the place index, matches descriptors with each keyframe that looks like the

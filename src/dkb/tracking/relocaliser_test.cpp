@@ -78,7 +78,7 @@ TEST_F(RelocaliserTest, FindsTheCameraWithoutAnyIdeaOfItsPlace) {
     FixedAppearance unmatched(Look::other);
     const auto found = find(*scene.look(truth, noisy).features, &unmatched);
     ASSERT_TRUE(found) << n;
-    EXPECT_TRUE(found->verified());
+    EXPECT_TRUE(found->verified);
     EXPECT_LT(distance_between(found->fit.cam_from_world, truth), 0.015);
     EXPECT_LT(rotation_between(found->fit.cam_from_world, truth), 0.3);
     const auto matched = std::count_if(found->looks.begin(), found->looks.end(), [](PointLook l) { return l.same; });
@@ -104,7 +104,7 @@ TEST_F(RelocaliserTest, TwoPlacesThatExplainAFrameEquallyWellAreAmbiguous) {
   const RgbdFeatures features = *scene.look({}).features;
   const auto proposals = relocaliser().propose(map, features, ignores_none, nullptr);
   ASSERT_EQ(proposals.size(), 2U);
-  EXPECT_TRUE(proposals[0].verified() && proposals[1].verified());
+  EXPECT_TRUE(proposals[0].verified && proposals[1].verified);
   const auto found = find(features);
   ASSERT_TRUE(found);
   EXPECT_TRUE(found->ambiguous) << "a guess is no pose";
@@ -146,7 +146,7 @@ TEST_F(RelocaliserTest, TheImageTellsHowPointsLookThatNoFeatureMatched) {
   const auto looks_by = [&](Look answer) {
     FixedAppearance appearance(answer);
     const auto found = find(features, &appearance);
-    EXPECT_TRUE(found && found->verified());
+    EXPECT_TRUE(found && found->verified);
     const auto same = std::count_if(found->looks.begin(), found->looks.end(), [](PointLook l) { return l.same; });
     return std::pair(same, static_cast<long>(found->looks.size()) - same);
   };
@@ -175,7 +175,7 @@ TEST_F(RelocaliserTest, ALookAlikeIsAmbiguousUntilTheViewsDecide) {
     if (seen->keypoints[f].pixel.x() < 120) seen->descriptors[f] = {f, ~f, f * f, ~(f * f)};
   FixedAppearance different(Look::other);
   const auto found = find(*seen, &different);
-  ASSERT_TRUE(found && found->verified());
+  ASSERT_TRUE(found && found->verified);
   EXPECT_LT(found->log_odds, 0);
 
   Tracker tracker({camera, {}, TestScene::kScaleFactor, TestScene::kLevels}, {}, 1);

@@ -103,7 +103,8 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, cons
 double Tracker::reach_px(double radius, const Matrix6d& covariance) const {
   const auto sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const double spread = 3 * optics_.camera.fx * (sd.head<2>().maxCoeff() + sd.tail<3>().head<2>().maxCoeff());
-  return std::min(kMaxSearchRadius, radius + spread);
+  // Beyond, nearly everything is a candidate of everything.
+  return std::min(6 * radius_last_frame(), radius + spread);
 }
 
 // [px] Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
@@ -132,7 +133,7 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
   const auto ignores = [this](PointId point) { return is_retracted(point); };
   const auto right = [&](const std::optional<PoseProposal>& found) {
-    return found && found->verified() && expected.agrees(found->fit.cam_from_world);
+    return found && found->verified && expected.agrees(found->fit.cam_from_world);
   };
   if (nearby.empty()) return std::nullopt;
   for (const double radius : widening_radii(expected.covariance)) {

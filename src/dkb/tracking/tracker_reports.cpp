@@ -76,7 +76,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
     p.keyframe = id;
     p.feature = f;
     p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), z);
-    p.scale = static_cast<float>(std::pow(optics_.scale_factor, k.octave));
+    p.scale = optics_.scale(k.octave);
     p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
     packet.new_points.push_back(p);
   }

@@ -16,9 +16,7 @@ namespace {
 constexpr double kMaxVelocity = 15;         // [m/s]
 constexpr double kMaxAngularVelocity = 15;  // [rad/s]
 
-constexpr double kRadiusLastFrame = 10.0;  // [px] search around the motion model's prediction
-constexpr double kRadiusWide = 30.0;       // [px] the same around the last pose
-constexpr int kMinMatches = 20;            // with the last frame that make a pose worth trying
+constexpr int kMinMatches = 20;  // with the last frame that make a pose worth trying
 
 }  // namespace
 
@@ -34,7 +32,7 @@ std::vector<Candidate> Tracker::points_shown_last() const {
     if (id == kNoPoint || is_retracted(id)) continue;
     const auto at = position(id);
     if (!at) continue;
-    Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), optics_.scale_factor);
+    Candidate c = candidate_of(*last_->features, f, *at, (*at - centre).norm(), optics_);
     c.id = id;
     if (!seen_from_here) c.angle = -1;
     c.established = established(id, last_->timestamp);
@@ -57,8 +55,8 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   };
   // By what is known of the step where there is anything, then by the motion so far.
   std::optional<PlaceFit> fit;
-  const double radius =
-      last_->state == TrackingState::predicted ? reach_px(kRadiusLastFrame, last_->covariance) : kRadiusLastFrame;
+  const double usual = radius_last_frame();
+  const double radius = last_->state == TrackingState::predicted ? reach_px(usual, last_->covariance) : usual;
   if (input.step != nullptr)
     fit = fit_near(input.step->previous_from_current.inverse() * last_->cam_from_world, radius);
   if (!fit && velocity_)
@@ -80,7 +78,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
       if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world)) frame.predicted->weighs = false;
     }
   }
-  if (!fit) fit = fit_near(last_->cam_from_world, kRadiusWide);
+  if (!fit) fit = fit_near(last_->cam_from_world, 3 * usual);
   if (!fit && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
