@@ -8,6 +8,7 @@
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/folder_source.h"
+#include "dkb/dataset/stored_pair.h"
 #include "dkb/recordings/depth_registration.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
@@ -215,14 +216,24 @@ class PairsToFolder {
   RecordedImage read(StampPairing::Kind kind, std::string_view bytes) const {
     return read_recorded_image(bytes, topic(kind).type, encoding_[kind], topic(kind).name);
   }
+  // Of the size of the camera that took it. Throws InputError.
+  RecordedImage read_whole(StampPairing::Kind kind, std::string_view bytes) const {
+    RecordedImage image = read(kind, bytes);
+    const bool of_own_camera = kind == StampPairing::depth && contents_.depth_camera;
+    const Camera& camera = of_own_camera ? contents_.depth_camera->camera : contents_.camera;
+    const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
+    if (image.content == topic(kind).content && !wrong.empty()) throw InputError(wrong);
+    return image;
+  }
   void leave_out(const std::string& why) const { options_.warn(why + "; it is left out"); }
 
   void write() {
     while (const auto pair = pairing_.take()) {
       try {
-        const RecordedImage colour = read(StampPairing::colour, pair->colour.bytes);
+        const RecordedImage colour = read_whole(StampPairing::colour, pair->colour.bytes);
         const Picture picture = picture_of(colour);
-        DepthImage depth = depth_of(read(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
+        DepthImage depth =
+            depth_of(read_whole(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
         if (registration_) depth = registration_->registered(depth);
         const std::string_view file = colour.compressed ? colour.stored : std::string_view();
         writer_.add({pair->colour.stamp_ns, pair->depth.stamp_ns, file, &picture, &depth});
