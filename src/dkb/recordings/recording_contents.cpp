@@ -198,8 +198,11 @@ class Chooser {
       motion.name = motion_topic(survey_.odometries, options_.odom_topic, "--odom-topic", "nav_msgs/Odometry",
                                  prior == PriorKind::odometry);
     if (motion.name.empty() && prior != PriorKind::odometry) {
-      motion.name =
-          motion_topic(survey_.inertial, options_.imu_topic, "--imu-topic", "sensor_msgs/Imu", prior == PriorKind::imu);
+      if (survey_.without_rates.contains(options_.imu_topic))
+        throw InputError("--imu-topic " + options_.imu_topic +
+                         ": tells no angular rates (covariance -1); pick another");
+      motion.name = motion_topic(survey_.inertial, options_.imu_topic, "--imu-topic",
+                                 "sensor_msgs/Imu with angular rates", prior == PriorKind::imu);
       motion.inertial = true;
     }
     if (motion.name.empty()) return;

@@ -238,7 +238,7 @@ TEST_F(MotionOfARecording, WithoutThePlaceOfTheCameraIsTakenForItsOwnOnlyWhenAsk
 }
 
 TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
-  EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu");
+  EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
   list.add("/wheels", "nav_msgs/Odometry", kFirst, odometry);
   const std::string several =
       "r.bag: has several topics of nav_msgs/Odometry: /odom, /wheels; pick one with --odom-topic";
@@ -249,6 +249,22 @@ TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
   EXPECT_EQ(contents_of(list, options).motion->name, "/wheels");
   options.odom_topic = "/no";
   EXPECT_EQ(refused(list, options), "--odom-topic /no: r.bag has no nav_msgs/Odometry there; it has /odom, /wheels");
+}
+
+TEST(RecordingContents, AnInertialUnitWithoutAGyroscopeIsNoMotion) {
+  MessageList list = usual();
+  ImuMessage imu;
+  imu.header = {kFirst, "camera", 0}, imu.angular_velocity_covariance[0] = -1;
+  list.add("/accel", "sensor_msgs/Imu", kFirst, imu);
+  EXPECT_FALSE(contents_of(list).motion);
+  SourceOptions options;
+  options.imu_topic = "/accel";
+  EXPECT_EQ(refused(list, options), "--imu-topic /accel: tells no angular rates (covariance -1); pick another");
+  options.imu_topic = "", options.prior = PriorKind::imu;
+  EXPECT_EQ(refused(list, options), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
+  imu.angular_velocity_covariance[0] = 0;
+  list.add("/gyro", "sensor_msgs/Imu", kFirst, imu);
+  EXPECT_EQ(contents_of(list).motion->name, "/gyro");
 }
 
 TEST(StaticTransforms, AreFoundThroughCommonAncestors) {
