@@ -237,6 +237,18 @@ TEST_F(MotionOfARecording, WithoutThePlaceOfTheCameraIsTakenForItsOwnOnlyWhenAsk
   EXPECT_EQ(asked.warnings, std::vector<std::string>{unlinked + "taken for the camera's own"});
 }
 
+TEST_F(MotionOfARecording, OfAnInertialUnitThatIsLinkedGoesBeforeOdometryThatIsNot) {
+  ImuMessage imu;
+  imu.header = {kFirst, "camera", 0};
+  list.add("/imu", "sensor_msgs/Imu", kFirst, imu);
+  const RecordingContents contents = contents_of(list);
+  ASSERT_TRUE(contents.motion);
+  EXPECT_EQ(contents.motion->name, "/imu");
+  EXPECT_TRUE(contents.motion->inertial);
+  ASSERT_EQ(contents.warnings.size(), 1u);
+  EXPECT_NE(contents.warnings[0].find("the frame of /odom (base)"), std::string::npos) << contents.warnings[0];
+}
+
 TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
   EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
   list.add("/wheels", "nav_msgs/Odometry", kFirst, odometry);
