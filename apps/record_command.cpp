@@ -43,7 +43,9 @@ int record(const RecordArguments& args) {
   SourceOptions reading = args.reading;
   reading.depth_limits = false;  // those are for whoever reads the recording
   const std::unique_ptr<Source> source = open_source(args.source, reading);
-  const auto writer = write_pairs(args.out, source->camera(), source->camera().to_yaml(), quick_options(args.out));
+  PairWriterOptions writing = quick_options(args.out);
+  writing.warn = [&](const std::string& line) { warnings.warn(line, line); };
+  const auto writer = write_pairs(args.out, source->camera(), source->camera().to_yaml(), writing);
   if (!args.quiet) tell(stdout, "{}, into {}; Ctrl-C ends it\n", source->description(), args.out);
   const Interrupt interrupt([&] { source->stop(); });
   const bool terminal = isatty(STDERR_FILENO) != 0 && !args.quiet;

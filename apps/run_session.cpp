@@ -20,6 +20,7 @@
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/detection/boxes_file.h"
+#include "dkb/detection/mask_folder.h"
 #include "dkb/map/map_file.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
@@ -117,9 +118,16 @@ std::optional<double> cv_orb_of(const RunArguments& args, const Source& source, 
   return measure_cv_orb(*again, static_cast<size_t>(pairs));
 }
 
+// Of the images of a part, boxes and masks may show nobody.
+bool takes_all_images(const RunArguments& args) {
+  const SourceOptions whole;
+  return args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
+         args.reading.end == whole.end && !args.reading.max_frames;
+}
+
 DetectorChoice detector_choice(const RunArguments& args, const Options& options, const ReaderSource* source) {
   DetectorChoice choice = args.detection;
-  if (source != nullptr) choice.stamps_ns = source->stamps_ns();
+  if (source != nullptr && takes_all_images(args)) choice.stamps_ns = source->stamps_ns();
   return choice_beside(options, args.disable, std::move(choice));
 }
 
@@ -170,20 +178,21 @@ std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr
   return with_prior(std::move(source), std::move(track));
 }
 
+template <class Kind>
+std::shared_ptr<const Kind> detector_of(const Detectors& detectors) {
+  for (const auto& detector : detectors.prompt)
+    if (auto found = std::dynamic_pointer_cast<const Kind>(detector)) return found;
+  return nullptr;
+}
+
 // The detector that reads boxes, when there are any, to see whether they belong to these images. Throws InputError when
 // it is known that they do not.
 std::shared_ptr<const FileDetector> boxes_of(const RunArguments& args, const Detectors& detectors,
                                              const ReaderSource* reader) {
-  std::shared_ptr<const FileDetector> file;
-  for (const auto& detector : detectors.prompt)
-    if (!file) file = std::dynamic_pointer_cast<const FileDetector>(detector);
+  auto file = detector_of<FileDetector>(detectors);
   if (!file || file->boxes().empty()) return nullptr;
   const std::vector<int64_t> stamps = reader != nullptr ? reader->stamps_ns() : std::vector<int64_t>();
-  const SourceOptions whole;
-  const bool all_images = args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
-                          args.reading.end == whole.end && !args.reading.max_frames;
-  // Those of a part may show nobody.
-  if (!all_images || stamps.empty()) return file;
+  if (!takes_all_images(args) || stamps.empty()) return file;
   if (std::none_of(stamps.begin(), stamps.end(), [&](int64_t stamp) { return file->at(stamp) != nullptr; }))
     throw InputError(
         fmt::format("{}: none of its boxes has the stamp of a colour image ({:.6f} is the first); write stamps as in "
@@ -207,6 +216,7 @@ RunSession::RunSession(const RunArguments& args)
   Detectors detectors = make_detectors(detector_choice(args, options_, reader_), recording_->camera());
   loading_s_ = loading.ms() / 1000;
   boxes_ = boxes_of(args, detectors, reader_);
+  masks_ = detector_of<MaskFolder>(detectors);
   slam_.emplace(recording_->camera(), options_, std::move(detectors));
   if (!args.load_map.empty()) slam_->load_map(args.load_map);
   slam_->localize_only(args.localize);
@@ -282,6 +292,7 @@ void RunSession::track() {
       facts_.stamps.push_back(next.stamp);
       had_prior_ = had_prior_ || next.frame.prior();
       if (boxes_ && boxes_->at(next.frame.stamp_ns()) != nullptr) boxes_.reset();
+      if (masks_ && masks_->has(next.frame.stamp_ns())) masks_.reset();
       show(next, slam_->process(next.frame));
     }
   }
@@ -408,6 +419,9 @@ void RunSession::warn_of_unused() {
   if (boxes_ && !facts_.stamps.empty())
     warnings_.warn("--boxes",
                    args_.detection.boxes.string() + ": no box has the stamp of a frame; are they of this run?");
+  if (masks_ && !facts_.stamps.empty())
+    warnings_.warn("--masks",
+                   args_.detection.masks.string() + ": no mask has the stamp of a frame; are they of this run?");
   if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)
     warnings_.warn("--prior-file",
                    args_.prior_file + ": tells of no frame's motion; are its times those of the images?");

@@ -12,6 +12,7 @@
 
 #include "dkb/dataset/paced_source.h"
 #include "dkb/detection/boxes_file.h"
+#include "dkb/detection/mask_folder.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/log.h"
 #include "dkb/util/timing.h"
@@ -93,6 +94,7 @@ class RunSession {
   RunFacts facts_;
   std::optional<report::RunLog> log_;
   std::shared_ptr<const FileDetector> boxes_;  // while no frame had one of its boxes
+  std::shared_ptr<const MaskFolder> masks_;    // likewise
   bool had_prior_ = false;
   LiveReport camera_;
   std::optional<Progress> progress_;

@@ -176,6 +176,19 @@ TEST(RunCommand, WhatSwitchesTheFilterOffWinsOverADetectorWithoutAnError) {
   }
 }
 
+TEST(RunCommand, OfAPartMasksMayShowNobody) {
+  const TempFolder temp;
+  std::filesystem::create_directory(temp / "masks");
+  const std::string last = rows_of(sequence() / "rgb.txt").back()[0];
+  write_image_file(temp / "masks" / (last + ".png"), encode_png(GreyImage(640, 480, 0)));
+  const SlamRun part(sequence(), temp / "out", {"--detector", "none", "--masks", temp / "masks", "--max-frames", "8"});
+  EXPECT_EQ(part.finished.exit_code, 0) << part.finished.err;
+  EXPECT_NE(part.finished.err.find("masks: no mask has the stamp of a frame"), std::string::npos) << part.finished.err;
+  const SlamRun whole(sequence(), temp / "out", {"--detector", "none", "--masks", temp / "masks"});
+  EXPECT_EQ(whole.finished.exit_code, 0) << whole.finished.err;
+  EXPECT_EQ(whole.finished.err.find("no mask"), std::string::npos) << whole.finished.err;
+}
+
 TEST(RunCommand, ShowsProgressUnlessQuiet) {
   const TempFolder temp;
   const Finished loud = run_program(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <queue>
 #include <tuple>
 
@@ -24,9 +25,14 @@ void require_columns(const std::vector<std::string_view>& columns, size_t wanted
                      " columns; a row must be `" + form + "`");
 }
 
-// ICL-NUIM and some tools write the depth image first.
-bool names_depth(std::string_view path) {
-  return path.substr(0, path.find('/')).find("depth") != std::string_view::npos;
+// ICL-NUIM and some tools write the depth image first. It is told by the folders that the other image is not in as
+// well, else by its name.
+bool names_depth(std::string_view image, std::string_view other) {
+  const fs::path path = fs::path(image).lexically_normal(), beside = fs::path(other).lexically_normal();
+  const auto names = [](const fs::path& part) { return part.string().find("depth") != std::string::npos; };
+  const auto own = std::mismatch(path.begin(), path.end(), beside.begin(), beside.end()).first;
+  const auto name = std::prev(path.end());
+  return own == name || own == path.end() ? names(*name) : std::any_of(own, name, names);
 }
 
 // Checks that each stamp lies after the one of the row before.
@@ -89,7 +95,7 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
     DatasetPair pair;
     read_number(columns[0], place, "timestamp");
     require_columns(columns, 4, "rgb_timestamp rgb_file depth_timestamp depth_file", place);
-    const size_t c = names_depth(columns[1]) && !names_depth(columns[3]) ? 2 : 0, d = 2 - c;
+    const size_t c = names_depth(columns[1], columns[3]) && !names_depth(columns[3], columns[1]) ? 2 : 0, d = 2 - c;
     pair.timestamp = read_number(columns[c], place, "timestamp");
     pair.depth_timestamp = read_number(columns[d], place, "depth timestamp");
     pair.stamp = columns[c], pair.depth_stamp = columns[d];

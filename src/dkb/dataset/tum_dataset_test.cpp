@@ -46,6 +46,22 @@ TEST_F(TumFolder, AssociationsAreTakenAsTheyAre) {
   EXPECT_EQ(d.pairs[1].depth_path, folder / "depth/a.png");
 }
 
+TEST_F(TumFolder, DepthThatComesFirstIsToldByItsFolderWhereverThatLies) {
+  for (const std::string root : {"", "./", "/data/depth_camera/", "seq/"}) {
+    SCOPED_TRACE(root);
+    write("associations.txt", "1.4 " + root + "depth/a.png 1.5 " + root + "rgb/a.png\n");
+    const TumDataset depth_first = open_tum_dataset(folder);
+    EXPECT_EQ(depth_first.pairs[0].stamp, "1.5");
+    EXPECT_EQ(depth_first.pairs[0].depth_path, folder / (root + "depth/a.png"));
+    write("associations.txt", "1.5 " + root + "rgb/a.png 1.4 " + root + "depth/a.png\n");
+    EXPECT_EQ(open_tum_dataset(folder).pairs[0].stamp, "1.5");
+  }
+  write("associations.txt", "1.4 depth_a.png 1.5 rgb_a.png\n");
+  EXPECT_EQ(open_tum_dataset(folder).pairs[0].stamp, "1.5") << "without folders, by its name";
+  write("associations.txt", "1.4 depth/left/a.png 1.5 rgb/left/a.png\n");
+  EXPECT_EQ(open_tum_dataset(folder).pairs[0].stamp, "1.5");
+}
+
 TEST_F(TumFolder, ListsArePairedByStamp) {
   write("rgb.txt", "#\n1.00 rgb/a\n1.03 rgb/b\n1.06 rgb/c\n");
   write("depth.txt", "0.99 d/a\n1.035 d/b\n1.2 d/c\n");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dkb/detection/detection.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 
@@ -30,6 +31,7 @@ class MaskFolder final : public Detector {
   // Throws InputError for a mask that cannot be read or has another size.
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "masks"; }
+  bool has(int64_t stamp_ns) const { return find(seconds_from_ns(stamp_ns)) != nullptr; }  // a mask for that image
 
  private:
   GreyImage read(const std::filesystem::path& path) const;

@@ -197,7 +197,7 @@ std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage
     if (observed && o.has_depth) remember(o, depth, &t);
     seen.push_back(position);
     if (t.id == 0) continue;
-    const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace());
+    const double position_sd = o.has_depth ? o.position_sd : std::sqrt(t.covariance.topLeftCorner<3, 3>().trace() / 3);
     movers.push_back({t.id, t.class_name.empty() ? kUnnamed : t.class_name, position, t.state.tail<3>(), position_sd,
                       t.covariance, t.size, o.box});
   }

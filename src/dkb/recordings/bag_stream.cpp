@@ -117,6 +117,7 @@ void BagStream::read_index(uint64_t at) {
     if (record.op == bag::kChunkInfo) add_chunk_info(record.header, data);
     at = record.end();
   }
+  topics_.count_rest();
 }
 
 void BagStream::add_connection(std::string_view header, std::string_view data) {

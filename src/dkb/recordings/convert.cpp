@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/recordings/convert.h"
 
-#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/folder_source.h"
+#include "dkb/dataset/stored_pair.h"
 #include "dkb/recordings/depth_registration.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
@@ -32,29 +32,12 @@ std::string camera_text(const Camera& camera, const std::string& option, const f
   return fs::is_regular_file(file, error) ? read_file(file) : camera.to_yaml();
 }
 
-// Whether a reader that pairs by stamps finds these pairs again.
-bool pairs_by_stamps(const std::vector<DatasetPair>& pairs) {
-  std::vector<double> colour, depth;
-  for (const DatasetPair& pair : pairs) {
-    if (!depth.empty() && pair.depth_timestamp <= depth.back()) return false;
-    colour.push_back(pair.timestamp), depth.push_back(pair.depth_timestamp);
-  }
-  const std::vector<std::pair<size_t, size_t>> found = associate(colour, depth, {});
-  if (found.size() != pairs.size()) return false;
-  return std::all_of(found.begin(), found.end(), [](const auto& pair) { return pair.first == pair.second; });
-}
-
 Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
   const FolderLayout layout = open_folder_layout(in);
   const TumDataset& dataset = layout.dataset;
   const Camera camera = choose_folder_camera(in, layout, options.source).camera;
   const std::string text = camera_text(camera, options.source.camera, in);
-  const bool own_stamps = !is_recording_name(out) || pairs_by_stamps(dataset.pairs);
-  if (!own_stamps)
-    options.warn((in / dataset.list).string() +
-                 ": by their stamps alone these images would be paired otherwise; depth images get the stamps of their "
-                 "colour images");
-  const auto writer = write_pairs(out, camera, text, {.compression = options.compression});
+  const auto writer = write_pairs(out, camera, text, {.compression = options.compression, .warn = options.warn});
   Converted converted{0, "pairs"};
   for (const DatasetPair& pair : dataset.pairs) {
     options.go_on();
@@ -63,7 +46,7 @@ Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertO
       Picture picture = decode_picture(colour, pair.colour_path.string());
       if (layout.fit_colour) picture = resampled(picture, camera.width, camera.height);
       const DepthImage depth = read_depth(pair.depth_path, without_limits(camera));
-      PairToWrite write{pair.stamp_ns, own_stamps ? pair.depth_stamp_ns : pair.stamp_ns, colour, &picture, &depth};
+      PairToWrite write{pair.stamp_ns, pair.depth_stamp_ns, colour, &picture, &depth};
       if (options.raw || layout.fit_colour) write.colour_file = {};
       writer->add(write);
       ++converted.count;
@@ -215,14 +198,24 @@ class PairsToFolder {
   RecordedImage read(StampPairing::Kind kind, std::string_view bytes) const {
     return read_recorded_image(bytes, topic(kind).type, encoding_[kind], topic(kind).name);
   }
+  // Of the size of the camera that took it. Throws InputError.
+  RecordedImage read_whole(StampPairing::Kind kind, std::string_view bytes) const {
+    RecordedImage image = read(kind, bytes);
+    const bool of_own_camera = kind == StampPairing::depth && contents_.depth_camera;
+    const Camera& camera = of_own_camera ? contents_.depth_camera->camera : contents_.camera;
+    const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
+    if (image.content == topic(kind).content && !wrong.empty()) throw InputError(wrong);
+    return image;
+  }
   void leave_out(const std::string& why) const { options_.warn(why + "; it is left out"); }
 
   void write() {
     while (const auto pair = pairing_.take()) {
       try {
-        const RecordedImage colour = read(StampPairing::colour, pair->colour.bytes);
+        const RecordedImage colour = read_whole(StampPairing::colour, pair->colour.bytes);
         const Picture picture = picture_of(colour);
-        DepthImage depth = depth_of(read(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
+        DepthImage depth =
+            depth_of(read_whole(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
         if (registration_) depth = registration_->registered(depth);
         const std::string_view file = colour.compressed ? colour.stored : std::string_view();
         writer_.add({pair->colour.stamp_ns, pair->depth.stamp_ns, file, &picture, &depth});

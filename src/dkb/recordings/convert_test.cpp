@@ -229,6 +229,37 @@ TEST_F(ConvertTest, DepthOfACameraOfItsOwnIsRegisteredWithoutLimits) {
   EXPECT_NEAR(read_depth(depth, without_limits(camera))(16, 12), 25, 1e-3);
 }
 
+TEST_F(ConvertTest, ImagesOfAnotherSizeThanTheirCameraAreLeftOutAndTold) {
+  const auto writer = write_recording(scratch / "a.bag");
+  const auto write = [&](const std::string& topic, const std::string& type, int64_t stamp, const std::string& bytes) {
+    writer->write(writer->add_topic(topic, type), stamp, bytes);
+  };
+  write(
+      "/tf_static", "tf2_msgs/TFMessage", kFirst,
+      encode(TransformsMessage{transform_message("colour", "depth", {Eigen::Quaterniond::Identity(), {0.01, 0, 0}})}));
+  const CameraInfoMessage info = info_message(small_camera(), "colour");
+  write("/rgb/camera_info", "sensor_msgs/CameraInfo", kFirst, encode(info));
+  write("/depth/camera_info", "sensor_msgs/CameraInfo", kFirst, encode(info_message(small_camera(), "depth")));
+  // The second pair's depth and the third's colour are larger than their CameraInfo says.
+  for (int n = 0; n < 3; ++n) {
+    const int64_t stamp = kFirst + n * kInterval;
+    const int colour_scale = n == 2 ? 2 : 1, depth_scale = n == 1 ? 20 : 1;
+    const std::string colour = bytes_of(noise_picture(1, 32 * colour_scale, 24 * colour_scale));
+    const std::string depth = metres_of(Image<uint16_t>(32 * depth_scale, 24 * depth_scale, 10'000));
+    write("/rgb/image", "sensor_msgs/Image", stamp,
+          encode(image_message(stamp, "rgb8", 32 * colour_scale, 24 * colour_scale, colour, "colour")));
+    write("/depth/image", "sensor_msgs/Image", stamp,
+          encode(image_message(stamp, "32FC1", 32 * depth_scale, 24 * depth_scale, depth, "depth")));
+  }
+  writer->close();
+  EXPECT_EQ(convert(scratch / "a.bag", scratch / "out", options).count, 1U);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_NE(warnings[0].find("/depth/image"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("is of 640x480 px, the camera of 32x24"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[1].find("/rgb/image"), std::string::npos) << warnings[1];
+  EXPECT_NE(warnings[1].find("is of 64x48 px, the camera of 32x24"), std::string::npos) << warnings[1];
+}
+
 TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {
   const auto writer = write_recording(scratch / "a.bag");
   ImuMessage imu;

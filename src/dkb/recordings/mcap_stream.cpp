@@ -98,6 +98,7 @@ bool McapStream::read_summary() {
     take_small(*record);
     at = record->end();
   }
+  if (all_counted_) topics_.count_rest();
   end_ = summary;
   tell_foreign();
   return true;
@@ -158,14 +159,18 @@ void McapStream::take(uint8_t op, std::string_view bytes) {
   } else if (op == mcap::kChunkIndex) {
     add_chunk_index(in);
   } else if (op == mcap::kStatistics) {
-    in.raw(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);
+    const uint64_t messages = in.u64();
+    uint64_t counted = 0;
+    in.raw(2 + 4 + 4 + 4 + 4 + 8 + 8);
     for (ByteReader counts(text(in), "counts"); counts.left() > 0;) {
       const uint16_t channel = u16(counts);
       const uint64_t count = counts.u64();
       const auto topic = topic_of_.find(channel);
       if (topic != topic_of_.end() && topic->second && count < UINT32_MAX)
         topics_.add_count(*topic->second, static_cast<int64_t>(count));
+      counted += count;
     }
+    all_counted_ = counted == messages;
   }
 }
 

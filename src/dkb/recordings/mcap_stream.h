@@ -56,6 +56,7 @@ class McapStream final : public MessageStream {
   size_t texts_size_ = 0;
   uint64_t metadata_read_ = 0;    // [bytes] by the index
   uint64_t start_ = 0, end_ = 0;  // of the data section
+  bool all_counted_ = false;      // statistics count every message
   bool told_cut_ = false, told_foreign_ = false;
 
   uint64_t at_ = 0;        // the next record in the file

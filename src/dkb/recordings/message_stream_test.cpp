@@ -188,27 +188,34 @@ TEST(MessageStream, WhatAFileClaimsSetsNoMemoryAside) {
   EXPECT_LT(peak_memory_mb() - before, 40);
 }
 
-// A channel, a message and no chunk, no summary, byte by byte as the format's specification has it.
-std::string plain_mcap(const std::string& encoding) {
-  const auto text = [](const std::string& v) {
-    ByteWriter out;
-    out.u32(static_cast<uint32_t>(v.size()));
-    out.raw(v);
-    return out.take();
-  };
-  const auto record = [](uint8_t op, const std::string& content) {
-    ByteWriter out;
-    out.u8(op), out.u64(content.size());
-    out.raw(content);
-    return out.take();
-  };
+std::string mcap_text(const std::string& value) {
+  ByteWriter out;
+  out.u32(static_cast<uint32_t>(value.size())), out.raw(value);
+  return out.take();
+}
+std::string mcap_record(uint8_t op, const std::string& content) {
+  ByteWriter out;
+  out.u8(op), out.u64(content.size()), out.raw(content);
+  return out.take();
+}
+std::string mcap_channel(const std::string& id, const std::string& topic, const std::string& encoding) {
+  return mcap_record(mcap::kChannel, id + "\x01\x00"s + mcap_text(topic) + mcap_text(encoding) + mcap_text(""));
+}
+
+// A channel, a message and no chunk, byte by byte as the format's specification has it; without a summary, unless one
+// is given.
+std::string plain_mcap(const std::string& encoding, const std::string& summary = "") {
   const std::string magic = "\x89MCAP0\r\n";
-  return magic + record(1, text("ros2") + text("somebody")) +
-         record(3, "\x01\x00"s + text("std_msgs/msg/String") + text("ros2msg") + text("string data")) +
-         record(4, "\x05\x00\x01\x00"s + text("/chatter") + text(encoding) + text("")) +
-         record(5, "\x05\x00\x00\x00\x00\x00"s + "\x02\x00\x00\x00\x00\x00\x00\x00"s + std::string(8, '\0') +
-                       "\x00\x01\x00\x00\x03\x00\x00\x00hi\x00"s) +
-         record(15, std::string(4, '\0')) + record(2, std::string(20, '\0')) + magic;
+  const std::string data =
+      magic + mcap_record(1, mcap_text("ros2") + mcap_text("somebody")) +
+      mcap_record(3, "\x01\x00"s + mcap_text("std_msgs/msg/String") + mcap_text("ros2msg") + mcap_text("string data")) +
+      mcap_channel("\x05\x00"s, "/chatter", encoding) +
+      mcap_record(5, "\x05\x00\x00\x00\x00\x00"s + "\x02\x00\x00\x00\x00\x00\x00\x00"s + std::string(8, '\0') +
+                         "\x00\x01\x00\x00\x03\x00\x00\x00hi\x00"s) +
+      mcap_record(15, std::string(4, '\0'));
+  ByteWriter footer;
+  footer.u64(summary.empty() ? 0 : data.size()), footer.u64(0), footer.u32(0);
+  return data + summary + mcap_record(2, footer.bytes()) + magic;
 }
 
 TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
@@ -225,24 +232,52 @@ TEST(MessageStream, McapNeedsNoChunksAndNoSummary) {
   EXPECT_TRUE(stream->take_warnings().empty());
 }
 
+TEST(MessageStream, ABagsTopicWithoutMessagesIsKnownToHaveNone) {
+  const TempFolder scratch;
+  const auto writer = write_recording(scratch / "a.bag");
+  writer->add_topic("/silent", "sensor_msgs/Imu");
+  writer->write(writer->add_topic("/chatter", "std_msgs/String"), kStart, encode_string("hi"));
+  writer->close();
+  const auto stream = open_messages(scratch / "a.bag");
+  ASSERT_EQ(stream->topics().size(), 2U);
+  EXPECT_EQ(stream->topics()[0].count, 0);
+  EXPECT_EQ(stream->topics()[1].count, 1);
+}
+
+// Statistics name the channels that have messages; where they do not add up, they say nothing of the others.
+TEST(MessageStream, AnMcapsTopicWithoutMessagesIsKnownToHaveNone) {
+  const TempFolder scratch;
+  for (const uint64_t messages : {1, 2}) {
+    ByteWriter count, statistics;
+    count.raw("\x05\x00"s), count.u64(1);
+    statistics.u64(messages), statistics.raw(std::string(2 + 4 * 4 + 2 * 8, '\0'));
+    statistics.raw(mcap_text(count.bytes()));
+    write_bytes(scratch / "a.mcap", plain_mcap("cdr", mcap_channel("\x05\x00"s, "/chatter", "cdr") +
+                                                          mcap_record(mcap::kStatistics, statistics.bytes()) +
+                                                          mcap_channel("\x06\x00"s, "/silent", "cdr")));
+    const auto stream = open_messages(scratch / "a.mcap");
+    ASSERT_EQ(stream->topics().size(), 2U);
+    EXPECT_EQ(stream->topics()[0].count, 1);
+    EXPECT_EQ(stream->topics()[1].name, "/silent");
+    EXPECT_EQ(stream->topics()[1].count, messages == 1 ? std::optional<int64_t>(0) : std::nullopt);
+    EXPECT_TRUE(stream->take_warnings().empty());
+  }
+}
+
 // Each entry of the index costs as much as the record it names.
 TEST(MessageStream, AnMcapIndexThatNamesOneTextManyTimesIsReadInTime) {
   const TempFolder scratch;
-  const auto text = [](const std::string& value) {
-    ByteWriter out;
-    out.u32(static_cast<uint32_t>(value.size())), out.raw(value);
-    return out.bytes();
-  };
   ByteWriter out;
   out.raw(mcap::kMagic);
   const uint64_t at = out.bytes().size();
-  const std::string metadata = text("note") + text(text("key") + text(std::string((1 << 24) - 100, 'x')));
+  const std::string metadata =
+      mcap_text("note") + mcap_text(mcap_text("key") + mcap_text(std::string((1 << 24) - 100, 'x')));
   out.u8(mcap::kMetadata), out.u64(metadata.size()), out.raw(metadata);
   out.u8(mcap::kDataEnd), out.u64(4), out.u32(0);
   const uint64_t summary = out.bytes().size();
   for (int i = 0; i < 60'000; ++i) {
     out.u8(mcap::kMetadataIndex), out.u64(20);
-    out.u64(at), out.u64(mcap::kRecordStart + metadata.size()), out.raw(text(""));
+    out.u64(at), out.u64(mcap::kRecordStart + metadata.size()), out.raw(mcap_text(""));
   }
   out.u8(mcap::kFooter), out.u64(mcap::kFooterSize), out.u64(summary), out.u64(0), out.u32(0);
   out.raw(mcap::kMagic);

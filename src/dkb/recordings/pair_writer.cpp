@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <optional>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/tum_dataset.h"
 #include "dkb/image/image.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
@@ -152,11 +155,43 @@ class FolderPairWriter final : public PairWriter {
   std::vector<Row> rows_;
 };
 
+// The pairs of a recording so far, to which a reader is to find back by stamps alone: it pairs the nearest ones first.
+class StampedPairs {
+ public:
+  // Whether a pair with these stamps, after the others, is found. One of equal stamps is, since nothing is nearer.
+  bool finds(int64_t colour_ns, int64_t depth_ns) const {
+    const double c = seconds_from_ns(colour_ns), d = seconds_from_ns(depth_ns);
+    const auto taken_apart = [&](const Pair& other) {
+      const double own = std::abs(c - d), others = std::abs(other.colour - other.depth);
+      const auto nearer = [&](double difference) { return difference <= own && difference <= others; };
+      return nearer(std::abs(c - other.depth)) || nearer(std::abs(other.colour - d));
+    };
+    if (!pairs_.empty() && d <= pairs_.back().depth) return false;
+    return d >= c - kLimit && d <= c + kLimit && std::none_of(pairs_.begin(), pairs_.end(), taken_apart);
+  }
+  void add(int64_t colour_ns, int64_t depth_ns) {
+    pairs_.push_back({seconds_from_ns(colour_ns), seconds_from_ns(depth_ns)});
+    // What is farther away than twice the limit shares no image in reach with those to come.
+    while (pairs_.front().colour < pairs_.back().colour - 3 * kLimit) pairs_.pop_front();
+  }
+
+ private:
+  struct Pair {
+    double colour, depth;  // [s]
+  };
+  static constexpr double kLimit = AssociationOptions().max_difference + kStampRounding;
+  std::deque<Pair> pairs_;
+};
+
 class RecordingPairWriter final : public PairWriter {
  public:
   RecordingPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text,
-                      Compression compression)
-      : name_(path.string()), camera_(camera), camera_text_(camera_text), writer_(write_recording(path, compression)) {
+                      const PairWriterOptions& options)
+      : name_(path.string()),
+        camera_(camera),
+        camera_text_(camera_text),
+        warn_(options.warn),
+        writer_(write_recording(path, options.compression)) {
     writer_->add_text(kCameraText, camera_text_);
   }
 
@@ -168,17 +203,43 @@ class RecordingPairWriter final : public PairWriter {
       writer_->write(topic(kCameraTopic, "std_msgs/String", true), std::min(pair.stamp_ns, pair.depth_stamp_ns),
                      encode_string(camera_text_));
     began_ = true;
-    const bool depth_first = pair.depth_stamp_ns < pair.stamp_ns;
-    if (depth_first) add_depth(pair);
+    write_late_depth(pair.stamp_ns);
+    const bool told = pairs_.finds(pair.stamp_ns, pair.depth_stamp_ns);
+    if (!told) warn_of_stamps(pair.stamp_ns);
+    const int64_t depth_ns = told ? pair.depth_stamp_ns : pair.stamp_ns;
+    if (depth_ns < pair.stamp_ns) add_depth(*pair.depth, pair.stamp_ns, depth_ns);
     add_camera_info(pair.stamp_ns);
     add_colour(pair);
-    if (!depth_first) add_depth(pair);
+    if (depth_ns == pair.stamp_ns) add_depth(*pair.depth, pair.stamp_ns, depth_ns);
+    if (depth_ns > pair.stamp_ns) late_depth_ = {*pair.depth, pair.stamp_ns, depth_ns};
   }
 
-  void close() override { writer_->close(); }
+  void close() override {
+    write_late_depth(std::nullopt);
+    writer_->close();
+  }
   void salvage() override { writer_->salvage(); }
 
  private:
+  // Depth that was taken after its colour image: whether the next one comes between them decides on its stamp.
+  struct LateDepth {
+    DepthImage depth;
+    int64_t colour_ns = 0, depth_ns = 0;
+  };
+  void write_late_depth(std::optional<int64_t> next_colour_ns) {
+    const std::optional<LateDepth> late = std::exchange(late_depth_, std::nullopt);
+    if (!late) return;
+    const bool told = !next_colour_ns || seconds_from_ns(late->depth_ns) < seconds_from_ns(*next_colour_ns);
+    if (!told) warn_of_stamps(late->colour_ns);
+    add_depth(late->depth, late->colour_ns, told ? late->depth_ns : late->colour_ns);
+  }
+
+  void warn_of_stamps(int64_t colour_ns) {
+    if (std::exchange(warned_, true)) return;
+    warn_(name_ + ": by stamps alone the images at " + stamp_text(colour_ns) +
+          " would be paired otherwise; such depth images get the stamps of their colour images");
+  }
+
   size_t topic(const std::string& name, const std::string& type, bool latched = false) {
     const auto [known, is_new] = topics_.try_emplace(name, 0);
     if (is_new) known->second = writer_->add_topic(name, type, latched);
@@ -216,14 +277,15 @@ class RecordingPairWriter final : public PairWriter {
     }
   }
 
-  void add_depth(const PairToWrite& pair) {
+  void add_depth(const DepthImage& depth, int64_t colour_ns, int64_t stamp_ns) {
+    pairs_.add(colour_ns, stamp_ns);
     constexpr const char* kTopic = "/camera/depth/image_raw";
     std::optional<Image<uint16_t>> millimetres;
-    if (camera_.depth_factor == 1000) millimetres = exact_units(*pair.depth, camera_);
+    if (camera_.depth_factor == 1000) millimetres = exact_units(depth, camera_);
     if (millimetres)
-      add_image(kTopic, "16UC1", pair.depth_stamp_ns, *millimetres);
+      add_image(kTopic, "16UC1", stamp_ns, *millimetres);
     else
-      add_image(kTopic, "32FC1", pair.depth_stamp_ns, *pair.depth);
+      add_image(kTopic, "32FC1", stamp_ns, depth);
   }
 
   template <class T>
@@ -241,17 +303,19 @@ class RecordingPairWriter final : public PairWriter {
   const std::string name_;
   const Camera camera_;
   const std::string camera_text_;
+  const std::function<void(const std::string&)> warn_;
   const std::unique_ptr<RecordingWriter> writer_;
   std::map<std::string, size_t> topics_;
-  bool began_ = false;
+  StampedPairs pairs_;
+  std::optional<LateDepth> late_depth_;
+  bool began_ = false, warned_ = false;
 };
 
 }  // namespace
 
 std::unique_ptr<PairWriter> write_pairs(const fs::path& path, const Camera& camera, const std::string& camera_text,
                                         const PairWriterOptions& options) {
-  if (is_recording_name(path))
-    return std::make_unique<RecordingPairWriter>(path, camera, camera_text, options.compression);
+  if (is_recording_name(path)) return std::make_unique<RecordingPairWriter>(path, camera, camera_text, options);
   if (path.extension() == ".db3" || path.extension() == ".oni")
     throw InputError(path.string() + ": recordings are written as FILE.mcap or FILE.bag, not as " +
                      path.extension().string());

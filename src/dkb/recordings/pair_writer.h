@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -23,9 +24,12 @@ struct PairToWrite {
 struct PairWriterOptions {
   Compression compression = Compression::none;  // of a recording's chunks
   int png_level = 6;                            // of PNG files that are made for a folder, 0 ... 9
+  std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
-// Keeps pairs of images so that nothing is lost: the same frames are read from it, bit for bit. Throws OutputError.
+// Keeps pairs of images so that nothing is lost: the same frames are read from it, bit for bit. Readers of recordings
+// pair images by their stamps: where these would pair others, depth gets the stamp of its colour image, and `warn` is
+// told once. Throws OutputError.
 class PairWriter {
  public:
   // Without close() nothing is left behind, and what has this name stays what it was.

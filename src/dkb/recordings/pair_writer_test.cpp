@@ -50,15 +50,18 @@ Camera camera() {
   return c;
 }
 
-void add(PairWriter& writer, int n) {
+void add(PairWriter& writer, int n, int64_t stamp_ns, int64_t depth_stamp_ns) {
   Random random(static_cast<uint64_t>(n));
   Picture picture;
   picture.colour = ColourImage(kWidth, kHeight);
   for (size_t i = 0; i < picture.colour.size(); ++i)
     picture.colour.data()[i] = {static_cast<uint8_t>(random.below(256)), 0, static_cast<uint8_t>(n)};
   const DepthImage depth(kWidth, kHeight, 1.0F + 0.25F * static_cast<float>(n));
+  writer.add({stamp_ns, depth_stamp_ns, {}, &picture, &depth});
+}
+void add(PairWriter& writer, int n) {
   const int64_t stamp = int64_t{1'000'000'000} + n * int64_t{33'000'000};
-  writer.add({stamp, stamp, {}, &picture, &depth});
+  add(writer, n, stamp, stamp);
 }
 
 int frames_in(Source& source) {
@@ -90,6 +93,45 @@ TEST(PairWriter, CameraInfoTellsRationalDistortion) {
   EXPECT_EQ(read.p2, -0.0002);
   EXPECT_EQ(read.k6, 1.43);
   EXPECT_EQ(RecordedSource(scratch / "a.bag", {}).camera().k5, -2.45);
+}
+
+TEST(PairWriter, OfARecordingNoPairIsLostWhoseStampsDoNotTellIt) {
+  struct Case {
+    const char* name;
+    std::vector<std::pair<int, int>> stamps;  // [ms] colour, depth
+    std::vector<int> depth_read;              // [ms]
+  };
+  for (const Case& c : {Case{"repeated", {{0, 1}, {33, 1}, {66, 67}}, {1, 33, 67}},
+                        Case{"going back", {{0, 2}, {10, 1}, {33, 34}}, {2, 10, 34}},
+                        Case{"far apart", {{0, 25}, {33, 58}, {66, 41}}, {0, 33, 66}},
+                        Case{"nearer to the next colour image", {{0, 18}, {33, 51}, {66, 84}}, {18, 33, 84}},
+                        Case{"after the next colour image", {{0, 15}, {10, 25}, {20, 35}}, {0, 10, 35}},
+                        // The nearest pair goes first, and leaves the first two to each other.
+                        Case{"told by the next pair", {{0, 18}, {33, 34}, {66, 67}}, {18, 34, 67}}}) {
+    SCOPED_TRACE(c.name);
+    const TempFolder temp;
+    std::vector<std::string> warnings;
+    PairWriterOptions options;
+    options.warn = [&](const std::string& line) { warnings.push_back(line); };
+    const auto writer = write_pairs(temp / "a.mcap", camera(), camera().to_yaml(), options);
+    const auto ns = [](int ms) { return int64_t{1'305'031'102'000'000'000} + ms * int64_t{1'000'000}; };
+    bool kept = true;
+    for (size_t n = 0; n < c.stamps.size(); ++n) {
+      add(*writer, static_cast<int>(n), ns(c.stamps[n].first), ns(c.stamps[n].second));
+      kept = kept && c.stamps[n].second == c.depth_read[n];
+    }
+    writer->close();
+    EXPECT_EQ(warnings.size(), kept ? 0u : 1u);
+    RecordedSource source(temp / "a.mcap", SourceOptions{});
+    for (size_t n = 0; n < c.stamps.size(); ++n) {
+      const SourceFrame f = source.next();
+      ASSERT_EQ(f.state, SourceState::frame) << n << " " << f.note;
+      EXPECT_EQ(f.frame.stamp_ns(), ns(c.stamps[n].first));
+      EXPECT_EQ(f.frame.depth_stamp_ns(), ns(c.depth_read[n]));
+      EXPECT_EQ(f.frame.image()->depth(5, 5), 1.0F + 0.25F * static_cast<float>(n));
+    }
+    EXPECT_EQ(source.next().state, SourceState::ended);
+  }
 }
 
 TEST(PairWriter, OfARecordingThatFillsTheDiskTheWholeChunksAreKept) {

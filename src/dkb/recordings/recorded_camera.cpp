@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "dkb/util/errors.h"
 
@@ -52,6 +53,8 @@ bool is_rectified(const std::string& image_topic) {
 
 std::string info_topic_of(const std::string& image_topic) {
   const std::string image = image_name(image_topic);
+  constexpr std::string_view kRealSense = "/image/data";  // librealsense's own bags
+  if (image.ends_with(kRealSense)) return image.substr(0, image.size() - kRealSense.size()) + "/info/camera_info";
   return image.substr(0, image.rfind('/') + 1) + "camera_info";
 }
 

@@ -62,7 +62,8 @@ bool RecordedMotion::add(const OdometryMessage& message) {
 }
 
 bool RecordedMotion::add(const ImuMessage& message) {
-  if (!message.angular_velocity.allFinite() || !take_stamp(message.header.stamp_ns)) return false;
+  if (!tells_rates(message) || !message.angular_velocity.allFinite() || !take_stamp(message.header.stamp_ns))
+    return false;
   inertial_ = true;
   Sample sample;
   sample.stamp_ns = message.header.stamp_ns;

@@ -10,14 +10,20 @@
 
 namespace dkb {
 
+// ROS marks an inertial unit without a gyroscope by a covariance of -1; its rates of 0 are none.
+inline bool tells_rates(const ImuMessage& message) {
+  return !(message.angular_velocity_covariance[0] < 0);
+}
+
 // What wheels or an inertial unit say of the motion between two times. Memory is bounded.
 class RecordedMotion {
  public:
   // `body_from_cam`: the camera in the frame that the messages speak of: the odometry's child frame, or the unit's.
   explicit RecordedMotion(const Rigid3& body_from_cam = {}) : body_from_cam_(body_from_cam) {}
 
-  // False: the message is left out, since it is not after the one before, or not finite. After ten such in a row the
-  // clock is taken to have been set back, or one stamp to have been far ahead: it goes on from there. One kind only.
+  // False: the message is left out, since it is not after the one before, or not finite, or tells no rates. After ten
+  // such in a row the clock is taken to have been set back, or one stamp to have been far ahead: it goes on from there.
+  // One kind only.
   bool add(const OdometryMessage& message);
   bool add(const ImuMessage& message);
   // Whether what is known reaches up to this time.

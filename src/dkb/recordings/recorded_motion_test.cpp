@@ -130,6 +130,9 @@ TEST(RecordedMotion, NumbersThatAreNoneAreLeftOut) {
   imu.angular_velocity.x() = std::numeric_limits<double>::infinity();
   RecordedMotion motion;
   motion.add(odometry), motion.add(imu);
+  imu = imu_at(0);
+  imu.angular_velocity_covariance[0] = -1;  // no gyroscope
+  EXPECT_FALSE(motion.add(imu));
   EXPECT_FALSE(motion.reaches(ns(0)));
 }
 

@@ -23,6 +23,10 @@ void RecordedTopics::add_count(size_t topic, int64_t count) {
   sum = sum.value_or(0) + count;
 }
 
+void RecordedTopics::count_rest() {
+  for (RecordedTopic& topic : topics_) topic.count = topic.count.value_or(0);
+}
+
 void RecordedTopics::forget_counts() {
   for (RecordedTopic& topic : topics_) topic.count.reset();
 }

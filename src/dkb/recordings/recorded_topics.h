@@ -19,6 +19,7 @@ class RecordedTopics {
   // The same name, type and encoding is the same topic, however many wrote to it. Nothing when there are too many.
   std::optional<size_t> add(std::string name, std::string type, MessageEncoding encoding);
   void add_count(size_t topic, int64_t count);
+  void count_rest();  // an index that is whole names no messages of the others: they have none
   void forget_counts();
   void select(const std::vector<std::string>& names);
   bool wanted(size_t topic) const { return wanted_[topic]; }

@@ -191,24 +191,30 @@ class Chooser {
   void choose_motion() {
     const PriorKind prior = options_.prior;
     if (prior == PriorKind::none) return;
-    RecordedMotionTopic motion;
     const bool inertial_picked =
         prior == PriorKind::automatic && options_.odom_topic.empty() && !options_.imu_topic.empty();
     if (prior != PriorKind::imu && !inertial_picked)
-      motion.name = motion_topic(survey_.odometries, options_.odom_topic, "--odom-topic", "nav_msgs/Odometry",
-                                 prior == PriorKind::odometry);
-    if (motion.name.empty() && prior != PriorKind::odometry) {
-      motion.name =
-          motion_topic(survey_.inertial, options_.imu_topic, "--imu-topic", "sensor_msgs/Imu", prior == PriorKind::imu);
-      motion.inertial = true;
-    }
-    if (motion.name.empty()) return;
+      take_motion(motion_topic(survey_.odometries, options_.odom_topic, "--odom-topic", "nav_msgs/Odometry",
+                               prior == PriorKind::odometry),
+                  false);
+    if (made_.motion || prior == PriorKind::odometry) return;
+    if (survey_.without_rates.contains(options_.imu_topic))
+      throw InputError("--imu-topic " + options_.imu_topic + ": tells no angular rates (covariance -1); pick another");
+    take_motion(motion_topic(survey_.inertial, options_.imu_topic, "--imu-topic", "sensor_msgs/Imu with angular rates",
+                             prior == PriorKind::imu),
+                true);
+  }
+
+  // Unless it is not linked with the camera, and nobody asked for it.
+  void take_motion(const std::string& topic, bool inertial) {
+    if (topic.empty()) return;
+    RecordedMotionTopic motion{topic, inertial, {}};
     const std::string body = frame_name((motion.inertial ? survey_.inertial : survey_.odometries).at(motion.name));
     const std::string unlinked = name_ + ": /tf_static does not link the frame of " + motion.name + " (" + body +
                                  ") with the camera's (" + made_.colour.frame_id + "); ";
     if (const auto body_from_cam = survey_.transforms.find(body, made_.colour.frame_id)) {
       motion.body_from_cam = *body_from_cam;
-    } else if (prior == PriorKind::automatic && options_.odom_topic.empty() && options_.imu_topic.empty()) {
+    } else if (options_.prior == PriorKind::automatic && options_.odom_topic.empty() && options_.imu_topic.empty()) {
       // A body's axes seldom are the camera's: such a prior would mislead.
       made_.warnings.push_back(unlinked + "the motion is left out; --prior " + (motion.inertial ? "imu" : "odom") +
                                " takes it for the camera's own");

@@ -153,6 +153,8 @@ TEST(RecordedCamera, TopicsAreNamedAsInRos) {
   EXPECT_EQ(info_topic_of("/camera/rgb/image_color"), "/camera/rgb/camera_info");
   EXPECT_EQ(info_topic_of("/camera/rgb/image_color/compressed"), "/camera/rgb/camera_info");
   EXPECT_EQ(info_topic_of("/camera/depth/image_raw/compressedDepth"), "/camera/depth/camera_info");
+  EXPECT_EQ(info_topic_of("/device_0/sensor_0/Depth_0/image/data"), "/device_0/sensor_0/Depth_0/info/camera_info")
+      << "librealsense";
   EXPECT_TRUE(is_rectified("/camera/rgb/image_rect_color/compressed"));
   EXPECT_FALSE(is_rectified("/camera_rect/rgb/image_raw"));
 }
@@ -185,6 +187,24 @@ TEST(RecordingContents, DepthOfAnotherFrameIsToBeRegisteredByItsTransform) {
   const RecordingContents contents = contents_of(list);
   ASSERT_TRUE(contents.depth_camera);
   EXPECT_TRUE(contents.depth_camera->colour_from_depth.translation.isApprox(kMount.inverse().translation));
+}
+
+// As the RealSense Viewer records: whatever took the images, their frame is "0".
+TEST(RecordingContents, OneNumberForAllFramesDoesNotMakeDepthRegistered) {
+  const std::string sensor = "/device_0/sensor_";
+  MessageList list;
+  add_colour(list, 0, "0", sensor + "1/Color_0/image/data"), add_depth(list, 0, "0", sensor + "0/Depth_0/image/data");
+  add_info(list, sensor + "1/Color_0/info/camera_info", info_message(small_camera(), "0"));
+  Camera depth_camera = small_camera();
+  depth_camera.fx = depth_camera.fy = 40;
+  MessageList same_view = list;
+  add_info(list, sensor + "0/Depth_0/info/camera_info", info_message(depth_camera, "0"));
+  EXPECT_NE(
+      refused(list).find("is not registered to the colour images on /device_0/sensor_1/Color_0/image/data (32x24), "
+                         "and cannot be: their headers name no frames;"),
+      std::string::npos);
+  add_info(same_view, sensor + "0/Depth_0/info/camera_info", info_message(small_camera(), "0"));
+  EXPECT_EQ(contents_of(same_view).camera_origin, "of /device_0/sensor_1/Color_0/info/camera_info");
 }
 
 TEST(RecordingContents, DepthOfAnotherSizeWithoutFramesIsRefused) {
@@ -237,8 +257,20 @@ TEST_F(MotionOfARecording, WithoutThePlaceOfTheCameraIsTakenForItsOwnOnlyWhenAsk
   EXPECT_EQ(asked.warnings, std::vector<std::string>{unlinked + "taken for the camera's own"});
 }
 
+TEST_F(MotionOfARecording, OfAnInertialUnitThatIsLinkedGoesBeforeOdometryThatIsNot) {
+  ImuMessage imu;
+  imu.header = {kFirst, "camera", 0};
+  list.add("/imu", "sensor_msgs/Imu", kFirst, imu);
+  const RecordingContents contents = contents_of(list);
+  ASSERT_TRUE(contents.motion);
+  EXPECT_EQ(contents.motion->name, "/imu");
+  EXPECT_TRUE(contents.motion->inertial);
+  ASSERT_EQ(contents.warnings.size(), 1u);
+  EXPECT_NE(contents.warnings[0].find("the frame of /odom (base)"), std::string::npos) << contents.warnings[0];
+}
+
 TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
-  EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu");
+  EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
   list.add("/wheels", "nav_msgs/Odometry", kFirst, odometry);
   const std::string several =
       "r.bag: has several topics of nav_msgs/Odometry: /odom, /wheels; pick one with --odom-topic";
@@ -249,6 +281,22 @@ TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
   EXPECT_EQ(contents_of(list, options).motion->name, "/wheels");
   options.odom_topic = "/no";
   EXPECT_EQ(refused(list, options), "--odom-topic /no: r.bag has no nav_msgs/Odometry there; it has /odom, /wheels");
+}
+
+TEST(RecordingContents, AnInertialUnitWithoutAGyroscopeIsNoMotion) {
+  MessageList list = usual();
+  ImuMessage imu;
+  imu.header = {kFirst, "camera", 0}, imu.angular_velocity_covariance[0] = -1;
+  list.add("/accel", "sensor_msgs/Imu", kFirst, imu);
+  EXPECT_FALSE(contents_of(list).motion);
+  SourceOptions options;
+  options.imu_topic = "/accel";
+  EXPECT_EQ(refused(list, options), "--imu-topic /accel: tells no angular rates (covariance -1); pick another");
+  options.imu_topic = "", options.prior = PriorKind::imu;
+  EXPECT_EQ(refused(list, options), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
+  imu.angular_velocity_covariance[0] = 0;
+  list.add("/gyro", "sensor_msgs/Imu", kFirst, imu);
+  EXPECT_EQ(contents_of(list).motion->name, "/gyro");
 }
 
 TEST(StaticTransforms, AreFoundThroughCommonAncestors) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "dkb/recordings/recorded_motion.h"
 #include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 
@@ -33,7 +34,7 @@ bool RecordingSurvey::shown(const RecordedTopic& topic) const {
   }
   if (topic.type == "sensor_msgs/CameraInfo") return infos.contains(topic.name);
   if (topic.type == "nav_msgs/Odometry") return odometries.contains(topic.name);
-  if (topic.type == "sensor_msgs/Imu") return inertial.contains(topic.name);
+  if (topic.type == "sensor_msgs/Imu") return inertial.contains(topic.name) || without_rates.contains(topic.name);
   if (topic.name == kTransforms) return transform_messages_ >= topic.count.value_or(1);
   return camera_file.has_value();
 }
@@ -72,8 +73,12 @@ void RecordingSurvey::take(const RecordedTopic& topic, const RecordedMessage& me
     if (!odometries.contains(topic.name))
       odometries.emplace(topic.name, decode_odometry(message.bytes, topic.encoding).child_frame_id);
   } else if (topic.type == "sensor_msgs/Imu") {
-    if (!inertial.contains(topic.name))
-      inertial.emplace(topic.name, decode_imu(message.bytes, topic.encoding).header.frame_id);
+    if (shown(topic)) return;
+    const ImuMessage imu = decode_imu(message.bytes, topic.encoding);
+    if (tells_rates(imu))
+      inertial.emplace(topic.name, imu.header.frame_id);
+    else
+      without_rates.insert(topic.name);
   } else if (topic.name == kTransforms) {
     ++transform_messages_;
     transforms.add(decode_transforms(message.bytes, topic.encoding));

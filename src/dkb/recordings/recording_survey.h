@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ class RecordingSurvey {
   std::map<std::string, CameraInfoMessage> infos;  // by topic
   std::map<std::string, std::string> odometries;   // child frame by topic
   std::map<std::string, std::string> inertial;     // frame by topic
+  std::set<std::string> without_rates;             // topics of inertial units that tell no angular rates
   StaticTransforms transforms;
   std::optional<std::string> camera_file;  // the text of a camera file that the recording holds
   std::string camera_file_origin;

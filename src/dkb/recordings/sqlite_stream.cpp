@@ -158,6 +158,7 @@ class SqliteStream final : public MessageStream {
       const auto topic = topic_of_.find(sqlite3_column_int64(counts.get(), 0));
       if (topic != topic_of_.end()) topics_.add_count(topic->second, sqlite3_column_int64(counts.get(), 1));
     }
+    if (!ended_) topics_.count_rest();
     ended_ = false;
   }
 

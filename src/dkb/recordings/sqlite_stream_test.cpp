@@ -57,6 +57,12 @@ TEST(SqliteMessages, AreReadInTheOrderOfTheirTime) {
   EXPECT_TRUE(stream->take_warnings().empty());
 }
 
+TEST(SqliteMessages, ATopicWithoutMessagesIsKnownToHaveNone) {
+  const TempFolder scratch;
+  run_sql(scratch / "a.db3", kTables + row(1, 1, 30, "6969"));
+  EXPECT_EQ(open_messages(scratch / "a.db3")->topics()[1].count, 0);
+}
+
 TEST(SqliteMessages, TopicsThatCannotBeConvertedAreTold) {
   const TempFolder scratch;
   run_sql(scratch / "a.db3", kTables + row(1, 1, 30, "6969") + row(2, 3, 10, "6868") +

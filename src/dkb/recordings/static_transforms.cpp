@@ -7,7 +7,8 @@
 namespace dkb {
 
 std::string frame_name(const std::string& frame_id) {
-  return frame_id.substr(std::min(frame_id.find_first_not_of('/'), frame_id.size()));
+  const std::string name = frame_id.substr(std::min(frame_id.find_first_not_of('/'), frame_id.size()));
+  return name == "0" ? "" : name;
 }
 
 void StaticTransforms::add(const TransformsMessage& transforms) {

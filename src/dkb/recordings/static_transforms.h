@@ -31,7 +31,7 @@ class StaticTransforms {
   std::map<std::string, Link> parents_;  // by child
 };
 
-// Without slashes in front.
+// Without slashes in front. "0", which librealsense's bags write for every frame, is no name.
 std::string frame_name(const std::string& frame_id);
 
 }  // namespace dkb
