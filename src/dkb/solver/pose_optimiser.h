@@ -22,6 +22,7 @@ inline constexpr double kStudentFreedom = 4;
 // Of the squares of errors in the plane by Student's t with four degrees of freedom, nine of ten are below so many
 // times that variance: twice the quantile of F(2, 4).
 inline constexpr double kStudent90 = 8.65;
+inline constexpr double kDepthInFront = 0.01;  // [m] points nearer than this along the optical axis are outliers
 
 // One match of a known point with a feature of the image whose pose is sought.
 struct PoseObservation {
@@ -33,15 +34,9 @@ struct PoseObservation {
 };
 
 struct PoseOptions {
-  int rounds = 4;                       // classifications of inliers, each followed by an optimisation, >= 1
-  int iterations = 10;                  // Levenberg-Marquardt steps of one round, >= 1
-  int robust_rounds = 2;                // first rounds that use the Huber kernel, >= 0
   int tail_rounds = 3;                  // of weights by how well an observation fits, and a step, >= 0
   double chi2_pixel = kChi2TwoDof95;    // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
   double chi2_depth = kChi2ThreeDof95;  // the same with depth (3 d.o.f.), > 0
-  double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
-  double translation_tolerance = 1e-4;  // [m] a step below both tolerances ends a round, >= 0
-  double rotation_tolerance = 1e-4;     // [rad] >= 0
   int min_inliers = 6;                  // fewer at the end: not ok, >= 3
 
   void check() const;  // throws InvalidOption
