@@ -58,13 +58,10 @@ std::vector<Points> points_of(const std::vector<Detection>& boxes, std::span<con
   std::vector<Points> own(boxes.size()), inside(boxes.size());
   for (const PointMotion& p : motions) {
     if (!p.from.allFinite() || !p.to.allFinite()) continue;
-    size_t smallest = boxes.size();
-    for (size_t i = 0; i < boxes.size(); ++i) {
-      if (!boxes[i].box.contains(p.from.x(), p.from.y())) continue;
-      inside[i].push_back(&p);
-      if (smallest == boxes.size() || boxes[i].box.area() < boxes[smallest].box.area()) smallest = i;
-    }
-    if (smallest < boxes.size()) own[smallest].push_back(&p);
+    for (size_t i = 0; i < boxes.size(); ++i)
+      if (boxes[i].box.contains(p.from.x(), p.from.y())) inside[i].push_back(&p);
+    const int smallest = smallest_box_at(boxes, p.from.x(), p.from.y());
+    if (smallest >= 0) own[static_cast<size_t>(smallest)].push_back(&p);
   }
   for (size_t i = 0; i < boxes.size(); ++i)
     if (own[i].size() < kMinPoints) own[i] = std::move(inside[i]);
