@@ -81,7 +81,7 @@ class PoseProblem {
     const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
-      const double weight = times * (kStudentFreedom + 2) / (kStudentFreedom + array(kChi2)[i] / variance);
+      const double weight = student_weight(array(kChi2)[i] / variance, times);
       array(kWeight)[i] = weight;
       array(kUsedInvDepthSigma)[i] = array(kInvDepthSigma)[i] * std::sqrt(weight);
     }

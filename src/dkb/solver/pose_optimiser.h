@@ -19,6 +19,9 @@ double variance_by_median(std::span<double> squares);
 // such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
 // freedom (Lange, Little and Taylor, JASA 1989), in a pose about a scale that its own observations tell.
 inline constexpr double kStudentFreedom = 4;
+inline double student_weight(double squared_error, double times = 1) {
+  return times * (kStudentFreedom + 2) / (kStudentFreedom + squared_error);
+}
 // Of the squares of errors in the plane by Student's t with four degrees of freedom, nine of ten are below so many
 // times that variance: twice the quantile of F(2, 4).
 inline constexpr double kStudent90 = 8.65;
