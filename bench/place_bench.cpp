@@ -4,6 +4,7 @@
 // flipped. Beside it a plain hash index with buckets of a fixed number of bits, whose lists grow with the map.  Usage:
 // place_bench [keyframes]
 #include <fmt/core.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <cmath>
@@ -66,13 +67,6 @@ class HashIndex {
     matches.erase(end, matches.end());
     return matches;
   }
-  size_t memory() const {
-    size_t bytes = 0;
-    for (const auto& table : lists_)
-      for (const auto& list : table)
-        bytes += sizeof(list) + list.capacity() * sizeof(uint16_t) + (list.empty() ? 0 : 16);
-    return bytes;
-  }
 
  private:
   int size_ = 0;
@@ -110,6 +104,11 @@ Asked ask(const Index& index, int keyframes) {
   return asked;
 }
 
+size_t heap_in_use() {
+  const auto info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
 void print_row(const char* name, int keyframes, const Asked& asked, double add_ms, size_t memory) {
   fmt::print("{:>6} | {:>9} | {:8.3f} | {:7.3f} | {:11.2f} | {:8.3f} | {:8.3f}\n", name, keyframes, asked.query_ms,
              add_ms, static_cast<double>(memory) / 1000.0 / keyframes, asked.recall[0], asked.recall[1]);
@@ -121,20 +120,26 @@ int main(int argc, char** argv) {
   const int most = argc > 1 ? std::atoi(argv[1]) : 4000;
   fmt::print(" index | keyframes | query ms |  add ms | kB/keyframe | r@5, 10% | r@5, 15%\n");
   PlaceIndex forest, published;
+  const size_t start = heap_in_use();
   HashIndex hash;
+  size_t hash_bytes = heap_in_use() - start, forest_bytes = 0;
   std::vector<double> add_forest, add_hash;
   for (int k = 0, next = 250; k < most; ++k) {
     const Descriptors place = random_place(k);
-    published = forest;
+    const size_t before = heap_in_use();
     const Stopwatch forest_watch;
     forest.add(k, place);
     add_forest.push_back(forest_watch.ms());
+    published = forest;
+    const size_t between = heap_in_use();
     const Stopwatch hash_watch;
     hash.add(k, place);
     add_hash.push_back(hash_watch.ms());
+    forest_bytes += between - before;
+    hash_bytes += heap_in_use() - between;
     if (k + 1 != next) continue;
-    print_row("forest", next, ask(forest, next), median(add_forest), forest.memory());
-    print_row("hash", next, ask(hash, next), median(add_hash), hash.memory());
+    print_row("forest", next, ask(forest, next), median(add_forest), forest_bytes);
+    print_row("hash", next, ask(hash, next), median(add_hash), hash_bytes);
     add_forest.clear();
     add_hash.clear();
     next *= 2;

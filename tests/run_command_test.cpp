@@ -238,7 +238,7 @@ TEST(RunCommand, GreyImagesFloatDepthAndHalfTheSizeWork) {
         small_depth(x, y) = depth(2 * x, 2 * y);
       }
     write_text(folder / row[1], encode_png(small));  // a file's kind is told by its content
-    write_text(folder / row[3], encode_pfm(small_depth));
+    write_text(folder / row[3], encode_tiff(small_depth));
   }
   const SlamRun run(folder, temp / "out");
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;

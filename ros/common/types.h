@@ -138,7 +138,7 @@ struct DiagnosticsOutput {
   std::vector<std::pair<std::string, std::string>> values;
 };
 
-enum class LogLevel { debug, info, warning, error };
+enum class LogLevel { info, warning, error };
 enum class Topic { odom, pose, path, map_points, movers, movers_array, features_image, grid };
 
 // What the core needs of a middleware. Called from the core's threads, more than one at a time.

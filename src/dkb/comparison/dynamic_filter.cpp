@@ -38,15 +38,9 @@ double flow_residual(const FilterFeature& f, const CameraModel& camera, const Ri
 }  // namespace
 
 std::vector<int> box_of_each(std::span<const FilterFeature> features, std::span<const Detection> boxes) {
-  std::vector<int> box(features.size(), -1);
-  for (size_t i = 0; i < features.size(); ++i)
-    for (size_t b = 0; b < boxes.size(); ++b) {
-      if (!boxes[b].box.contains(static_cast<float>(features[i].image_pixel.x()),
-                                 static_cast<float>(features[i].image_pixel.y())))
-        continue;
-      if (box[i] < 0 || boxes[b].box.area() < boxes[static_cast<size_t>(box[i])].box.area())
-        box[i] = static_cast<int>(b);
-    }
+  std::vector<int> box;
+  for (const FilterFeature& f : features)
+    box.push_back(smallest_box_at(boxes, static_cast<float>(f.image_pixel.x()), static_cast<float>(f.image_pixel.y())));
   return box;
 }
 

@@ -257,13 +257,6 @@ Image<float> decode_npy(std::string_view bytes, const std::string& name) {
 
 }  // namespace formats
 
-std::string encode_pfm(const Image<float>& image) {
-  formats::require_side_lengths(image.width(), image.height(), "PFM");
-  std::string out = "Pf\n" + std::to_string(image.width()) + " " + std::to_string(image.height()) + "\n-1.0\n";
-  for (int y = image.height() - 1; y >= 0; --y) out += little_endian_bytes(image, y);
-  return out;
-}
-
 std::string encode_tiff(const Image<float>& image) {
   formats::require_side_lengths(image.width(), image.height(), "TIFF");
   const auto width = static_cast<uint32_t>(image.width()), height = static_cast<uint32_t>(image.height());

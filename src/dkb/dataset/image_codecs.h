@@ -60,7 +60,6 @@ std::string encode_png(const ColourImage& image, int compression = 6);
 std::string encode_png(const Image<uint16_t>& image, int compression = 6);
 std::string encode_jpeg(const ColourImage& image, int quality = 95);
 std::string encode_jpeg(const GreyImage& image, int quality = 95);
-std::string encode_pfm(const Image<float>& image);
 std::string encode_tiff(const Image<float>& image);  // no compression
 
 // Plain write without the cost of fsync, for folders of thousands of images. Throws OutputError.

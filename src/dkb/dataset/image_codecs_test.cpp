@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -31,6 +32,19 @@ Image<float> float_depth(int width = 19, int height = 17) {
   return image;
 }
 
+// Little-endian samples, row by row.
+std::string bytes_of(const Image<float>& image) {
+  return encode_tiff(image).substr(8, 4 * image.size());
+}
+
+std::string encode_pfm(const Image<float>& image) {
+  Image<float> upside_down(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y)
+    std::copy_n(image.row(image.height() - 1 - y), image.width(), upside_down.row(y));
+  return "Pf\n" + std::to_string(image.width()) + " " + std::to_string(image.height()) + "\n-1.0\n" +
+         bytes_of(upside_down);
+}
+
 // Bytes of a .npy file of float32, little endian.
 std::string encode_npy(const Image<float>& image) {
   std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + std::to_string(image.height()) + ", " +
@@ -39,8 +53,7 @@ std::string encode_npy(const Image<float>& image) {
   std::string out("\x93NUMPY\x01\x00", 8);
   out += static_cast<char>(header.size());
   out += '\0';
-  const std::string tiff = encode_tiff(image);  // little-endian samples from byte 8 on
-  return out + header + tiff.substr(8, 4 * image.size());
+  return out + header + bytes_of(image);
 }
 
 TEST(Png, ColourAndGreyComeBackExactly) {

@@ -41,7 +41,6 @@ class PacedSource final : public Source {
   SourceCounts counts() const override;
   std::optional<size_t> size() const override { return source_.size(); }
   std::string description() const override { return source_.description(); }
-  int dropped() const { return dropped_; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <numeric>
 
 #include "dkb/map/byte_stream.h"
+#include "dkb/util/disjoint_sets.h"
 
 namespace dkb {
 namespace {
@@ -113,15 +113,6 @@ void add_quad(const std::array<int32_t, 4>& q, bool flip, SurfaceMesh* mesh) {
   }
 }
 
-int32_t find_root(std::vector<int32_t>& parent, int32_t i) {
-  while (parent[static_cast<size_t>(i)] != i) {
-    int32_t& p = parent[static_cast<size_t>(i)];
-    p = parent[static_cast<size_t>(p)];
-    i = p;
-  }
-  return i;
-}
-
 }  // namespace
 
 SurfaceMesh extract_surface(const TsdfVolume& volume) {
@@ -172,23 +163,19 @@ SurfaceMesh extract_surface(const TsdfVolume& volume) {
 }
 
 SurfaceMesh without_small_parts(const SurfaceMesh& mesh, double min_area) {
-  std::vector<int32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
+  DisjointSets joined(mesh.vertices.size());
+  const auto part = [&](const auto& triangle) { return joined.first_of(static_cast<size_t>(triangle[0])); };
   for (const auto& t : mesh.triangles)
-    for (int i = 1; i < 3; ++i) {
-      const int32_t a = find_root(parent, t[0]), b = find_root(parent, t[static_cast<size_t>(i)]);
-      parent[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
-    }
+    for (size_t i = 1; i < 3; ++i) joined.join(static_cast<size_t>(t[0]), static_cast<size_t>(t[i]));
   std::vector<double> area(mesh.vertices.size(), 0);
   for (const auto& t : mesh.triangles) {
     const auto at = [&](size_t i) -> const Eigen::Vector3f& { return mesh.vertices[static_cast<size_t>(t[i])]; };
-    area[static_cast<size_t>(find_root(parent, t[0]))] +=
-        0.5 * static_cast<double>((at(1) - at(0)).cross(at(2) - at(0)).norm());
+    area[part(t)] += 0.5 * static_cast<double>((at(1) - at(0)).cross(at(2) - at(0)).norm());
   }
   SurfaceMesh result;
   std::vector<int32_t> renamed(mesh.vertices.size(), kNoVertex);
   for (const auto& t : mesh.triangles) {
-    if (area[static_cast<size_t>(find_root(parent, t[0]))] < min_area) continue;
+    if (area[part(t)] < min_area) continue;
     for (int32_t v : t) renamed[static_cast<size_t>(v)] = 0;
   }
   for (size_t v = 0; v < renamed.size(); ++v) {

@@ -11,6 +11,11 @@
 namespace dkb {
 namespace {
 
+constexpr size_t kMinPoints = 4;        // followed inside a box below which it is not moved, only grown
+constexpr float kMaxScaleStep = 1.05f;  // largest change of size per frame carried, either way
+constexpr float kGrowth = 1.0f;         // [px] per frame and side, for what flow does not tell
+constexpr float kBlindGrowth = 0.02f;   // share of the box per frame and side, more, for boxes without enough points
+
 // How one coordinate moves: to = centre + scale * (from - centre) + shift, where the shift lies within low ... high.
 struct AxisMotion {
   float centre = 0, scale = 1, low = 0, middle = 0, high = 0;
@@ -49,21 +54,17 @@ float scale_change(const Points& points, float limit) {
 }
 
 // Points of each box: its own (no smaller box holds them), or all inside it where these are too few.
-std::vector<Points> points_of(const std::vector<Detection>& boxes, std::span<const PointMotion> motions,
-                              int min_points) {
+std::vector<Points> points_of(const std::vector<Detection>& boxes, std::span<const PointMotion> motions) {
   std::vector<Points> own(boxes.size()), inside(boxes.size());
   for (const PointMotion& p : motions) {
     if (!p.from.allFinite() || !p.to.allFinite()) continue;
-    size_t smallest = boxes.size();
-    for (size_t i = 0; i < boxes.size(); ++i) {
-      if (!boxes[i].box.contains(p.from.x(), p.from.y())) continue;
-      inside[i].push_back(&p);
-      if (smallest == boxes.size() || boxes[i].box.area() < boxes[smallest].box.area()) smallest = i;
-    }
-    if (smallest < boxes.size()) own[smallest].push_back(&p);
+    for (size_t i = 0; i < boxes.size(); ++i)
+      if (boxes[i].box.contains(p.from.x(), p.from.y())) inside[i].push_back(&p);
+    const int smallest = smallest_box_at(boxes, p.from.x(), p.from.y());
+    if (smallest >= 0) own[static_cast<size_t>(smallest)].push_back(&p);
   }
   for (size_t i = 0; i < boxes.size(); ++i)
-    if (own[i].size() < static_cast<size_t>(min_points)) own[i] = std::move(inside[i]);
+    if (own[i].size() < kMinPoints) own[i] = std::move(inside[i]);
   return own;
 }
 
@@ -92,11 +93,11 @@ void move_mask(const GreyImage& mask, const Box& from, const AxisMotion& x_motio
 }  // namespace
 
 Detections carry(const Detections& from, std::span<const PointMotion> motions, int frames, int width, int height,
-                 const CarryOptions& options, std::vector<size_t>* kept) {
+                 std::vector<size_t>* kept) {
   if (frames <= 0) return from;
-  const std::vector<Points> points = points_of(from.boxes, motions, options.min_points);
+  const std::vector<Points> points = points_of(from.boxes, motions);
   const auto steps = static_cast<float>(frames);
-  const float scale_limit = std::pow(options.max_scale_step, steps);
+  const float scale_limit = std::pow(kMaxScaleStep, steps);
   Detections to;
   to.mask = from.mask;
   if (!to.mask.empty())
@@ -108,9 +109,9 @@ Detections carry(const Detections& from, std::span<const PointMotion> motions, i
     const Detection& d = from.boxes[i];
     const float cx = d.box.x + d.box.w / 2, cy = d.box.y + d.box.h / 2;
     AxisMotion x_motion{cx, 1, 0, 0, 0}, y_motion{cy, 1, 0, 0, 0};
-    float growth = options.growth_px * steps;
-    if (points[i].size() < static_cast<size_t>(options.min_points)) {
-      growth += options.blind_growth * steps * std::max(d.box.w, d.box.h);
+    float growth = kGrowth * steps;
+    if (points[i].size() < kMinPoints) {
+      growth += kBlindGrowth * steps * std::max(d.box.w, d.box.h);
     } else {
       const float scale = scale_change(points[i], scale_limit);
       x_motion = axis_motion(points[i], 0, cx, scale);

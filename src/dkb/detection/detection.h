@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
+
 #include "dkb_slam/detector.h"
 
 namespace dkb {
@@ -8,6 +10,11 @@ namespace dkb {
 // The part of `box` within an image of this size [px]; of zero width or height when there is none.
 Box clip(const Box& box, int width, int height);
 
+// The number of the smallest box that holds a point [px], of equal ones the first; -1 where none does.
+int smallest_box_at(std::span<const Detection> boxes, float x, float y);
+
+// Of the intersection [px^2].
+float shared_area(const Box& a, const Box& b);
 // Area of the intersection over area of the union, 0 ... 1; 0 for empty boxes.
 float intersection_over_union(const Box& a, const Box& b);
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "dkb/util/disjoint_sets.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
@@ -13,36 +13,27 @@ namespace dkb {
 namespace fs = std::filesystem;
 namespace {
 
-// Pixels first ... last of one row; `parent` links the runs of a region to its first one.
+// Pixels first ... last of one row.
 struct Run {
-  int y = 0, first = 0, last = 0, parent = 0;
+  int y = 0, first = 0, last = 0;
 };
 
-int root_of(std::vector<Run>& runs, int i) {
-  while (runs[i].parent != i) i = runs[i].parent = runs[runs[i].parent].parent;
-  return i;
-}
-
-void join(std::vector<Run>& runs, int a, int b) {
-  a = root_of(runs, a);
-  b = root_of(runs, b);
-  runs[std::max(a, b)].parent = std::min(a, b);
-}
-
-std::vector<Run> connected_runs(const GreyImage& mask) {
+// Joins those of a region, by their numbers.
+std::vector<Run> connected_runs(const GreyImage& mask, DisjointSets* regions) {
   std::vector<Run> runs;
-  int above = 0;  // first run of the row before
+  size_t above = 0;  // first run of the row before
   for (int y = 0; y < mask.height(); ++y) {
     const uint8_t* row = mask.row(y);
-    const int begin = static_cast<int>(runs.size());
+    const size_t begin = runs.size();
     for (int x = 0; x < mask.width(); ++x) {
       if (row[x] < 128) continue;
       const int first = x;
       while (x + 1 < mask.width() && row[x + 1] >= 128) ++x;
-      const int self = static_cast<int>(runs.size());
-      runs.push_back({y, first, x, self});
-      for (int i = above; i < begin; ++i)
-        if (runs[i].first <= x + 1 && runs[i].last >= first - 1) join(runs, i, self);
+      const size_t self = runs.size();
+      runs.push_back({y, first, x});
+      regions->add();
+      for (size_t i = above; i < begin; ++i)
+        if (runs[i].first <= x + 1 && runs[i].last >= first - 1) regions->join(i, self);
     }
     above = begin;
   }
@@ -55,11 +46,12 @@ std::vector<Box> region_boxes(const GreyImage& mask, int min_pixels) {
   struct Region {
     int left, right, top, bottom, pixels;
   };
-  std::vector<Run> runs = connected_runs(mask);
-  std::vector<Region> regions(runs.size(), Region{0, 0, 0, 0, 0});  // at the root's place
+  DisjointSets joined;
+  const std::vector<Run> runs = connected_runs(mask, &joined);
+  std::vector<Region> regions(runs.size(), Region{0, 0, 0, 0, 0});  // at the first run's place
   for (size_t i = 0; i < runs.size(); ++i) {
     const Run& run = runs[i];
-    Region& region = regions[static_cast<size_t>(root_of(runs, static_cast<int>(i)))];
+    Region& region = regions[joined.first_of(i)];
     if (region.pixels == 0) region = {run.first, run.last, run.y, run.y, 0};
     region.left = std::min(region.left, run.first);
     region.right = std::max(region.right, run.last);

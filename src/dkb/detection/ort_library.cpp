@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
-#include <type_traits>
 
 #include "dkb/util/module.h"
 #include "dkb/util/one_line.h"
@@ -20,10 +19,9 @@ constexpr const char* kLibrary = "libonnxruntime.so.1";
 constexpr const char* kEntry = "OrtGetApiBase";
 constexpr unsigned kInterface = 14;  // version of the interface that is asked for: ONNX Runtime 1.14 and newer have it
 
-using Function = void (*)();
 struct Base {
-  const Function* (*interface)(uint32_t version);  // null when the library has not got that version
-  const char* (*version)();                        // of the library: "1.20.1"
+  const OrtTable::Function* (*interface)(uint32_t version);  // null when the library has not got that version
+  const char* (*version)();                                  // of the library: "1.20.1"
 };
 
 const char* named_library() {
@@ -49,44 +47,6 @@ void* find_entry(std::string* reason) {
   return entry_of(kLibrary, &ignored);
 }
 
-// The places of the functions in the table, by ONNX Runtime's reference of its C interface.
-OrtLibrary read_table(const Function* table) {
-  OrtLibrary library{};
-  const auto take = [&](size_t place, auto* function) {
-    *function = reinterpret_cast<std::remove_pointer_t<decltype(function)>>(table[place]);
-  };
-  take(2, &library.error_message);
-  take(3, &library.create_environment);
-  take(8, &library.create_session);  // from an array
-  take(9, &library.run);
-  take(10, &library.create_options);
-  take(17, &library.disable_memory_pattern);
-  take(23, &library.set_optimisation);
-  take(24, &library.set_threads_within);
-  take(25, &library.set_threads_between);
-  take(31, &library.output_count);
-  take(37, &library.output_name);
-  take(49, &library.create_tensor);
-  take(50, &library.is_tensor);
-  take(51, &library.tensor_data);
-  take(60, &library.element_type);
-  take(61, &library.rank);
-  take(62, &library.dimensions);
-  take(65, &library.shape_of);
-  take(69, &library.create_cpu_memory);
-  take(76, &library.free);
-  take(78, &library.default_allocator);
-  take(92, &library.release_environment);
-  take(93, &library.release_status);
-  take(94, &library.release_memory);
-  take(95, &library.release_session);
-  take(96, &library.release_value);
-  take(99, &library.release_shape);
-  take(100, &library.release_options);
-  take(130, &library.set_entry);
-  return library;
-}
-
 }  // namespace
 
 bool onnxruntime_is_named() {
@@ -105,15 +65,13 @@ std::optional<OrtLibrary> load_onnxruntime(std::string* reason) {
   const bool numbered = version.starts_with("1.") &&
                         std::from_chars(version.data() + 2, version.data() + version.size(), minor).ec == std::errc();
   // Asked for a version that it has not got, the library would print.
-  const Function* table = numbered && minor >= kInterface ? base->interface(kInterface) : nullptr;
+  const OrtTable::Function* table = numbered && minor >= kInterface ? base->interface(kInterface) : nullptr;
   if (table == nullptr) {
     *reason = name + " has not got version " + std::to_string(kInterface) + " of the interface, which ONNX Runtime 1." +
               std::to_string(kInterface) + " and newer have";
     return std::nullopt;
   }
-  OrtLibrary library = read_table(table);
-  library.name = name;
-  return library;
+  return OrtLibrary{name, {table}};
 }
 
 }  // namespace dkb

@@ -61,8 +61,7 @@ void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid)
   if (past.empty() || carried_.empty()) return;
   const Detections here{boxes(), std::move(mask_)};
   std::vector<size_t> kept;
-  Detections there =
-      carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, {}, &kept);
+  Detections there = carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, &kept);
   std::vector<Carried> moved;
   for (size_t i = 0; i < kept.size(); ++i) moved.push_back({there.boxes[i], carried_[kept[i]].missed});
   carried_ = std::move(moved);

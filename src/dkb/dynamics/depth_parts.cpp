@@ -27,13 +27,9 @@ DepthParts::DepthParts(int columns, int rows, Simd simd)
       down_(right_.size()),
       run_above_(static_cast<size_t>(columns)) {}
 
-size_t DepthParts::first_run(size_t run) {
-  while (runs_[run].part != run) run = runs_[run].part = runs_[runs_[run].part].part;
-  return run;
-}
-
 void DepthParts::find_runs(std::span<const float> depth) {
   runs_.clear();
+  joined_runs_.clear();
   for (int y = 0; y < rows_; ++y) {
     const size_t row = static_cast<size_t>(y) * static_cast<size_t>(columns_), first_of_row = runs_.size();
     const uint8_t* right = right_.data() + row;
@@ -45,15 +41,15 @@ void DepthParts::find_runs(std::span<const float> depth) {
       const size_t run = runs_.size();
       int end = x + 1;
       while (end < columns_ && right[end - 1]) ++end;
-      runs_.push_back({y, x, end, run});
+      runs_.push_back({y, x, end});
+      joined_runs_.add();
       const uint8_t* up = y > 0 ? below(y - 1) : nullptr;
       size_t last = run;
       for (int c = x; up && c < end; ++c) {
         const size_t above = run_above_[static_cast<size_t>(c)];
         if (!up[c] || above == last) continue;
         last = above;
-        const size_t a = first_run(above), b = first_run(run);
-        runs_[std::max(a, b)].part = std::min(a, b);
+        joined_runs_.join(above, run);
       }
       x = end;
     }
@@ -88,7 +84,7 @@ std::vector<DepthPart> DepthParts::find(std::span<const float> depth, std::span<
   std::vector<size_t> number(runs_.size());  // of the part that a first run begins
   for (size_t r = 0; r < runs_.size(); ++r) {
     const Run& run = runs_[r];
-    const size_t first = first_run(r);
+    const size_t first = joined_runs_.first_of(r);
     if (first == r) {
       number[r] = parts.size();
       parts.push_back({{run.x0, run.y, run.x1, run.y + 1}, {}, 0});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dkb/features/simd.h"
+#include "dkb/util/disjoint_sets.h"
 
 namespace dkb {
 
@@ -44,10 +45,8 @@ class DepthParts {
  private:
   struct Run {
     int y, x0, x1;
-    size_t part;  // a run of the same part that comes earlier, or itself
   };
   void find_runs(std::span<const float> depth);
-  size_t first_run(size_t run);
   size_t inner_of(const Run& run) const;
   const uint8_t* below(int y) const { return down_.data() + static_cast<size_t>(y) * static_cast<size_t>(columns_); }
 
@@ -57,6 +56,7 @@ class DepthParts {
   std::vector<uint8_t> right_, down_;
   std::vector<float> jump_;
   std::vector<Run> runs_;
+  DisjointSets joined_runs_;
   std::vector<size_t> run_above_;  // per column: the run of the row above
 };
 

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "dkb/features/vectorised.h"
+#include "dkb/util/disjoint_sets.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/quantile.h"
 
@@ -228,17 +229,12 @@ std::vector<MoverObserver::Region> MoverObserver::find_regions(std::span<const D
 
 // Holes of the depth image and arms held out cut bodies into parts.
 std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts) const {
-  std::vector<size_t> merged_into(parts.size());
-  std::iota(merged_into.begin(), merged_into.end(), size_t{0});
+  DisjointSets bodies(parts.size());
   std::vector<Eigen::Vector2f> middles;
   for (const Region& part : parts) {
     auto points = sample(part.cells);
     middles.emplace_back(upper_median(points[0]), upper_median(points[2]));
   }
-  const auto root = [&](size_t p) {
-    while (merged_into[p] != p) p = merged_into[p];
-    return p;
-  };
   const auto of_one_body = [&](size_t a, size_t b) {
     if (parts[a].expected >= 0 || parts[b].expected >= 0) return parts[a].expected == parts[b].expected;
     const CellBounds &p = parts[a].bounds, &q = parts[b].bounds;
@@ -248,12 +244,9 @@ std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts
   };
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b)
-      if (of_one_body(a, b)) {
-        const size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
-        merged_into[high] = low;
-      }
+      if (of_one_body(a, b)) bodies.join(a, b);
   for (size_t p = 0; p < parts.size(); ++p) {
-    const size_t r = root(p);
+    const size_t r = bodies.first_of(p);
     if (r == p) continue;
     Region &into = parts[r], &from = parts[p];
     into.cells.insert(into.cells.end(), from.cells.begin(), from.cells.end());
@@ -262,7 +255,7 @@ std::vector<MoverObserver::Region> MoverObserver::join(std::vector<Region> parts
   }
   std::vector<Region> regions;
   for (size_t p = 0; p < parts.size(); ++p)
-    if (merged_into[p] == p && parts[p].cells.size() >= (parts[p].expected >= 0 ? kMinCells : kMinRegion))
+    if (bodies.first_of(p) == p && parts[p].cells.size() >= (parts[p].expected >= 0 ? kMinCells : kMinRegion))
       regions.push_back(std::move(parts[p]));
   return regions;
 }

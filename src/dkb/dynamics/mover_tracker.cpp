@@ -39,9 +39,7 @@ constexpr double kRegionsApart = 0.6;  // [m] the same for regions without a box
 
 // Whether a box may be what is left of another one of the frame before.
 bool left_of(const Box& before, const Box& now) {
-  const float w = std::min(before.x + before.w, now.x + now.w) - std::max(before.x, now.x);
-  const float h = std::min(before.y + before.h, now.y + now.h) - std::max(before.y, now.y);
-  return w > 0 && h > 0 && 2 * w * h > now.area();
+  return 2 * shared_area(before, now) > now.area();
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ AdaptiveKeyframeOptions paper_keyframe_options();
 // frame is the first one after a keyframe. Deterministic.
 class AdaptiveKeyframePolicy final : public KeyframeDecider {
  public:
-  // The size [px] is that of the images. Throws InvalidOption.
+  // The size [px] is that of the images.
   AdaptiveKeyframePolicy(const AdaptiveKeyframeOptions& options, int image_width, int image_height);
   KeyframeDecision decide(const KeyframeContext& query, const Map& map) override;
 

@@ -68,6 +68,24 @@ const KeyframeMotion* motion_between(const Map& map, KeyframeId a, KeyframeId b)
   return nullptr;
 }
 
+// Keyframes within so many steps along covisibility, `id` included; one flag per keyframe.
+std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps) {
+  std::vector<uint8_t> near(static_cast<size_t>(map.keyframe_count()), 0);
+  std::vector<KeyframeId> rim = {id};
+  near[static_cast<size_t>(id)] = 1;
+  for (int s = 0; s < steps; ++s) {
+    std::vector<KeyframeId> next;
+    for (KeyframeId k : rim)
+      for (const Covisible& c : map.keyframe(k)->covisible)
+        if (!near[static_cast<size_t>(c.keyframe)]) {
+          near[static_cast<size_t>(c.keyframe)] = 1;
+          next.push_back(c.keyframe);
+        }
+    rim = std::move(next);
+  }
+  return near;
+}
+
 }  // namespace
 
 std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
@@ -104,23 +122,6 @@ std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
     if (k.parent != kNoKeyframe) go(k.parent, motion_between(map, k.parent, at));
   }
   return paths;
-}
-
-std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps) {
-  std::vector<uint8_t> near(static_cast<size_t>(map.keyframe_count()), 0);
-  std::vector<KeyframeId> rim = {id};
-  near[static_cast<size_t>(id)] = 1;
-  for (int s = 0; s < steps; ++s) {
-    std::vector<KeyframeId> next;
-    for (KeyframeId k : rim)
-      for (const Covisible& c : map.keyframe(k)->covisible)
-        if (!near[static_cast<size_t>(c.keyframe)]) {
-          near[static_cast<size_t>(c.keyframe)] = 1;
-          next.push_back(c.keyframe);
-        }
-    rim = std::move(next);
-  }
-  return near;
 }
 
 std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics& optics, const LoopOptions& options,

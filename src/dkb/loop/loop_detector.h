@@ -31,9 +31,6 @@ struct PathThroughMap {
 // From `from` to every keyframe.
 std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from);
 
-// Keyframes within so many steps along covisibility, `id` included; one flag per keyframe.
-std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps);
-
 // Does keyframe `id` show a place that the map knows, but does not know to be the same? Candidates are the keyframes
 // that look most like it (PlaceIndex), its neighbours apart. Each is verified as a camera that was lost is found: a
 // pose by descriptors alone, matches around it, and a pose on these. A loop needs supporting keyframes, and a drift

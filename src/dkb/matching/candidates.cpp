@@ -10,6 +10,7 @@ namespace dkb {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kMinViewCosine = 0.5f;  // between the viewing ray and the point's mean direction
 
 float angle_between(float a, float b) {
   const float d = std::fabs(a - b);
@@ -75,7 +76,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     const float distance = ray.norm();
     const float scale = c.reference_scale * c.reference_distance / distance;
     if (scale < nearest_scale || scale > farthest_scale) continue;
-    if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < options.min_view_cosine * distance) continue;
+    if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < kMinViewCosine * distance) continue;
     if (visible != nullptr) (*visible)[i] = 1;
     // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;

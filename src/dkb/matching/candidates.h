@@ -32,10 +32,9 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
                        const Optics& optics);
 
 struct ProjectionMatchOptions {
-  float radius = 4.0f;           // [px] search radius at the finest level, > 0; grows with the predicted scale
-  int max_distance = 64;         // [bits] largest Hamming distance of a match, 0 ... 256
-  float ratio = 0.8f;            // best distance must be below this share of the second best on the same level, 0 ... 1
-  float min_view_cosine = 0.5f;  // least cosine between the viewing ray and the point's mean direction
+  float radius = 4.0f;    // [px] search radius at the finest level, > 0; grows with the predicted scale
+  int max_distance = 64;  // [bits] largest Hamming distance of a match, 0 ... 256
+  float ratio = 0.8f;     // best distance must be below this share of the second best on the same level, 0 ... 1
 };
 
 struct ProjectionMatch {

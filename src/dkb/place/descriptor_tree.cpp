@@ -123,25 +123,4 @@ void DescriptorTree::compare(const Lookup& lookup, std::vector<Neighbour>& neigh
   }
 }
 
-size_t DescriptorTree::memory() const {
-  constexpr size_t kHeapHeader = 16, kControl = 16;
-  size_t bytes = sizeof(*this);
-  std::vector<const Node*> open;
-  for (const auto& block : root_) {
-    if (!block) continue;
-    bytes += sizeof(Block) + kControl + kHeapHeader;
-    for (const auto& node : block->nodes)
-      if (node) open.push_back(node.get());
-  }
-  while (!open.empty()) {
-    const Node* node = open.back();
-    open.pop_back();
-    bytes += sizeof(Node) + kControl + kHeapHeader;
-    if (node->entries.capacity() > 0) bytes += node->entries.capacity() * sizeof(Entry) + kHeapHeader;
-    for (const auto& child : node->children)
-      if (child) open.push_back(child.get());
-  }
-  return bytes;
-}
-
 }  // namespace dkb

@@ -53,9 +53,6 @@ class DescriptorTree {
     }
   }
 
-  // [bytes] of all nodes, whether shared with a copy or not.
-  size_t memory() const;
-
  private:
   using Entry = uint32_t;  // slot in the low half, stored key bits in the high half
   struct Node {

@@ -89,35 +89,25 @@ void PlaceIndex::sweep() {
 
 std::vector<PlaceMatch> PlaceIndex::query(std::span<const Descriptor> descriptors, size_t max_results) const {
   std::vector<float> scores(slots_.size(), 0.0f);
-  std::vector<int> votes(slots_.size(), 0);
   std::vector<float> rarity(DescriptorTree::kCommon + 1, 0.0f);
   for (size_t n = 1; n < rarity.size(); ++n) rarity[n] = std::log1p(static_cast<float>(size()) / static_cast<float>(n));
   for (const DescriptorTree& tree : trees_)
     tree.find(descriptors, [&](const std::vector<DescriptorTree::Neighbour>& neighbours) {
       const float weight = rarity[neighbours.size()];
-      for (const auto& n : neighbours) {
+      for (const auto& n : neighbours)
         scores[n.slot] +=
             weight * static_cast<float>(n.tolerated + 1 - n.distance) / static_cast<float>(n.tolerated + 1);
-        ++votes[n.slot];
-      }
     });
   std::vector<PlaceMatch> matches;
   for (const auto& [id, slot] : slot_of_id_)
-    if (votes[slot] > 0)
-      matches.push_back({id, scores[slot] / std::sqrt(static_cast<float>(slots_[slot].descriptors)), votes[slot]});
+    if (scores[slot] > 0)
+      matches.push_back({id, scores[slot] / std::sqrt(static_cast<float>(slots_[slot].descriptors))});
   const auto end = matches.begin() + static_cast<long>(std::min(max_results, matches.size()));
   std::partial_sort(matches.begin(), end, matches.end(), [](const PlaceMatch& a, const PlaceMatch& b) {
     return a.score != b.score ? a.score > b.score : a.id < b.id;
   });
   matches.erase(end, matches.end());
   return matches;
-}
-
-size_t PlaceIndex::memory() const {
-  size_t bytes = sizeof(*this) + slots_.capacity() * sizeof(Slot) + slot_of_id_.capacity() * sizeof(IdSlot) +
-                 free_.capacity() * sizeof(uint16_t);
-  for (const DescriptorTree& tree : trees_) bytes += tree.memory();
-  return bytes;
 }
 
 }  // namespace dkb

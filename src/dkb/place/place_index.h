@@ -15,7 +15,6 @@ namespace dkb {
 struct PlaceMatch {
   int32_t id = -1;  // keyframe
   float score = 0;  // larger is more similar; to be compared within one query only
-  int votes = 0;    // pairs of like descriptors behind it
 };
 
 // Which keyframes look like this one? Learns keyframe by keyframe and needs no vocabulary: an LSH forest finds the
@@ -43,8 +42,6 @@ class PlaceIndex {
   bool full() const { return size() >= kMaxKeyframes; }
   bool contains(int32_t id) const { return find(id) != slot_of_id_.end(); }
   size_t size() const { return slot_of_id_.size(); }
-  // [bytes] in all, parts shared with copies included.
-  size_t memory() const;
 
  private:
   using IdSlot = std::pair<int32_t, uint16_t>;

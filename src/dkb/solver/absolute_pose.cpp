@@ -22,14 +22,16 @@ void draw_three(Random& random, uint32_t n, uint32_t (&sample)[3]) {
   while (sample[2] == sample[0] || sample[2] == sample[1]);
 }
 
-// Samples needed to draw one without outliers with this confidence.
-int samples_needed(const RansacOptions& options, int inliers, size_t count) {
+constexpr int kMaxSamples = 300;
+constexpr double kConfidence = 0.999;  // of having drawn one sample without outliers; ends early
+
+int samples_needed(int inliers, size_t count) {
   const double share = static_cast<double>(inliers) / static_cast<double>(count);
   const double clean = share * share * share;
   if (clean >= 1) return 1;
-  if (clean <= 0) return options.max_iterations;
-  const double needed = std::log(1 - options.confidence) / std::log1p(-clean);
-  return needed < options.max_iterations ? static_cast<int>(std::ceil(needed)) : options.max_iterations;
+  if (clean <= 0) return kMaxSamples;
+  const double needed = std::log(1 - kConfidence) / std::log1p(-clean);
+  return needed < kMaxSamples ? static_cast<int>(std::ceil(needed)) : kMaxSamples;
 }
 
 // A hypothesis by the sum of squared errors cut off at their limits (MSAC, Torr and Zisserman 2000).
@@ -67,7 +69,7 @@ class Errors {
  private:
   double of_limit(const Rigid3& pose, const PoseObservation& o) const {
     const Eigen::Vector3d point = pose * o.point_in_world;
-    if (!(point.z() > PoseOptions().depth_in_front)) return std::numeric_limits<double>::infinity();
+    if (!(point.z() > kDepthInFront)) return std::numeric_limits<double>::infinity();
     const double pixel = ((camera_.project(point) - o.pixel) / o.pixel_sigma).squaredNorm();
     const double depth = o.depth > 0 ? (point.z() - o.depth) / o.depth_sigma : 0.0;
     return (pixel + depth * depth) / (o.depth > 0 ? kChi2ThreeDof95 : kChi2TwoDof95);
@@ -89,8 +91,6 @@ constexpr int kRefinements = 3;
 }  // namespace
 
 void RansacOptions::check() const {
-  require_option(max_iterations >= 1, "max_iterations", max_iterations, ">= 1");
-  require_option(confidence > 0 && confidence < 1, "confidence", confidence, "in (0, 1)");
   require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
 }
 
@@ -105,7 +105,7 @@ RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const Pos
   const Errors errors(camera, observations);
   Random random(options.seed);
   Best best;
-  int needed = options.max_iterations;
+  int needed = kMaxSamples;
   for (; result.iterations < needed; ++result.iterations) {
     uint32_t sample[3];
     draw_three(random, static_cast<uint32_t>(count), sample);
@@ -115,7 +115,7 @@ RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const Pos
       rays[k] = camera.unproject(observations[sample[k]].pixel, 1.0).normalized();
     }
     for (const Rigid3& pose : solve_p3p(points, rays)) {
-      if (errors.offer(pose, best)) needed = samples_needed(options, best.inliers, count);
+      if (errors.offer(pose, best)) needed = samples_needed(best.inliers, count);
     }
   }
   if (best.inliers < 3) return result;

@@ -13,9 +13,7 @@
 namespace dkb {
 
 struct RansacOptions {
-  int max_iterations = 300;   // samples drawn at most, >= 1
-  double confidence = 0.999;  // of having drawn one sample without outliers, (0, 1); ends early
-  int min_inliers = 10;       // fewer: not ok, >= 3
+  int min_inliers = 10;  // fewer: not ok, >= 3
   uint64_t seed = 1;
 
   void check() const;  // throws InvalidOption

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string>
 
+#include "dkb/solver/pose_optimiser.h"
 #include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 
@@ -72,7 +73,6 @@ struct PointResiduals {
 };
 
 std::vector<PointResiduals> inlying_residuals(const BaProblem& problem) {
-  constexpr double kDepthInFront = 0.01;
   std::vector<PointResiduals> residuals(problem.points.size());
   for (const BaObservation& o : problem.observations) {
     const Eigen::Vector3d point = problem.cam_from_world[o.camera] * problem.points[o.point];

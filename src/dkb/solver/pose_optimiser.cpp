@@ -20,6 +20,12 @@ constexpr double kMedianChi2 = 1.386;  // of two degrees of freedom
 constexpr double kClaim = 1 / (1.0925 * 1.084);
 constexpr double kUsualScale = 20;  // observations of the sigmas as given that stand beside those at hand
 
+constexpr int kPoseRounds = 4;    // classifications of inliers, each followed by an optimisation
+constexpr int kRobustRounds = 2;  // first ones that use the Huber kernel
+constexpr int kRoundSteps = 10;   // of Levenberg-Marquardt, at most
+// [m, rad] a step below both ends a round.
+constexpr double kSmallTranslation = 1e-4, kSmallRotation = 1e-4;
+
 // The observations as arrays, in groups of four, and the sums over them at a pose.
 class PoseProblem {
  public:
@@ -42,7 +48,7 @@ class PoseProblem {
         array(kInvDepthSigma)[i] = share / o.depth_sigma;
       }
     }
-    input_.camera = {camera.fx, camera.fy, camera.cx, camera.cy, {}, {}, options.depth_in_front};
+    input_.camera = {camera.fx, camera.fy, camera.cx, camera.cy, {}, {}, kDepthInFront};
     input_.observations = {array(kU), array(kV), array(kInvSigma), array(kDepth), nullptr, array(kWeight)};
     input_.x = array(kX);
     input_.y = array(kY);
@@ -69,16 +75,18 @@ class PoseProblem {
   void weigh(const std::vector<uint8_t>& inlier, const Rigid3& pose, double times = 1) {
     use(inlier);
     compute_chi2(pose);
+    double* const chi2 = array(kChi2);
     double* const fits = array(kFits);
     double* end = fits;
-    for (size_t i = 0; i < count_; ++i)
-      if (inlier[i]) *end++ = array(kChi2)[i] / array(kGiven)[i];
+    for (size_t i = 0; i < count_; ++i) {
+      chi2[i] /= array(kGiven)[i];
+      if (inlier[i]) *end++ = chi2[i];
+    }
     if (end == fits) return;
     const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
-      const double fit = array(kChi2)[i] / array(kGiven)[i];
-      const double weight = times * (kStudentFreedom + 2) / (kStudentFreedom + fit / variance);
+      const double weight = student_weight(chi2[i] / variance, times);
       array(kWeight)[i] = weight;
       array(kUsedInvDepthSigma)[i] = array(kInvDepthSigma)[i] * std::sqrt(weight);
     }
@@ -158,11 +166,11 @@ class PoseProblem {
 };
 
 // Levenberg-Marquardt from `pose` with the observations in use. Returns the number of steps tried.
-int descend(PoseProblem& problem, const PoseOptions& options, bool robust, Rigid3& pose) {
+int descend(PoseProblem& problem, bool robust, Rigid3& pose) {
   double damping = 1e-6;
   PoseProblem::Normal normal = problem.normal_at(pose, robust);
   int tried = 0;
-  while (tried < options.iterations) {
+  while (tried < kRoundSteps) {
     ++tried;
     Matrix6d damped = normal.information;
     // The floor keeps directions without information where they are.
@@ -170,8 +178,7 @@ int descend(PoseProblem& problem, const PoseOptions& options, bool robust, Rigid
     const Vector6d step = -solve_symmetric(damped, normal.gradient);
     if (!step.allFinite()) break;
     const Rigid3 candidate = solver::perturbed(pose, step);
-    const bool small =
-        step.head<3>().norm() <= options.translation_tolerance && step.tail<3>().norm() <= options.rotation_tolerance;
+    const bool small = step.head<3>().norm() <= kSmallTranslation && step.tail<3>().norm() <= kSmallRotation;
     const PoseProblem::Normal next = problem.normal_at(candidate, robust);
     if (next.cost <= normal.cost) {
       pose = candidate;
@@ -203,15 +210,9 @@ double variance_by_median(std::span<double> squares) {
 }
 
 void PoseOptions::check() const {
-  require_option(rounds >= 1, "rounds", rounds, ">= 1");
-  require_option(iterations >= 1, "iterations", iterations, ">= 1");
-  require_option(robust_rounds >= 0, "robust_rounds", robust_rounds, ">= 0");
   require_option(tail_rounds >= 0, "tail_rounds", tail_rounds, ">= 0");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
   require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
-  require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
-  require_option(translation_tolerance >= 0, "translation_tolerance", translation_tolerance, ">= 0 m");
-  require_option(rotation_tolerance >= 0, "rotation_tolerance", rotation_tolerance, ">= 0 rad");
   require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
 }
 
@@ -225,9 +226,9 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
 
   Rigid3 pose = cam_from_world_initial;
   std::vector<uint8_t> used = problem.in_front(pose);
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < kPoseRounds; ++round) {
     problem.use(used);
-    estimate.iterations += descend(problem, options, round < options.robust_rounds, pose);
+    estimate.iterations += descend(problem, round < kRobustRounds, pose);
     estimate.inlier = problem.inliers(pose);
     // Within the limit, which is the kernel's corner, the kernel is least squares: the same observations would give
     // the same pose again, with the kernel or without.

@@ -19,9 +19,13 @@ double variance_by_median(std::span<double> squares);
 // such matches take a pose along that little else holds. Their weights are those of Student's t with four degrees of
 // freedom (Lange, Little and Taylor, JASA 1989), in a pose about a scale that its own observations tell.
 inline constexpr double kStudentFreedom = 4;
+inline double student_weight(double squared_error, double times = 1) {
+  return times * (kStudentFreedom + 2) / (kStudentFreedom + squared_error);
+}
 // Of the squares of errors in the plane by Student's t with four degrees of freedom, nine of ten are below so many
 // times that variance: twice the quantile of F(2, 4).
 inline constexpr double kStudent90 = 8.65;
+inline constexpr double kDepthInFront = 0.01;  // [m] points nearer than this along the optical axis are outliers
 
 // One match of a known point with a feature of the image whose pose is sought.
 struct PoseObservation {
@@ -34,15 +38,9 @@ struct PoseObservation {
 };
 
 struct PoseOptions {
-  int rounds = 4;                       // classifications of inliers, each followed by an optimisation, >= 1
-  int iterations = 10;                  // Levenberg-Marquardt steps of one round, >= 1
-  int robust_rounds = 2;                // first rounds that use the Huber kernel, >= 0
   int tail_rounds = 3;                  // of weights by how well an observation fits, and a step, >= 0
   double chi2_pixel = kChi2TwoDof95;    // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
   double chi2_depth = kChi2ThreeDof95;  // the same with depth (3 d.o.f.), > 0
-  double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
-  double translation_tolerance = 1e-4;  // [m] a step below both tolerances ends a round, >= 0
-  double rotation_tolerance = 1e-4;     // [rad] >= 0
   int min_inliers = 6;                  // fewer at the end: not ok, >= 3
 
   void check() const;  // throws InvalidOption

@@ -28,9 +28,6 @@ constexpr double kMoves = 1.1;
 double cost_of(double squared_error) {
   return std::min((kStudentFreedom + 2) * std::log1p(squared_error / kStudentFreedom), kWrong);
 }
-double weight_of(double squared_error) {
-  return (kStudentFreedom + 2) / (kStudentFreedom + squared_error);
-}
 
 // Half the second derivative and half the derivative of a sum of squares about a perturbation of zero.
 struct Normal {
@@ -102,7 +99,7 @@ std::vector<Labels> near_and_far(const std::vector<Match>& matches) {
   std::array<Normal, kQuarters> quarter;
   for (const Match& m : matches) {
     const auto q = static_cast<size_t>(std::upper_bound(limit.begin(), limit.end(), m.depth) - limit.begin());
-    quarter[q].add(weight_of(m.error.squaredNorm()), m.normal());
+    quarter[q].add(student_weight(m.error.squaredNorm()), m.normal());
   }
   double saved = 0;
   for (size_t k = 0; k < limit.size(); ++k) {
@@ -149,7 +146,7 @@ class MotionProblem {
     for (int step = 0; step < steps; ++step) {
       Normal sum = any_motion();
       for (size_t i = 0; i < matches_.size(); ++i)
-        if (part.label[i] == part.of) sum.add(weight_of(matches_[i].squared_error(motion)), normal_[i]);
+        if (part.label[i] == part.of) sum.add(student_weight(matches_[i].squared_error(motion)), normal_[i]);
       motion = sum.solve();
     }
     return motion;

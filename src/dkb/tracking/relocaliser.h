@@ -18,7 +18,7 @@ constexpr int kMinRelocalisationInliers = 40;  // map points that the pose of a 
 struct PoseProposal {
   PlaceFit fit;
   std::vector<Candidate> around;  // the map there, of which `fit` tells what was seen
-  // Of those that find() and propose() give:
+  // Of those that find() gives:
   std::vector<PointLook> looks;  // of well-known map points that should be in view, and are not hidden or gone
   double log_odds = 0;           // of all that was seen there, against a place that only looks like it
   bool ambiguous = false;        // another place in the map explains the view nearly as well
@@ -41,9 +41,6 @@ class Relocaliser {
   // earlier ones showed counts.
   std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
                                    PointAppearance* appearance, PlaceEvidence& evidence) const;
-  // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
-  std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
-                                    PointAppearance* appearance) const;
   // The pose that this one keyframe leads to, verified or not.
   std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
                                            const IgnoresPoint& ignores) const;
@@ -55,6 +52,9 @@ class Relocaliser {
                                          const IgnoresPoint& ignores) const;
 
  private:
+  // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
+  std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                    PointAppearance* appearance) const;
   std::optional<PoseProposal> fit_around(const Map& map, const std::vector<PointId>& points,
                                          const MatchableFeatures& features, const IgnoresPoint& ignores,
                                          const Rigid3& expected_cam_from_world, std::span<const float> radii) const;

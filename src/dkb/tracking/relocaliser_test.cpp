@@ -101,11 +101,7 @@ TEST_F(RelocaliserTest, TwoPlacesThatExplainAFrameEquallyWellAreAmbiguous) {
   ASSERT_TRUE(alone);
   EXPECT_FALSE(alone->ambiguous);
   map_scene(scene, TestScene::camera_at({20, 0, 0}));
-  const RgbdFeatures features = *scene.look({}).features;
-  const auto proposals = relocaliser().propose(map, features, ignores_none, nullptr);
-  ASSERT_EQ(proposals.size(), 2U);
-  EXPECT_TRUE(proposals[0].verified && proposals[1].verified);
-  const auto found = find(features);
+  const auto found = find(*scene.look({}).features);
   ASSERT_TRUE(found);
   EXPECT_TRUE(found->ambiguous) << "a guess is no pose";
 }

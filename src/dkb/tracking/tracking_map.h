@@ -21,7 +21,6 @@ class TrackingMap {
   // A keyframe that mapping was just told of; without a reference `cam_from_reference` is its cam_from_world.
   void add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference);
 
-  bool has(KeyframeId id) const { return view_->keyframe(id) != nullptr || pending(id) != nullptr; }
   // Pose of a keyframe. Throws std::logic_error for one that was never made.
   Rigid3 cam_from_world(KeyframeId id) const;
   // Of the map where this keyframe is: left perturbation of world_from_cam, [translation m, rotation rad]. For one that

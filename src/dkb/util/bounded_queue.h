@@ -47,11 +47,11 @@ class BoundedQueue {
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     not_empty_.wait(lock, [&] { return closed_ || !items_.empty(); });
-    return take();
-  }
-  std::optional<T> try_pop() {
-    std::unique_lock lock(mutex_);
-    return take();
+    if (items_.empty()) return std::nullopt;
+    std::optional<T> value(std::move(items_.front()));
+    items_.pop_front();
+    not_full_.notify_one();
+    return value;
   }
   void close() {
     std::unique_lock lock(mutex_);
@@ -65,14 +65,6 @@ class BoundedQueue {
   }
 
  private:
-  std::optional<T> take() {
-    if (items_.empty()) return std::nullopt;
-    std::optional<T> value(std::move(items_.front()));
-    items_.pop_front();
-    not_full_.notify_one();
-    return value;
-  }
-
   const size_t capacity_;
   mutable std::mutex mutex_;
   std::condition_variable not_full_, not_empty_;

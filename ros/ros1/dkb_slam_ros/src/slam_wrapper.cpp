@@ -161,9 +161,6 @@ void SlamWrapper::serve(ros::NodeHandle& nh, const std::string& name, Request re
 
 void SlamWrapper::log(dkb_ros::LogLevel level, const std::string& text) {
   switch (level) {
-    case dkb_ros::LogLevel::debug:
-      ROS_DEBUG_STREAM_NAMED(name_, text);
-      break;
     case dkb_ros::LogLevel::info:
       ROS_INFO_STREAM(text);
       break;

@@ -152,9 +152,6 @@ void SlamComponent::serve(const std::string& name, Request request) {
 
 void SlamComponent::log(dkb_ros::LogLevel level, const std::string& text) {
   switch (level) {
-    case dkb_ros::LogLevel::debug:
-      RCLCPP_DEBUG_STREAM(get_logger(), text);
-      break;
     case dkb_ros::LogLevel::info:
       RCLCPP_INFO_STREAM(get_logger(), text);
       break;
