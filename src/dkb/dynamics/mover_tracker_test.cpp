@@ -173,7 +173,7 @@ TEST(MoverTracker, ABoxWithoutDepthGoesOnWithWhomItIsLeftOf) {
   EXPECT_EQ(movers[0].id, 1);
   EXPECT_NEAR(movers[0].position_in_world.z(), 2, 1e-6);
   // Of each coordinate: their variances make up the position's.
-  EXPECT_NEAR(3 * movers[0].position_sd * movers[0].position_sd, movers[0].covariance.topLeftCorner<3, 3>().trace(),
+  EXPECT_NEAR(3 * movers[0].position_sd * movers[0].position_sd, movers[0].covariance.diagonal().head<3>().sum(),
               1e-12);
   MoverTestScene elsewhere;
   elsewhere.boxes.push_back({"person", {250, 190, 20, 17}, 1});
