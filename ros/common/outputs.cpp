@@ -85,13 +85,15 @@ CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points) {
 }
 
 std::vector<PathOutput::Pose> path_of(const std::vector<dkb::TrajectoryFrame>& trajectory, const Rigid3& cam_from_base,
-                                      double step) {
+                                      double step, int placed) {
   constexpr double kTurn = 10 * M_PI / 180;
   std::vector<PathOutput::Pose> path;
-  for (size_t i = 0; i < trajectory.size(); ++i) {
-    if (trajectory[i].map != trajectory.back().map) continue;
+  size_t end = trajectory.size();
+  while (placed > 0 && end > 0 && trajectory[end - 1].map >= placed) --end;
+  for (size_t i = 0; i < end; ++i) {
+    if (trajectory[i].map != trajectory[end - 1].map) continue;
     const PathOutput::Pose pose{trajectory[i].stamp_ns, trajectory[i].world_from_cam * cam_from_base};
-    const bool last = i + 1 == trajectory.size();
+    const bool last = i + 1 == end;
     if (path.empty() || last || (pose.pose.translation - path.back().pose.translation).norm() >= step ||
         pose.pose.rotation.angularDistance(path.back().pose.rotation) >= kTurn)
       path.push_back(pose);

@@ -21,9 +21,10 @@ MoversOutput movers_of(const dkb::FrameResult& result);
 CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points);
 
 // The trajectory, thinned to poses of the base at least `step` metres or 10 degrees apart; the last one stays. Only
-// frames of the newest map, since maps that are not joined have worlds of their own.
+// frames of the newest map, since maps that are not joined have worlds of their own; of the first `placed` ones where
+// the others lie nobody knows where (0 = of all).
 std::vector<PathOutput::Pose> path_of(const std::vector<dkb::TrajectoryFrame>& trajectory, const Rigid3& cam_from_base,
-                                      double step);
+                                      double step, int placed = 0);
 
 // The library's grid, whose axes are those of the floor, in the map's axes: what shows it ignores a grid's turn.
 GridOutput grid_in_map(const dkb::OccupancyGrid& grid);

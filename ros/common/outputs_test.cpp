@@ -44,6 +44,7 @@ TEST(Path, IsThinnedAndEndsWhereTheRobotIs) {
   std::vector<dkb::TrajectoryFrame> trajectory;
   for (int i = 0; i <= 100; ++i)
     trajectory.push_back({i, i, Rigid3(Eigen::Quaterniond::Identity(), {0.01 * i, 0, 0}), i < 10 ? 0 : 1});
+  EXPECT_EQ(path_of(trajectory, Rigid3(), 0.2, 1).back().stamp_ns, 9) << "the map that was loaded";
   const auto path = path_of(trajectory, Rigid3(), 0.2);
   ASSERT_EQ(path.size(), 6u);  // 0.1, 0.3, 0.5, 0.7, 0.9 and the last, 1.0
   EXPECT_EQ(path.front().stamp_ns, 10);

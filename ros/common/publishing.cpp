@@ -35,10 +35,10 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     recent_.overhead_ms.add(out_ms - result.tracking_ms - result.waiting_ms);
   }
   publish_transforms(result);
-  const bool placed = in_map_frame(result) || !result.tracked();
-  if (placed && (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array))) {
+  if (middleware_.wanted(Topic::movers) || middleware_.wanted(Topic::movers_array)) {
     MoversOutput movers = movers_of(result);
     movers.frame_id = parameters_.map_frame;
+    if (!in_map_frame(result)) movers.movers.clear();
     middleware_.publish(movers);
   }
   if (middleware_.wanted(Topic::features_image)) {
@@ -76,7 +76,7 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
 
 // A map that was loaded is what others plan in: one begun beside it lies nobody knows where.
 bool SlamCore::in_map_frame(const dkb::FrameResult& result) const {
-  return result.tracked() && (result.map == 0 || loaded_map_.empty());
+  return result.tracked() && (loaded_maps_ == 0 || result.map < loaded_maps_);
 }
 
 void SlamCore::publish_transforms(const dkb::FrameResult& result) {

@@ -61,9 +61,9 @@ void SlamCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
     middleware_.publish(cloud);
   }
   if (middleware_.wanted(Topic::path))
-    middleware_.publish(
-        PathOutput{stamp_ns, parameters_.map_frame,
-                   path_of(slam.trajectory(), slam.options().base_from_cam.inverse(), parameters_.path_step)});
+    middleware_.publish(PathOutput{
+        stamp_ns, parameters_.map_frame,
+        path_of(slam.trajectory(), slam.options().base_from_cam.inverse(), parameters_.path_step, loaded_maps_)});
 }
 
 // The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.
@@ -138,7 +138,10 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
   if (slam != nullptr && !hindrance_.empty()) say(Level::warning, hindrance_);
   if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
-  if (maps > 1) say(Level::warning, std::to_string(maps) + " maps that are not joined: poses are in the newest");
+  if (maps > std::max(1, loaded_maps_.load()))
+    say(Level::warning, std::to_string(maps) + " maps that are not joined: " +
+                            (loaded_maps_ > 0 ? "there is no pose in the newest until it is joined to what was loaded"
+                                              : "poses are in the newest"));
   if (d.message.empty()) d.message = dkb::name_of(state_);
   const auto add = [&](const std::string& key, const std::string& value) { d.values.emplace_back(key, value); };
   const auto count = [&](const std::string& key, int64_t value) { add(key, std::to_string(value)); };

@@ -139,6 +139,7 @@ void SlamCore::load_map(const std::string& path, Done done) {
       [this, path](dkb::Slam& slam) {
         slam.load_map(path);
         loaded_map_ = path;
+        loaded_maps_ = slam.statistics().maps;
         begin_anew();
         return Answer{true, "going on in " + path};
       },
@@ -150,6 +151,7 @@ void SlamCore::reset(Done done) {
       [this](dkb::Slam& slam) {
         slam.reset();
         loaded_map_.clear();
+        loaded_maps_ = 0;
         begin_anew();
         return Answer{true, "a new world begins"};
       },
@@ -306,8 +308,11 @@ bool SlamCore::start(const ImagePair& pair) {
 std::shared_ptr<dkb::Slam> SlamCore::make_slam(const dkb::Camera& camera, const dkb::Options& options) {
   auto slam = std::make_shared<dkb::Slam>(camera, options, dkb::make_detectors(parameters_.detector, camera));
   slam->localize_only(parameters_.localize_only);
-  if (!parameters_.load_map.empty()) slam->load_map(parameters_.load_map);
   loaded_map_ = parameters_.load_map;
+  if (!loaded_map_.empty()) {
+    slam->load_map(loaded_map_);
+    loaded_maps_ = slam->statistics().maps;
+  }
   return slam;
 }
 
@@ -397,7 +402,10 @@ void SlamCore::begin_after_jump() {
       complain(LogLevel::error, error.what());
     }
   }
-  if (slam_ && !loaded) slam_->reset();
+  if (slam_ && !loaded) {
+    slam_->reset();
+    loaded_maps_ = 0;
+  }
   complain(LogLevel::warning, jumped + (loaded ? "begins again in " + loaded_map_ : "a new world begins"));
   forget_motion();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <dkb_slam/viewer.h>
+#include <atomic>
 
 #include <algorithm>
 #include <chrono>
@@ -123,7 +124,8 @@ class SlamCore final : public RosCore {
   std::deque<std::pair<int64_t, Rigid3>> unplaced_;  // map_from_base at times that the robot's odometry has not reached
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
   std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
-  std::string loaded_map_;                           // file that this world began in; empty = it began anew
+  std::string loaded_map_;                           // file to begin in again; empty = begin anew
+  std::atomic<int> loaded_maps_ = 0;                 // of the file that this world began in; 0 = it began anew
   std::string failed_start_;                         // why there is no system and will be none
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;

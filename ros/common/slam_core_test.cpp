@@ -295,6 +295,45 @@ TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
   std::filesystem::remove(file);
 }
 
+TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {
+  const std::string file = testing::TempDir() + "dkb_ros_beside_test.dkb";
+  {
+    const auto core = start();
+    core->camera_info(info_of(source_camera()));
+    feed_all(*core, 0, 10);
+    EXPECT_TRUE(answer_of([&](auto done) { core->save_map(file, done); }).success);
+  }
+  {
+    const std::lock_guard lock(out.mutex);
+    out.odometry.clear(), out.poses.clear(), out.transforms.clear(), out.movers.clear();
+  }
+  const auto core = start({{"load_map", file}, {"tracking.new_map_after", 0.1}});
+  core->camera_info(info_of(source_camera()));
+  for (size_t i = 0; i < 12; ++i) {  // what the camera sees in a mirror is another place
+    ImageMessage colour = message_of(frames()[i], false), depth = message_of(frames()[i], true);
+    for (ImageMessage* image : {&colour, &depth}) {
+      const int bytes = image->step / image->width;
+      const auto mirrored = std::make_shared<std::vector<uint8_t>>(image->size);
+      for (int p = 0; p < image->width * image->height; ++p) {
+        const int x = p % image->width;
+        std::copy_n(image->data + static_cast<ptrdiff_t>(p) * bytes, bytes,
+                    mirrored->data() + static_cast<ptrdiff_t>(p - x + image->width - 1 - x) * bytes);
+      }
+      image->data = mirrored->data();
+      image->owner = mirrored;
+    }
+    core->colour(std::move(colour));
+    core->depth(std::move(depth));
+    ASSERT_TRUE(out.wait([&] { return out.movers.size() == i + 1; }));
+  }
+  const std::lock_guard lock(out.mutex);
+  EXPECT_GT(out.odometry.size(), 4U) << "where it moves is known";
+  EXPECT_TRUE(out.poses.empty()) << "where it is, is not";
+  for (const auto& sent : out.transforms)
+    for (const TransformOutput& t : sent) EXPECT_EQ(t.parent, "odom");
+  std::filesystem::remove(file);
+}
+
 TEST_F(SlamCoreTest, LocalizeOnlySaysWhyThereIsNoGrid) {
   const auto core = start({{"localize_only", true}, {"grid_period", 0.05}});
   ASSERT_TRUE(out.wait([&] { return !out.logged.empty(); }));

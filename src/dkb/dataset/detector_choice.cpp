@@ -69,6 +69,9 @@ DetectorChoice choice_beside(const Options& options, const std::string& disabled
   if (asked_for) choice.masks.clear();
   choice.kinds = "none";
   choice.boxes.clear();
+  choice.model.clear();
+  choice.labels.clear();
+  choice.classes.clear();
   return choice;
 }
 
@@ -78,7 +81,7 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   const std::filesystem::path model = model_of(choice);
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model.empty());
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
-  if (!kinds.empty() && !has("yolo")) check_no_network(choice);
+  if (!has("yolo")) check_no_network(choice);
   if (has("yolo")) {
     if (model.empty())
       throw InputError(

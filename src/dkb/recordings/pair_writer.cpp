@@ -221,7 +221,8 @@ class RecordingPairWriter final : public PairWriter {
   void salvage() override { writer_->salvage(); }
 
  private:
-  // Depth that was taken after its colour image: whether the next one comes between them decides on its stamp.
+  // Depth that was taken after its colour image: whether the next one comes between them decides on its stamp. It is
+  // lost where the writer ends by a full disk.
   struct LateDepth {
     DepthImage depth;
     int64_t colour_ns = 0, depth_ns = 0;

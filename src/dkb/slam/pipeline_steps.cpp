@@ -340,7 +340,7 @@ void Pipeline::push_start(const TrackedFrame* next) {
 void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked) {
   const KeyframeId id = next_keyframe_++;
   if (!may_make_keyframes())
-    note(Event::Kind::warning, "the map is full, " + std::to_string(id) +
+    note(Event::Kind::warning, "the map is full, " + std::to_string(next_keyframe_) +
                                    " keyframes were made: tracking goes on in it; save it, and begin a new one");
   last_keyframe_ = {id, tracked.index, scene.extracted.frame.stamp_ns()};
   KeyframePacket packet = tracker_.make_keyframe(id, tracked);

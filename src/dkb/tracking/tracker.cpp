@@ -139,7 +139,7 @@ double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, co
   return (at - k.pixel.cast<double>()).squaredNorm() / (optics_.corner_variance(k) + square(pair.parallax_sigma));
 }
 
-// Visual-odometry points weigh little in a pose, and the limits of an inlier widen with their sigmas: a shoe that goes
+// Visual-odometry points weigh little in a pose, and may be off by as much more: a shoe that goes
 // 3 px a frame was within them. What has moved is told by what these points leave in this frame instead; it starts anew
 // where it is now. Returns the limit, for squared errors over their variance.
 double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, const PoseEstimate& pose,
