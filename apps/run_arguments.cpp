@@ -15,13 +15,9 @@ void check_detector(const DetectorChoice& choice) {
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model_of(choice).empty());
   const bool yolo = std::find(kinds.begin(), kinds.end(), "yolo") != kinds.end();
   const bool slow = yolo || (!kinds.empty() && kinds.back().starts_with("exec:"));
-  const auto refuse = [&](const char* option, const char* reader) {
-    throw InputError(std::string(option) + ": --detector " + choice.kinds + " has no " + reader +
-                     "; leave it out, or add a detector that has one");
-  };
   if (!yolo) check_no_network(choice);
-  if (choice.every > 0 && !slow) refuse("--detect-every", "network or command");
-  if (choice.latency > 0 && !slow) refuse("--detect-latency", "network or command");
+  if (choice.every > 0 && !slow) refuse_option(choice, "--detect-every", "network or command");
+  if (choice.latency > 0 && !slow) refuse_option(choice, "--detect-latency", "network or command");
 }
 
 void check_arguments(const RunArguments& args, const Options& options) {

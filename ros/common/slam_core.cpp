@@ -137,9 +137,7 @@ void SlamCore::save_map(const std::string& path, Done done) {
 void SlamCore::load_map(const std::string& path, Done done) {
   request(
       [this, path](dkb::Slam& slam) {
-        slam.load_map(path);
-        loaded_map_ = path;
-        loaded_maps_ = slam.statistics().maps;
+        begin_in(slam, path);
         begin_anew();
         return Answer{true, "going on in " + path};
       },
@@ -308,11 +306,7 @@ bool SlamCore::start(const ImagePair& pair) {
 std::shared_ptr<dkb::Slam> SlamCore::make_slam(const dkb::Camera& camera, const dkb::Options& options) {
   auto slam = std::make_shared<dkb::Slam>(camera, options, dkb::make_detectors(parameters_.detector, camera));
   slam->localize_only(parameters_.localize_only);
-  loaded_map_ = parameters_.load_map;
-  if (!loaded_map_.empty()) {
-    slam->load_map(loaded_map_);
-    loaded_maps_ = slam->statistics().maps;
-  }
+  if (!parameters_.load_map.empty()) begin_in(*slam, parameters_.load_map);
   return slam;
 }
 
@@ -382,6 +376,13 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
 }
 
 // After a service: the images that follow may have any stamps.
+// Throws what the library throws, and changes nothing then.
+void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
+  slam.load_map(map);
+  loaded_map_ = map;
+  loaded_maps_ = slam.statistics().maps;
+}
+
 void SlamCore::begin_anew() {
   forget_motion();
   const std::lock_guard lock(input_mutex_);
@@ -396,7 +397,7 @@ void SlamCore::begin_after_jump() {
   bool loaded = false;
   if (slam_ && !loaded_map_.empty()) {
     try {
-      slam_->load_map(loaded_map_);
+      begin_in(*slam_, loaded_map_);
       loaded = true;
     } catch (const std::exception& error) {
       complain(LogLevel::error, error.what());

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <dkb_slam/viewer.h>
-#include <atomic>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -89,6 +89,7 @@ class SlamCore final : public RosCore {
   bool in_map_frame(const dkb::FrameResult& result) const;
   void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
+  void begin_in(dkb::Slam& slam, const std::string& map);
   void begin_anew();
   void begin_after_jump();
   void forget_motion();

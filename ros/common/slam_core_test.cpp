@@ -104,6 +104,11 @@ ImageMessage message_of(const dkb::Frame& frame, bool depth) {
   return m;
 }
 
+void show_instead(const std::shared_ptr<std::vector<uint8_t>>& pixels, ImageMessage* image) {
+  image->data = pixels->data();
+  image->owner = pixels;
+}
+
 CameraInfoMessage info_of(const dkb::Camera& c) {
   CameraInfoMessage info;
   info.width = c.width;
@@ -319,8 +324,7 @@ TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {
         std::copy_n(image->data + static_cast<ptrdiff_t>(p) * bytes, bytes,
                     mirrored->data() + static_cast<ptrdiff_t>(p - x + image->width - 1 - x) * bytes);
       }
-      image->data = mirrored->data();
-      image->owner = mirrored;
+      show_instead(mirrored, image);
     }
     core->colour(std::move(colour));
     core->depth(std::move(depth));
@@ -461,11 +465,7 @@ TEST_F(SlamCoreTest, MotionsOfPausedFramesCountOnce) {
   EXPECT_TRUE(answer_of([&](auto done) { core->pause(false, done); }).success);
   drive_to(10, 0.14);
   ImageMessage colour = message_of(frames()[10], false), depth = message_of(frames()[10], true);
-  for (ImageMessage* dark : {&colour, &depth}) {
-    const auto nothing = std::make_shared<std::vector<uint8_t>>(dark->size);
-    dark->data = nothing->data();
-    dark->owner = nothing;
-  }
+  for (ImageMessage* dark : {&colour, &depth}) show_instead(std::make_shared<std::vector<uint8_t>>(dark->size), dark);
   core->colour(std::move(colour));
   core->depth(std::move(depth));
   ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 5; }));

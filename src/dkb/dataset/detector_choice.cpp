@@ -53,14 +53,15 @@ std::filesystem::path model_of(const DetectorChoice& choice) {
   return choice.model.empty() && model != nullptr ? model : choice.model;
 }
 
+void refuse_option(const DetectorChoice& choice, const std::string& option, const std::string& reader) {
+  throw InputError(option + ": --detector " + choice.kinds + " has no " + reader +
+                   "; leave it out, or add a detector that has one");
+}
+
 void check_no_network(const DetectorChoice& choice) {
-  const auto refuse = [&](const char* option) {
-    throw InputError(std::string(option) + ": --detector " + choice.kinds +
-                     " has no network; leave it out, or add a detector that has one");
-  };
-  if (!choice.model.empty()) refuse("--model");
-  if (!choice.labels.empty()) refuse("--labels");
-  if (!choice.classes.empty()) refuse("--classes");
+  if (!choice.model.empty()) refuse_option(choice, "--model", "network");
+  if (!choice.labels.empty()) refuse_option(choice, "--labels", "network");
+  if (!choice.classes.empty()) refuse_option(choice, "--classes", "network");
 }
 
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {

@@ -17,6 +17,9 @@ std::vector<std::string> detector_kinds(const std::string& kinds, bool has_model
 // The model that is named, else that of $DKB_SLAM_MODEL; may be empty.
 std::filesystem::path model_of(const DetectorChoice& choice);
 
+// Throws InputError: nothing of the choice reads this option.
+[[noreturn]] void refuse_option(const DetectorChoice& choice, const std::string& option, const std::string& reader);
+
 // Throws InputError where a choice without a network names what only networks have.
 void check_no_network(const DetectorChoice& choice);
 

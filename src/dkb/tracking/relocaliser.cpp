@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dkb/tracking/local_map.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -124,9 +125,7 @@ std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, const std::v
     if (proposal.fit.sightings[i] == Sighting::found)
       depths.push_back((proposal.fit.cam_from_world * proposal.around[i].position).z());
   if (proposal.fit.inliers < kMinRelocalisationInliers || depths.empty()) return proposal;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  const double limit = std::max(kMaxPositionSd, kMaxSdInView * *middle / optics_.camera.fx);
+  const double limit = std::max(kMaxPositionSd, kMaxSdInView * upper_median(depths) / optics_.camera.fx);
   proposal.verified = std::sqrt(proposal.fit.covariance.topLeftCorner<3, 3>().trace()) <= limit;
   return proposal;
 }

@@ -139,9 +139,9 @@ double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, co
   return (at - k.pixel.cast<double>()).squaredNorm() / (optics_.corner_variance(k) + square(pair.parallax_sigma));
 }
 
-// Visual-odometry points weigh little in a pose, and may be off by as much more: a shoe that goes
-// 3 px a frame was within them. What has moved is told by what these points leave in this frame instead; it starts anew
-// where it is now. Returns the limit, for squared errors over their variance.
+// Visual-odometry points weigh little in a pose, and may be off by as much more: a shoe that goes 3 px a frame was
+// within that. What has moved is told by what these points leave in this frame instead; it starts anew where it is now.
+// Returns the limit, for squared errors over their variance.
 double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, const PoseEstimate& pose,
                               const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const {
   std::vector<double> squares(pairs.size()), of_inliers;
