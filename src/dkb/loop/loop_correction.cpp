@@ -34,12 +34,6 @@ PoseEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
   return e;
 }
 
-int shared_points(const Keyframe& k, KeyframeId other) {
-  for (const Covisible& c : k.covisible)
-    if (c.keyframe == other) return c.shared_points;
-  return 0;
-}
-
 void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root,
                         MapCorrection& correction) {
   BaProblem graph;
@@ -67,7 +61,7 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
     if (previous >= 0)
       graph.motions.push_back(
           {node[static_cast<size_t>(id)], previous, relative(id, k.motion->previous), k.motion->information()});
-    const int shared = k.parent != kNoKeyframe ? shared_points(k, k.parent) : 0;
+    const int shared = points_shared_with(k.parent, k.covisible);
     // Parents are older but where two maps were joined: without the edge to a younger one the graph may fall apart.
     if (k.parent != kNoKeyframe && (shared > 0 || previous < 0 || k.parent > id))
       add(k.parent, id, relative(k.parent, id), shared);

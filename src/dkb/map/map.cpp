@@ -3,17 +3,15 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "dkb/util/radix_sort.h"
 
 namespace dkb {
 namespace {
 
-void add_covisible(std::vector<Covisible>& list, Covisible entry) {
-  const auto better = [](const Covisible& a, const Covisible& b) {
-    return a.shared_points != b.shared_points ? a.shared_points > b.shared_points : a.keyframe < b.keyframe;
-  };
-  list.insert(std::upper_bound(list.begin(), list.end(), entry, better), entry);
+bool shares_more(const Covisible& a, const Covisible& b) {
+  return a.shared_points != b.shared_points ? a.shared_points > b.shared_points : a.keyframe < b.keyframe;
 }
 
 void drop_covisible(std::vector<Covisible>& list, KeyframeId id) {
@@ -107,6 +105,18 @@ std::vector<PointId> Map::live_points() const {
       if (place >= 0) ids.push_back(block.value->live[static_cast<size_t>(place)].id);
   }
   return ids;
+}
+
+std::vector<Covisible> Map::observers_of(const std::vector<PointId>& points) const {
+  std::vector<int> shared(keyframes_.size(), 0);
+  std::vector<Covisible> observers;
+  for (PointId id : points)
+    if (const MapPoint* p = point(id))
+      for (const Observation& o : p->observations)
+        if (shared[static_cast<size_t>(o.keyframe)]++ == 0) observers.push_back({o.keyframe, 0});
+  for (Covisible& o : observers) o.shared_points = shared[static_cast<size_t>(o.keyframe)];
+  std::sort(observers.begin(), observers.end(), shares_more);
+  return observers;
 }
 
 std::vector<PointId> Map::points_of(const std::vector<KeyframeId>& keyframes) const {
@@ -260,39 +270,19 @@ void Map::fuse(PointId from, PointId into) {
 void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   const Keyframe* self = live_keyframe(id);
   if (self == nullptr) return;
-  std::vector<KeyframeId> observers;
-  for (PointId p : self->points)
-    if (const MapPoint* seen = point(p))
-      for (const Observation& o : seen->observations)
-        if (o.keyframe != id) observers.push_back(o.keyframe);
-  std::sort(observers.begin(), observers.end());
-  std::vector<Covisible> found;
-  Covisible best;
-  for (size_t i = 0; i < observers.size();) {
-    size_t j = i;
-    while (j < observers.size() && observers[j] == observers[i]) ++j;
-    const Covisible c{observers[i], static_cast<int>(j - i)};
-    if (c.shared_points > best.shared_points) best = c;
-    if (c.shared_points >= min_shared_points) found.push_back(c);
-    i = j;
-  }
-  if (found.empty() && best.keyframe != kNoKeyframe) found.push_back(best);
-  const std::vector<Covisible> before = self->covisible;
-  Keyframe& me = edit(id);
-  me.covisible.clear();
-  for (const Covisible& c : found) add_covisible(me.covisible, c);
-  const auto weight_in = [](const std::vector<Covisible>& list, KeyframeId other) {
-    for (const Covisible& c : list)
-      if (c.keyframe == other) return c.shared_points;
-    return 0;
-  };
+  std::vector<Covisible> found = observers_of(self->points);
+  drop_covisible(found, id);
+  // The best one stays, however little they share.
+  while (found.size() > 1 && found.back().shared_points < min_shared_points) found.pop_back();
+  const std::vector<Covisible> before = std::exchange(edit(id).covisible, found);
   for (const Covisible& c : before)
-    if (weight_in(found, c.keyframe) == 0) drop_covisible(edit(c.keyframe).covisible, id);
+    if (points_shared_with(c.keyframe, found) == 0) drop_covisible(edit(c.keyframe).covisible, id);
   for (const Covisible& c : found) {
-    if (weight_in(keyframe(c.keyframe)->covisible, id) == c.shared_points) continue;
+    if (points_shared_with(id, keyframe(c.keyframe)->covisible) == c.shared_points) continue;
     auto& list = edit(c.keyframe).covisible;
     drop_covisible(list, id);
-    add_covisible(list, {id, c.shared_points});
+    const Covisible mine{id, c.shared_points};
+    list.insert(std::upper_bound(list.begin(), list.end(), mine, shares_more), mine);
   }
 }
 

@@ -43,6 +43,13 @@ struct Covisible {
   int shared_points = 0;
 };
 
+// 0 where `id` is not among them.
+inline int points_shared_with(KeyframeId id, const std::vector<Covisible>& covisible) {
+  for (const Covisible& c : covisible)
+    if (c.keyframe == id) return c.shared_points;
+  return 0;
+}
+
 struct Keyframe {
   KeyframeId id = kNoKeyframe;
   FrameIndex frame = 0;
@@ -110,6 +117,9 @@ class Map {
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
+  // The keyframes that see these points, by decreasing number of them, then increasing id. Points that are unknown are
+  // seen by none.
+  std::vector<Covisible> observers_of(const std::vector<PointId>& points) const;
   // The points that these keyframes show, which must exist: increasing, each once.
   std::vector<PointId> points_of(const std::vector<KeyframeId>& keyframes) const;
   // The live keyframes that look most like `descriptors`, best first; see PlaceIndex.

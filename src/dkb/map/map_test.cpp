@@ -177,6 +177,29 @@ TEST(Map, ThePointsOfKeyframesAreGivenOnceEachInOrder) {
   EXPECT_TRUE(world.map.points_of({}).empty());
 }
 
+TEST(Map, TheKeyframesThatSeePointsAreGivenByTheirNumberTheOlderFirstInATie) {
+  const ThreeKeyframes world;
+  const auto observers = [&](const std::vector<PointId>& points) {
+    std::vector<std::pair<KeyframeId, int>> found;
+    for (const Covisible& c : world.map.observers_of(points)) found.emplace_back(c.keyframe, c.shared_points);
+    return found;
+  };
+  using Found = std::vector<std::pair<KeyframeId, int>>;
+  EXPECT_EQ(observers({world.d, world.a, world.b}), (Found{{0, 3}, {1, 2}, {2, 1}}));
+  EXPECT_EQ(observers({world.c, kNoPoint, world.b}), (Found{{0, 2}, {1, 2}}));
+  EXPECT_EQ(observers({kNoPoint, make_point_id(7, 3), make_point_id(0, 9)}), Found{});
+  EXPECT_EQ(observers({}), Found{});
+}
+
+TEST(Map, TheOneThatSeesMostPointsComesFirstThoughItIsNewer) {
+  ThreeKeyframes world;
+  const PointId e = born(world.map, 2, 4), f = born(world.map, 2, 5);
+  const auto first = [&](const std::vector<PointId>& points) { return world.map.observers_of(points)[0].keyframe; };
+  EXPECT_EQ(first({world.d, e, f}), 2);
+  EXPECT_EQ(first({world.d, e}), 0);
+  EXPECT_EQ(first({e, kNoPoint, f, world.d}), 2);
+}
+
 TEST(Map, CovisibilityCountsSharedPointsAndIsMirrored) {
   ThreeKeyframes world;
   world.map.update_covisibility(1, 1);

@@ -49,25 +49,16 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics&
   std::sort(keyframes.begin(), keyframes.end());
 
   std::vector<PointId> points = map.points_of(keyframes);
-  std::vector<Covisible> around;  // keyframes outside the window, by how many of its points they see
-  {
-    std::vector<int> count(static_cast<size_t>(map.keyframe_count()), 0);
-    for (PointId p : points)
-      for (const Observation& o : map.point(p)->observations) ++count[static_cast<size_t>(o.keyframe)];
-    for (KeyframeId k : keyframes) count[static_cast<size_t>(k)] = 0;
-    for (size_t k = 0; k < count.size(); ++k)
-      if (count[k] > 0) around.push_back({static_cast<KeyframeId>(k), count[k]});
-    std::stable_sort(around.begin(), around.end(),
-                     [](const Covisible& a, const Covisible& b) { return a.shared_points > b.shared_points; });
-    if (static_cast<int>(around.size()) > options.fixed_keyframes)
-      around.resize(static_cast<size_t>(options.fixed_keyframes));
-  }
+  const auto in_window = [&](KeyframeId k) { return std::binary_search(keyframes.begin(), keyframes.end(), k); };
+  std::vector<Covisible> around = map.observers_of(points);  // outside the window
+  std::erase_if(around, [&](const Covisible& c) { return in_window(c.keyframe); });
+  around.resize(std::min(around.size(), static_cast<size_t>(options.fixed_keyframes)));
 
   // A keyframe that a motion joins to the window holds it too, though they may share no point.
   for (KeyframeId k : keyframes) {
     const auto& motion = map.keyframe(k)->motion;
     for (const KeyframeId other : {motion ? motion->previous : kNoKeyframe, map.moved_on_from(k)})
-      if (map.live_keyframe(other) != nullptr && !std::binary_search(keyframes.begin(), keyframes.end(), other) &&
+      if (map.live_keyframe(other) != nullptr && !in_window(other) &&
           std::none_of(around.begin(), around.end(), [other](const Covisible& c) { return c.keyframe == other; }))
         around.push_back({other, 0});
   }

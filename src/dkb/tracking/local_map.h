@@ -14,9 +14,6 @@ struct LocalMapOptions {
   int keyframes = 60;          // at most so many in all, >= 1
 };
 
-// Keyframe that shares most of `points`, the older one in a tie; kNoKeyframe when none is in the map.
-KeyframeId keyframe_sharing_most(const std::vector<PointId>& points, const Map& map);
-
 // The candidates around a frame that shows `points`: all points of the keyframes that see them and of their neighbours,
 // by increasing id.
 std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map,

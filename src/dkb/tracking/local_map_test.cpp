@@ -62,18 +62,10 @@ std::vector<PointId> operator+(std::vector<PointId> x, const std::vector<PointId
   return x;
 }
 
-TEST(LocalMap, TheReferenceIsTheKeyframeThatSharesMostAndTheOlderInATie) {
-  const Chain w;
-  EXPECT_EQ(keyframe_sharing_most({w.a[0], w.a[1], w.b[0]}, w.map), 0);
-  EXPECT_EQ(keyframe_sharing_most({w.a[0], w.b[0], w.b[1]}, w.map), 1);
-  EXPECT_EQ(keyframe_sharing_most({w.c[0], w.a[0]}, w.map), 0);
-  EXPECT_EQ(keyframe_sharing_most({w.c[0], kNoPoint, w.c[1], w.a[0]}, w.map), 2);
-}
-
 TEST(LocalMap, PointsThatAreNotInTheMapVoteForNobody) {
   const Chain w;
-  EXPECT_EQ(keyframe_sharing_most({kNoPoint, make_point_id(7, 3), make_point_id(0, 9)}, w.map), kNoKeyframe);
-  EXPECT_EQ(keyframe_sharing_most({}, w.map), kNoKeyframe);
+  EXPECT_TRUE(local_map_candidates({kNoPoint, make_point_id(7, 3), make_point_id(0, 9)}, w.map, {}).empty());
+  EXPECT_TRUE(local_map_candidates({}, w.map, {}).empty());
   EXPECT_TRUE(local_map_candidates({kNoPoint}, w.map, {}).empty());
 }
 

@@ -287,7 +287,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
 }
 
 void Tracker::finish(TrackedFrame& frame) {
-  KeyframeId reference = keyframe_sharing_most(frame.points, map_.view());
+  const std::vector<Covisible> observers = map_.view().observers_of(frame.points);
+  KeyframeId reference = observers.empty() ? kNoKeyframe : observers.front().keyframe;
   // A keyframe that is still being mapped is the reference while most matches are its provisional points.
   std::map<KeyframeId, int> pending_votes;
   int lasting = 0;
