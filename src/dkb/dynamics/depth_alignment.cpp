@@ -155,8 +155,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
   const auto position_variance = static_cast<float>(expected.covariance.topLeftCorner<3, 3>().trace() / 3);
   const auto rotation_variance = static_cast<float>(expected.covariance.bottomRightCorner<3, 3>().trace() / 3);
   // Steps are taken in the axes of `there`, on the left of the pose.
-  const Matrix6d to_there = adjoint(expected.previous_from_current);
-  Matrix6d covariance = to_there * expected.covariance * to_there.transpose();
+  Matrix6d covariance = carried(expected.previous_from_current, expected.covariance);
   covariance.diagonal().array() += kExact * kExact;
   const Matrix6d prior = inverse(covariance);
   const Rigid3 here_from_there_expected = expected.previous_from_current.inverse();
@@ -219,8 +218,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
     pose = rigid3_from_tangent(step) * pose;
     if (settled) break;
   }
-  const Matrix6d to_here = adjoint(pose.inverse());
-  return MotionPrior{pose, false, to_here * inverse(information) * to_here.transpose()};
+  return MotionPrior{pose, false, carried(pose.inverse(), inverse(information))};
 }
 
 }  // namespace dkb

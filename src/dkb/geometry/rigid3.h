@@ -52,6 +52,12 @@ inline Matrix6d adjoint(const Rigid3& a_from_b) {
   return m;
 }
 
+// The covariance of a right perturbation in frame b as that of one in frame a.
+inline Matrix6d carried(const Rigid3& a_from_b, const Matrix6d& covariance) {
+  const Matrix6d carry = adjoint(a_from_b);
+  return carry * covariance * carry.transpose();
+}
+
 // Camera centre in the world of a `cam_from_world`.
 inline Eigen::Vector3d centre_in_world(const Rigid3& cam_from_world) {
   return -(cam_from_world.rotation.conjugate() * cam_from_world.translation);

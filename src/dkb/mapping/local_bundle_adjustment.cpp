@@ -33,11 +33,6 @@ Matrix6d common_error(const Map& map, const BaWindow& window, const BaResult& re
   return sum / std::max(all, 1);
 }
 
-Matrix6d carried_to(const Rigid3& cam_from_world, const Matrix6d& in_world) {
-  const Matrix6d to_camera = adjoint(cam_from_world);
-  return to_camera * in_world * to_camera.transpose();
-}
-
 }  // namespace
 
 LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
@@ -85,9 +80,8 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics&
   for (size_t c = 0; c < window.keyframes.size(); ++c)
     if (!problem.fixed[c]) map.set_pose(window.keyframes[c], problem.cam_from_world[c]);
   if (result.covariance)
-    map.set_covariance(newest,
-                       *result.covariance + carried_to(problem.cam_from_world[static_cast<size_t>(problem.asked)],
-                                                       common_error(map, window, result)));
+    map.set_covariance(newest, *result.covariance + carried(problem.cam_from_world[static_cast<size_t>(problem.asked)],
+                                                            common_error(map, window, result)));
   for (size_t p = 0; p < window.points.size(); ++p) map.edit_point(window.points[p]).position = problem.points[p];
   for (size_t o = 0; o < window.sources.size(); ++o)
     if (result.outlier[o])

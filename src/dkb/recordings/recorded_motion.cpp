@@ -159,11 +159,7 @@ std::optional<MotionPrior> RecordedMotion::by_rates(int64_t from_ns, int64_t to_
 MotionPrior RecordedMotion::in_camera_axes(const Rigid3& motion, const Matrix6d& covariance) const {
   const Rigid3 cam_from_body = body_from_cam_.inverse();
   // A small motion on the right of the body's, as one on the right of the camera's.
-  const Matrix6d carry = adjoint(cam_from_body);
-  MotionPrior prior;
-  prior.previous_from_current = cam_from_body * motion * body_from_cam_;
-  prior.covariance = carry * covariance * carry.transpose();
-  return prior;
+  return {cam_from_body * motion * body_from_cam_, false, carried(cam_from_body, covariance)};
 }
 
 }  // namespace dkb

@@ -39,8 +39,7 @@ Matrix6d TrackingMap::covariance(KeyframeId id) const {
     id = pending_or_throw(id).reference;
     if (id == kNoKeyframe) return Matrix6d::Zero();
   }
-  const Matrix6d to_world = adjoint(view_->cam_from_world(id).inverse());
-  return to_world * view_->keyframe(id)->covariance * to_world.transpose();
+  return carried(view_->cam_from_world(id).inverse(), view_->keyframe(id)->covariance);
 }
 
 KeyframeId TrackingMap::root(KeyframeId id) const {
