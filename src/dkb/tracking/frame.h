@@ -67,6 +67,12 @@ struct TrackedFrame {
   int inliers = 0;                             // among `points`
 
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
+  // None of its features shows anything.
+  void show_nothing() {
+    points.assign(features->size(), kNoPoint);
+    outlier.assign(features->size(), 0);
+    odometry.assign(features->size(), std::nullopt);
+  }
   MatchableFeatures matchable() const { return {*features, motion}; }
 };
 

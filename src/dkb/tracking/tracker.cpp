@@ -218,10 +218,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
     c.descriptor = p.descriptor;
     candidates.push_back(c);
   }
-  ProjectionMatchOptions match;
-  match.radius = static_cast<float>(radius);
-  match.max_distance = kMatchDistance;
-  match.ratio = kMatchRatio;
+  const ProjectionMatchOptions match{
+      .radius = static_cast<float>(radius), .max_distance = kMatchDistance, .ratio = kMatchRatio};
   std::vector<uint8_t> visible(candidates.size(), 0);
   const auto matches = match_by_projection(candidates, frame.matchable(), optics_, initial, match, &taken, &visible);
   for (const auto& m : matches)
@@ -256,9 +254,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   visibility_.add_visible(std::move(in_view));
   visibility_.add_visible(std::move(matched));
   frame.matched = points;
-  frame.points.assign(points.size(), kNoPoint);
-  frame.outlier.assign(points.size(), 0);
-  frame.odometry.assign(points.size(), std::nullopt);
+  frame.show_nothing();
   for (size_t i = 0; i < pairs.size(); ++i) {
     const auto f = static_cast<size_t>(pairs[i].feature);
     if (!pose.inlier[i]) {
@@ -387,11 +383,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.timestamp = input.timestamp;
   frame.features = input.features.at(velocity());
   frame.motion = input.features.motion;
-  const size_t n = frame.features->size();
-  frame.motion.resize(n, FeatureMotion::still);
-  frame.points.assign(n, kNoPoint);
-  frame.outlier.assign(n, 0);
-  frame.odometry.assign(n, std::nullopt);
+  frame.motion.resize(frame.features->size(), FeatureMotion::still);
+  frame.show_nothing();
 
   const bool has_map = state_ != TrackingState::initialising;
   const auto predicted = frame.predicted = predict(input);
@@ -409,9 +402,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
       finish(frame);
       unconfirmed_ = frame;
       // The pose is not this frame's yet, and neither is what it explains.
-      frame.points.assign(frame.points.size(), kNoPoint);
-      frame.outlier.assign(frame.outlier.size(), 0);
-      frame.odometry.assign(frame.odometry.size(), std::nullopt);
+      frame.show_nothing();
       odometry_.clear();         // they belong to the last frame, which the sighting will replace
       candidates_made_.reset();  // and these to the sighting
       go_on_unseen(predicted, input.step, frame);
