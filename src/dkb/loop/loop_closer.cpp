@@ -15,13 +15,8 @@ std::optional<MapCorrection> LoopCloser::process(const Map& snapshot, KeyframeId
   if (id < rests_until_) return std::nullopt;
   const auto finding = find_loop(snapshot, id, optics_, options_, seed_);
   if (!finding) return std::nullopt;
-  MapCorrection correction = correct_loop(snapshot, *finding, edges_);
-  if (!finding->merge) {
-    const auto added = loop_edges(snapshot, *finding);
-    edges_.insert(edges_.end(), added.begin(), added.end());
-  }
   rests_until_ = id + 1 + kRestKeyframes;
-  return correction;
+  return correct_loop(snapshot, *finding, &edges_);
 }
 
 }  // namespace dkb

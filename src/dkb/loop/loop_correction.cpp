@@ -91,7 +91,7 @@ std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
   return edges;
 }
 
-MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std::vector<LoopEdge>& edges) {
+MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vector<LoopEdge>* edges) {
   MapCorrection correction;
   correction.kind = finding.merge ? MapCorrection::Kind::merge : MapCorrection::Kind::loop;
   correction.far_side = finding.far_area;
@@ -105,10 +105,9 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, const std
   }
   const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
   if (!finding.merge) {
-    std::vector<LoopEdge> all = edges;
     const auto added = loop_edges(map, finding);
-    all.insert(all.end(), added.begin(), added.end());
-    move_by_pose_graph(map, all, map.root(near), correction);
+    edges->insert(edges->end(), added.begin(), added.end());
+    move_by_pose_graph(map, *edges, map.root(near), correction);
     return correction;
   }
   Rigid3 moved_from_world = finding.support.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;

@@ -125,7 +125,7 @@ TEST(LoopCorrection, EdgesOutliveTheirKeyframes) {
   nothing_new.support[0].fit.cam_from_world = world.map.keyframe(newest)->cam_from_world;
   nothing_new.support[0].fit.inliers = 100;
   Map moved = world.map;
-  move_map(moved, correct_loop(world.map, nothing_new, edges));
+  move_map(moved, correct_loop(world.map, nothing_new, &edges));
   EXPECT_LT(world.error(moved, newest), 0.3 * world.error(world.map, newest));
 }
 
@@ -180,8 +180,8 @@ TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst)
   finding.support.emplace_back().keyframe = 9;
   finding.support.back().fit.cam_from_world = found;
   // As firm as a place seen again by 400 points.
-  const LoopEdge firm{0, 9, found * map.keyframe(0)->cam_from_world.inverse(), 400};
-  const MapCorrection correction = correct_loop(map, finding, {firm});
+  std::vector<LoopEdge> firm = {{0, 9, found * map.keyframe(0)->cam_from_world.inverse(), 400}};
+  const MapCorrection correction = correct_loop(map, finding, &firm);
   ASSERT_EQ(correction.poses.size(), 10U);
   const auto moved = [&](size_t k) -> Eigen::Vector3d {
     return centre_in_world(correction.poses[k].after) - centre_in_world(correction.poses[k].before);
