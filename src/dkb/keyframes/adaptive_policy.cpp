@@ -11,6 +11,9 @@ namespace dkb {
 namespace {
 
 constexpr int kFewTracked = 50;  // [points] fewer tracked ones call for a keyframe
+// [keyframes] whose points may be a point's neighbours: those that share most. In a place long seen hundreds share
+// some.
+constexpr size_t kKeyframesAround = 30;
 
 // Median depth [m] of the features that show a map point; 0 when none has a depth.
 double median_depth(const KeyframeContext& q) {
@@ -54,7 +57,8 @@ bool AdaptiveKeyframePolicy::level_changed(const KeyframePoint& p, const Eigen::
 // for.
 void AdaptiveKeyframePolicy::study_keyframe(KeyframeId id, const Map& map) {
   std::vector<KeyframeId> around = {id};
-  for (const Covisible& c : map.keyframe(id)->covisible) around.push_back(c.keyframe);
+  for (const Covisible& c : map.keyframe(id)->covisible)
+    if (around.size() <= kKeyframesAround) around.push_back(c.keyframe);
   const std::vector<PointId> points = map.points_of({id}), cloud = map.points_of(around);
   const auto normals = surface_normals(map, points, cloud, options_.normals);
 
