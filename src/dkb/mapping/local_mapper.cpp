@@ -87,11 +87,9 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
     fuse_pair(one, other);
     ++report_.points_fused;
   }
-  std::vector<KeyframeId> near, far;
-  for (KeyframeId k : correction.near_side)
-    if (map_.live_keyframe(k) != nullptr) near.push_back(k);
-  for (KeyframeId k : correction.far_side)
-    if (map_.live_keyframe(k) != nullptr) far.push_back(k);
+  std::vector<KeyframeId> near = correction.near_side, far = correction.far_side;
+  for (auto* side : {&near, &far})
+    std::erase_if(*side, [this](KeyframeId k) { return map_.live_keyframe(k) == nullptr; });
   for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), kSeamTolerance);
   for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), kSeamTolerance);
   near.insert(near.end(), far.begin(), far.end());
@@ -197,10 +195,8 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
     if (!seen) candidates.push_back(candidate_of(*p));
   }
   const Keyframe& k = *map_.keyframe(keyframe);
-  ProjectionMatchOptions match;
-  match.radius = static_cast<float>(tolerance * kFusionRadius);
-  match.max_distance = 50;
-  match.ratio = 1.0f;
+  const ProjectionMatchOptions match{
+      .radius = static_cast<float>(tolerance * kFusionRadius), .max_distance = 50, .ratio = 1.0f};
   const auto matches = match_by_projection(candidates, *k.features, optics_, k.cam_from_world, match, nullptr, nullptr);
   int fused = 0;
   const auto features = k.features;
