@@ -17,26 +17,21 @@ void TrackingMap::add_pending(KeyframeId id, KeyframeId reference, const Rigid3&
   pending_.push_back({id, reference, cam_from_reference});
 }
 
-const TrackingMap::Pending* TrackingMap::pending(KeyframeId id) const {
+const TrackingMap::Pending& TrackingMap::pending(KeyframeId id) const {
   const auto at = std::find_if(pending_.begin(), pending_.end(), [id](const Pending& p) { return p.id == id; });
-  return at == pending_.end() ? nullptr : &*at;
-}
-
-const TrackingMap::Pending& TrackingMap::pending_or_throw(KeyframeId id) const {
-  const Pending* found = pending(id);
-  if (found == nullptr) throw std::logic_error("there is no keyframe " + std::to_string(id));
-  return *found;
+  if (at == pending_.end()) throw std::logic_error("there is no keyframe " + std::to_string(id));
+  return *at;
 }
 
 Rigid3 TrackingMap::cam_from_world(KeyframeId id) const {
   if (view_->keyframe(id) != nullptr) return view_->cam_from_world(id);
-  const Pending& p = pending_or_throw(id);
+  const Pending& p = pending(id);
   return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * cam_from_world(p.reference);
 }
 
 Matrix6d TrackingMap::covariance(KeyframeId id) const {
   while (view_->keyframe(id) == nullptr) {
-    id = pending_or_throw(id).reference;
+    id = pending(id).reference;
     if (id == kNoKeyframe) return Matrix6d::Zero();
   }
   return carried(view_->cam_from_world(id).inverse(), view_->keyframe(id)->covariance);
@@ -44,7 +39,7 @@ Matrix6d TrackingMap::covariance(KeyframeId id) const {
 
 KeyframeId TrackingMap::root(KeyframeId id) const {
   while (view_->keyframe(id) == nullptr) {
-    const Pending& p = pending_or_throw(id);
+    const Pending& p = pending(id);
     if (p.reference == kNoKeyframe) return id;
     id = p.reference;
   }

@@ -34,8 +34,7 @@ class TrackingMap {
     KeyframeId id = kNoKeyframe, reference = kNoKeyframe;
     Rigid3 cam_from_reference;
   };
-  const Pending* pending(KeyframeId id) const;
-  const Pending& pending_or_throw(KeyframeId id) const;
+  const Pending& pending(KeyframeId id) const;
 
   MapView view_;
   std::vector<Pending> pending_;  // by id
