@@ -227,8 +227,7 @@ void LocalMapper::fuse_neighbours(KeyframeId id) {
   for (const Covisible& c : map_.keyframe(id)->covisible)
     if (static_cast<int>(neighbours.size()) < kFusionKeyframes) neighbours.push_back(c.keyframe);
   for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, map_.points_of({id}));
-  const std::vector<PointId> all = map_.points_of(neighbours);
-  report_.points_fused += fuse_into(id, all);
+  report_.points_fused += fuse_into(id, map_.points_of(neighbours));
   refresh(map_.points_of({id}));
 }
 
