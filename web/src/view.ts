@@ -66,6 +66,7 @@ export class View {
   private staleEdges = false;
   private cameraPose: THREE.Matrix4 | null = null;
   private measured: THREE.Vector3[] = [];
+  private whole: { at: THREE.Vector3; radius: number } | null = null; // the map, once the run has ended
   private dirty = true;
   private lastDrawn = 0;
   private movedAt = 0;
@@ -303,6 +304,10 @@ export class View {
     this.dirty = true;
     this.onMode();
   }
+  // The run has ended: there is nobody to follow any more, so the whole map comes into view.
+  end(): void {
+    this.whole ??= this.cloud.middle();
+  }
   // Shows where the camera was at a frame.
   jumpTo(frame: number): void {
     let best: (typeof this.pathFrames)[number] | null = null;
@@ -434,6 +439,10 @@ export class View {
     if (this.mode !== "follow" || !this.cameraPose) return;
     const at = new THREE.Vector3(0, 0, 1.0).applyMatrix4(this.cameraPose);
     const behind = new THREE.Vector3(0, -0.8, -1.6).applyMatrix4(this.cameraPose);
+    if (this.whole) {
+      behind.sub(at).setLength(2 * Math.max(0.5, this.whole.radius)).add(this.whole.at);
+      at.copy(this.whole.at);
+    }
     const share = this.still.matches ? 1 : 0.12;
     if (behind.distanceTo(this.camera.position) + at.distanceTo(this.controls.target) < 1e-3) return;
     this.camera.position.lerp(behind, share);
