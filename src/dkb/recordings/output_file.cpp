@@ -5,10 +5,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <system_error>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/files.h"
 
 namespace dkb {
 
@@ -29,7 +29,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::fail(const char* what) const {
-  throw OutputError(path_.string() + ": cannot be written (" + what + ": " + std::strerror(errno) + ")");
+  fail_to_write(path_, what, errno);
 }
 
 void OutputFile::write_at(uint64_t at, std::string_view bytes) {
