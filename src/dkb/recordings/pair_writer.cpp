@@ -144,7 +144,7 @@ class FolderPairWriter final : public PairWriter {
   void put_in_place() {
     std::error_code error;
     fs::rename(temporary_.path(), path_, error);  // also over an empty folder
-    if (error) fail_to_write(path_, "rename", error.value());
+    if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
     temporary_.keep();
   }
 
