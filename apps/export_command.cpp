@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dkb/dataset/trajectory_formats.h"
+#include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb_slam/source.h"
@@ -45,7 +46,7 @@ void run_export(const ExportArguments& arguments) {
     tell(stdout, "{}: {} poses\n", arguments.out, poses);
     return;
   }
-  const Trajectory trajectory = read_trajectory(fs::is_directory(results) ? results / "trajectory.txt" : results);
+  const Trajectory trajectory = read_poses(fs::is_directory(results) ? results / "trajectory.txt" : results);
   write_file_atomically(out, arguments.format == "tum"     ? trajectory_to_text(trajectory)
                              : arguments.format == "kitti" ? trajectory_to_kitti(trajectory)
                                                            : trajectory_to_euroc(trajectory));

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "dkb/dataset/detector_choice.h"
 #include "dkb/map/map_file.h"
 #include "dkb/map/point_cloud.h"
 #include "dkb/slam/map_merge.h"
@@ -117,7 +119,7 @@ void check_arguments(const MapExportArguments& arguments) {
   const bool model = arguments.format == "colmap" || arguments.format == "nerfstudio";
   if (!model && !arguments.images.empty())
     throw InputError("--images: --format " + arguments.format + " holds no pictures; leave it out");
-  if (!arguments.images.empty()) return check_detector(arguments.detection);
+  if (!arguments.images.empty()) return check_detector(arguments.detection, !model_of(arguments.detection).empty());
   if (const std::string option = source_option_given(arguments.reading); !option.empty())
     throw InputError(option + ": is that of --images; add them, or leave it out");
   const DetectorChoice& d = arguments.detection;
@@ -149,6 +151,10 @@ struct MergeArguments {
 };
 
 void merge(const MergeArguments& arguments) {
+  // Found out before the work.
+  const std::filesystem::path out = arguments.out;
+  if (std::filesystem::is_directory(out)) fail_to_write(out, "open", EISDIR);
+  if (out.has_parent_path() && !std::filesystem::is_directory(out.parent_path())) fail_to_write(out, "open", ENOENT);
   const MapFile first = load_map(arguments.first), second = load_map(arguments.second);
   const MapFileContext &a = first.context, &b = second.context;
   if (!same_optics(a.camera, b.camera))

@@ -15,6 +15,7 @@
 #include "dkb/util/log.h"
 #include "interrupt.h"
 #include "live_report.h"
+#include "number_check.h"
 #include "source_options.h"
 #include "terminal.h"
 
@@ -120,7 +121,7 @@ void register_record(CLI::App& app, int& exit_code) {
       ->required();
   command->add_option("--out", args->out, "New folder in TUM layout, FILE.mcap or FILE.bag")->required();
   add_source_options(*command, args->reading);
-  command->add_option("--max-frames", args->reading.max_frames, "Frames at most");
+  command->add_option("--max-frames", args->reading.max_frames, "Frames at most")->transform(whole_number<int64_t>());
   command->add_flag("--quiet", args->quiet, "No progress; warnings and errors are still shown");
   command->callback([args, &exit_code] { exit_code = record(*args); });
 }

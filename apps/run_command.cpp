@@ -27,7 +27,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
       ->allow_extra_args(false);
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
   command->add_option("--seed", args->seed, "Seed of every source of randomness")
-      ->check(not_negative())
+      ->transform(whole_number<uint64_t>())
       ->each(given(&RunArguments::has_seed));
   DetectorChoice& detection = args->detection;
   command->add_option("--detector", detection.kinds,
@@ -39,22 +39,24 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_option("--inference", detection.inference,
                       "What computes it: auto (ONNX Runtime where it is found, else OpenCV), onnxruntime, opencv");
   command->add_option("--detect-every", detection.every, "[frames] between detections (default: by the model's size)")
-      ->check(CLI::Range(1, 10000));
+      ->transform(whole_number(1, 10000));
   command
       ->add_option("--detect-latency", detection.latency,
                    "[frames] until a detection is used (default: by the model's size)")
-      ->check(CLI::Range(1, 10000));
+      ->transform(whole_number(1, 10000));
   command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
-  command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else");
+  command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else")
+      ->transform(whole_number<int64_t>());
   command->add_option("--start", reading.start, "[s] after the first pair");
   command->add_option("--end", reading.end, "[s] after the first pair");
-  command->add_option("--max-frames", reading.max_frames, "Pairs at most, counted from --start");
+  command->add_option("--max-frames", reading.max_frames, "Pairs at most, counted from --start")
+      ->transform(whole_number<int64_t>());
   command
       ->add_option("--threads", args->threads, "1 = everything on one thread, else one for each part (the same bytes)")
-      ->check(CLI::Range(0, 1024));
+      ->transform(whole_number(0, 1024));
   command->add_option("--load-map", args->load_map, "map.dkb to go on in; poses are in its world");
   command->add_option("--odom-topic", reading.odom_topic, "Of a recording with several topics of odometry");
   command->add_option("--imu-topic", reading.imu_topic, "Likewise of an inertial unit");

@@ -42,8 +42,17 @@ void write_by_map(const std::filesystem::path& folder, const std::string& name, 
   };
   for (size_t map = 0; map < by_map.size(); ++map)
     if (map == 0 || !by_map[map].empty()) write_trajectory(file(map), by_map[map]);
-  for (size_t map = 1; map < by_map.size() || std::filesystem::exists(file(map)); ++map)
-    if (map >= by_map.size() || by_map[map].empty()) std::filesystem::remove(file(map));
+  std::set<std::filesystem::path> stale;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string there = entry.path().filename().string();
+    const std::string start = name + "_map", end = ".txt";
+    if (there.starts_with(start) && there.ends_with(end) &&
+        there.find_first_not_of("0123456789", start.size()) == there.size() - end.size())
+      stale.insert(there);
+  }
+  for (size_t map = 1; map < by_map.size(); ++map)
+    if (!by_map[map].empty()) stale.erase(file(map).filename());
+  for (const auto& there : stale) std::filesystem::remove(folder / there);
 }
 
 std::string stats_json(const Statistics& s, const RunFacts& facts) {

@@ -42,13 +42,19 @@ std::string source_name(const fs::path& source) {
   return (fs::is_regular_file(source) ? name.stem() : name).string();
 }
 
+// A new folder: of runs that start in one second each has its own.
 fs::path default_output(const fs::path& source) {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
   localtime_r(&now, &parts);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
-  return fs::path("dkb-out") / (source_name(source) + "-" + stamp);
+  const fs::path all = "dkb-out";
+  make_output_folder(all);
+  const std::string name = source_name(source) + "-" + stamp;
+  std::string own = name;
+  for (int i = 2; !fs::create_directory(all / own); ++i) own = fmt::format("{}-{}", name, i);
+  return all / own;
 }
 
 void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
@@ -205,7 +211,10 @@ std::shared_ptr<const FileDetector> boxes_of(const RunArguments& args, const Det
 
 RunSession::RunSession(const RunArguments& args)
     : args_(args),
-      warnings_([](const std::string& line) { tell(stderr, "{}\n", line); }),
+      warnings_([this](const std::string& line) {
+        if (progress_) progress_->finish();
+        tell(stderr, "{}\n", line);
+      }),
       options_(checked(args)),
       recording_(open_source(args, args.threads != 1 || args.realtime)),
       opened_(*recording_),
@@ -258,6 +267,8 @@ int RunSession::run() {
   // Asked once: Ctrl-C while the results of a whole run are written does not make it one that was cut short.
   if (Interrupt::happened()) interrupted_ = fmt::format("interrupted after {} frames; ", facts_.offered);
   attempt([&] { slam_->finish(); });
+  for (const Event& event : take_events())
+    if (viewer_) viewer_->say(fmt::format("{}: {}", name_of(event.kind), event.text));
   const double seconds = wall.ms() / 1000;
   progress_->finish();
   source_->stop();
@@ -298,18 +309,24 @@ void RunSession::track() {
   }
 }
 
-// A frame's result to all who want to know of it.
-void RunSession::show(const SourceFrame& next, FrameResult result) {
-  for (const Mover& mover : result.movers)
-    facts_.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
-  log_->frame(next.frame, result);
+// What happened since the last call, told to the report; warnings also to the user.
+std::vector<Event> RunSession::take_events() {
   std::vector<Event> events = slam_->take_events();
   for (const Event& event : events) {
     log_->event(event);
     if (event.kind == Event::Kind::warning)  // of one kind when they begin alike
       warnings_.warn(event.text.substr(0, event.text.find(':')),
-                     "frame " + std::to_string(next.index) + ": " + event.text);
+                     fmt::format("frame {}: {}", facts_.offered - 1, event.text));
   }
+  return events;
+}
+
+// A frame's result to all who want to know of it.
+void RunSession::show(const SourceFrame& next, FrameResult result) {
+  for (const Mover& mover : result.movers)
+    facts_.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
+  log_->frame(next.frame, result);
+  std::vector<Event> events = take_events();
   if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
   if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
   progress_->frame(next.index + 1, &result);

@@ -52,7 +52,7 @@ struct RunArguments {
 // Refuses options that contradict each other. Throws InputError.
 void check_arguments(const RunArguments& args, const Options& options);
 // Throws InputError for an option that is for a detector which was not chosen.
-void check_detector(const DetectorChoice& choice);
+void check_detector(const DetectorChoice& choice, bool has_model);
 
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {
@@ -66,6 +66,7 @@ class RunSession {
 
  private:
   void track();
+  std::vector<Event> take_events();
   void show(const SourceFrame& next, FrameResult result);
   void write(double seconds);
   void write_dense(std::set<std::string>& written);

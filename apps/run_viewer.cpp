@@ -9,6 +9,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
 #include "interrupt.h"
+#include "number_check.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -43,7 +44,7 @@ std::vector<std::string> with_default_port(int argc, char** argv) {
 void add_viewer_options(CLI::App& command, ViewerArguments& args) {
   command
       .add_option("--viewer", args.port, "Live page in the browser at this port (8090 by default, 0 = any free one)")
-      ->check(CLI::Range(0, 65535))
+      ->transform(whole_number(0, 65535))
       ->each([&args](const std::string&) { args.on = true; });
   command.add_flag("--viewer-exit", args.exit, "End with the run instead of serving the page until Ctrl-C");
   command

@@ -35,6 +35,7 @@ class RunViewer {
   // the map when it is asked to. A run that is interrupted waits no longer.
   void wait_turn(const Slam& slam, const std::function<void(bool)>& hold);
   void show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events);
+  void say(const std::string& line) { viewer_->say(line); }
   std::vector<std::string> take_warnings() { return viewer_->take_warnings(); }
   // The run has ended: goes on serving until the interrupt, unless --viewer-exit.
   void serve_on(const Slam& slam, bool quiet);

@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "dkb/simulator/sequence_writer.h"
@@ -26,15 +27,25 @@ struct SimulateArguments {
 void run_simulate(const SimulateArguments& arguments) {
   const Simulator simulator(arguments.options);
   for (const std::string& note : simulator.notes()) std::fprintf(stderr, "warning: %s\n", note.c_str());
-  const bool live = isatty(STDERR_FILENO) != 0;
+  // Ends its line on a terminal also where an error is told after it.
+  struct Line {
+    const bool live = isatty(STDERR_FILENO) != 0;
+    bool open = false;
+    ~Line() {
+      if (open) std::fputs("\n", stderr);
+    }
+  };
+  std::optional<Line> line(std::in_place);
   const Interrupt interrupt([] {});
   NewFolder folder(arguments.out);
   write_sequence(simulator, arguments.out, [&](int written) {
     Interrupt::check();
-    if (live) std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
+    if (!line->live) return;
+    std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
+    line->open = true;
   });
   folder.keep();
-  if (live) std::fputs("\n", stderr);
+  line.reset();
   std::printf(
       "%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
       arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),
@@ -57,11 +68,13 @@ void register_simulate(CLI::App& app, int& exit_code) {
       ->add_option(
           "--frames", o.frames,
           "frames at --rate; 0: as many as the scene needs (at 30 Hz 300; loop, twins, corridor 900; building 6000)")
+      ->transform(whole_number<int>())
       ->capture_default_str();
   command->add_option("--rate", o.rate, "frames a second, 1 ... 60; the motion is the same in seconds")
       ->capture_default_str();
   command->add_option("--size", arguments->size, "WIDTHxHEIGHT of the images, 64x64 ... 4096x4096 (default: 640x480)")
       ->delimiter('x')
+      ->transform(whole_number<int>())
       ->expected(2);
   command->add_option("--dropouts", o.dropouts,
                       "share of the frames that is missing, 0 ... 0.9, singly and in bursts; never the first");
@@ -69,9 +82,9 @@ void register_simulate(CLI::App& app, int& exit_code) {
   command->add_option("--stand-still", o.stand_still,
                       "seconds that people stand from the start, half of them in view, before they walk off");
   command->add_option("--people", o.people, "people walking about, 0 ... 30 (default: the scene's own)")
-      ->check(CLI::Range(0, 30));
+      ->transform(whole_number(0, 30));
   command->add_option("--seed", o.seed, "of furniture, people, tremor and noise")
-      ->check(not_negative())
+      ->transform(whole_number<uint64_t>())
       ->capture_default_str();
   command->add_option("--blackout", arguments->blackout, "START,SECONDS: colour and depth are black from there on")
       ->delimiter(',')

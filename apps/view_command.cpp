@@ -16,6 +16,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/viewer/replay.h"
 #include "interrupt.h"
+#include "number_check.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -77,7 +78,7 @@ void register_view(CLI::App& app, int& exit_code) {
       ->required()
       ->expected(1, 2);
   command->add_option("--port", args->port, "Of the page (8090 by default, 0 = any free one)")
-      ->check(CLI::Range(0, 65535));
+      ->transform(whole_number(0, 65535));
   command->add_option("--viewer-host", args->host,
                       "Address to serve at; another than 127.0.0.1 lets other machines in, with the printed token");
   command->add_flag("--quiet", args->quiet, "Print nothing but the page's address and errors");

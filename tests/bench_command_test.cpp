@@ -98,6 +98,23 @@ TEST_F(Bench, ARunThatCrashesIsARowThatSaysSo) {
   EXPECT_NE(retry.out.find("1 runs done, 0 of them failed; 3 were there already"), std::string::npos) << retry.out;
 }
 
+TEST_F(Bench, IsAFailureWhereEveryRunFailed) {
+  write_text(temp_ / "failing", "#!/bin/sh\nexit 3\n");
+  fs::permissions(temp_ / "failing", fs::perms::owner_all);
+  const Finished run = bench({suite(suite_text()).string(), "--out", out(), "--program", out("failing")});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_TRUE(fs::exists(temp_.path() / "out" / "results.md"));
+}
+
+TEST_F(Bench, ASuitesDetectorIsNotThatOfTheEnvironment) {
+  const fs::path file =
+      suite("seeds: 1\nmax_frames: 4\nsequences:\n  short: {path: " + sequence().string() + "}\nvariants:\n  plain:\n");
+  const Finished run =
+      run_program({"bench", "--quiet", file.string(), "--out", out()}, -1, {"DKB_SLAM_MODEL=/nowhere/model.onnx"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("1 runs done, 0 of them failed"), std::string::npos) << run.out;
+}
+
 TEST_F(Bench, ARunThatHangsIsEnded) {
   const fs::path file = suite("timeout: 1\n" + suite_text());
   const Finished run =

@@ -249,5 +249,45 @@ TEST_F(Export, ResultsBecomeARecordingWithPosesCloudAndPictures) {
   EXPECT_EQ(counts["/path"], 1);
 }
 
+TEST_F(Export, AnEmptyTrajectoryIsRefused) {
+  write_text(folder / "empty.txt", "# nothing\n");
+  const Finished done =
+      run_program({"export", (folder / "empty.txt").string(), "--format", "tum", "--out", (folder / "tum").string()});
+  EXPECT_EQ(done.exit_code, 2);
+  EXPECT_NE(done.err.find("holds no pose"), std::string::npos) << done.err;
+  EXPECT_FALSE(fs::exists(folder / "tum"));
+}
+
+TEST_F(Export, PicturesAreThoseOfTheRunAlsoAfterItsLastPose) {
+  copy_sequence(folder / "other", 12, false);
+  std::string later;
+  for (const auto& row : rows_of(folder / "other/associations.txt"))
+    later += "16" + row[0].substr(2) + " " + row[1] + " 16" + row[2].substr(2) + " " + row[3] + "\n";
+  write_text(folder / "other/associations.txt", later);
+  const fs::path file = folder / "results.mcap";
+  const auto with_pictures = [&](const fs::path& source) {
+    return run_program({"export", run.out.string(), "--out", file.string(), "--images", source.string()});
+  };
+  const Finished foreign = with_pictures(folder / "other");
+  EXPECT_EQ(foreign.exit_code, 2);
+  EXPECT_NE(foreign.err.find("--images: no picture has the stamp of a pose"), std::string::npos) << foreign.err;
+  EXPECT_FALSE(fs::exists(file));
+
+  std::string first_ten;
+  for (const auto& row : rows_of(run.out / "trajectory.txt")) {
+    if (std::count(first_ten.begin(), first_ten.end(), '\n') == 10) break;
+    for (const std::string& word : row) first_ten += word + " ";
+    first_ten += "\n";
+  }
+  write_text(run.out / "trajectory.txt", first_ten);
+  const Finished done = with_pictures(sequence());
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const auto stream = open_messages(file);
+  int pictures = 0;
+  while (const auto message = stream->next())
+    pictures += stream->topics()[message->topic].name == "/features_image/compressed";
+  EXPECT_EQ(pictures, kSequenceFrames);
+}
+
 }  // namespace
 }  // namespace dkb::test

@@ -118,6 +118,28 @@ std::vector<Case> cases() {
       {"unknown preset", "papre", [](const fs::path&) {}, {"--preset", "papre"}},
       {"unknown detector", "yolos", [](const fs::path&) {}, {"--detector", "yolos"}},
       {"unknown inference", "onnxruntme", [](const fs::path&) {}, {"--inference", "onnxruntme"}},
+      {"inference without a network",
+       "--inference",
+       [](const fs::path&) {},
+       {"--detector", "motion", "--inference", "opencv"}},
+      {"final adjustment of a map that stays",
+       "--final-ba",
+       [](const fs::path&) {},
+       {"--localize", "--load-map", "@/map.dkb", "--final-ba"}},
+      {"topic beside a file of motions",
+       "--odom-topic",
+       [](const fs::path&) {},
+       {"--prior-file", "@/wheels.txt", "--odom-topic", "/odom"}},
+      {"topic of an inertial unit beside a file of motions",
+       "--imu-topic",
+       [](const fs::path&) {},
+       {"--prior-file", "@/wheels.txt", "--imu-topic", "/imu"}},
+      {"topic that nothing reads",
+       "--odom-topic",
+       [](const fs::path&) {},
+       {"--prior", "none", "--odom-topic", "/odom"}},
+      {"number too large", "--max-frames", [](const fs::path&) {}, {"--max-frames", "99999999999999999999"}},
+      {"number of another base", "--max-frames", [](const fs::path&) {}, {"--max-frames", "0x10"}},
       {"missing boxes file", "none.txt", [](const fs::path&) {}, {"--detector", "file", "--boxes", "@/none.txt"}},
       {"boxes that no detector reads",
        "--boxes",
@@ -291,6 +313,40 @@ TEST(RunBadInput, NegativeNumbersOfTheSimulatorAreRefused) {
     EXPECT_NE(run.err.find(option), std::string::npos) << run.err;
     EXPECT_FALSE(fs::exists(temp / "made"));
   }
+}
+
+TEST(RunBadInput, WholeNumbersAreDecimal) {
+  const TempFolder temp;
+  const auto simulate = [&](const std::string& frames) {
+    return run_program({"simulate", "--out", (temp / "made").string(), "--size", "64x64", "--frames", frames});
+  };
+  const Finished run = simulate("010");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(rows_of(temp.path() / "made" / "rgb.txt").size(), 10U);
+  const Finished refused = simulate("99999999999");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("--frames: \"99999999999\" is not a whole number of "), std::string::npos) << refused.err;
+}
+
+TEST(RunBadInput, AnOutputFileWithoutItsFolderIsRefusedWithTheRemedy) {
+  const TempFolder temp;
+  fs::create_directory(temp / "folder");
+  const std::string truth = (sequence() / "groundtruth.txt").string(), none = (temp / "none/a").string();
+  SlamRun run(sequence(), temp / "run", {"--max-frames", "12"});
+  const std::string map = (run.out / "map.dkb").string();
+  const std::vector<std::vector<std::string>> cases = {{"eval", truth, truth, "--json"},
+                                                       {"export", truth, "--format", "tum", "--out"},
+                                                       {"map", "merge", map, map, "--out"}};
+  for (const auto& c : cases)
+    for (const auto& [out, remedy] : {std::pair(none, "make the folder, or choose another"),
+                                      std::pair((temp / "folder").string(), "choose another place")}) {
+      std::vector<std::string> arguments = c;
+      arguments.push_back(out);
+      const Finished done = run_program(arguments);
+      EXPECT_EQ(done.exit_code, 2) << c[0];
+      EXPECT_EQ(done.error_lines(), 1U) << done.err;
+      EXPECT_NE(done.err.find(remedy), std::string::npos) << done.err;
+    }
 }
 
 }  // namespace

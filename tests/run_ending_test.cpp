@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -136,10 +137,15 @@ TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
   ASSERT_EQ(SlamRun(sequence(), out, all).finished.exit_code, 0);
   for (const char* name : {"dense.ply", "features.csv", "debug.log"}) ASSERT_TRUE(fs::exists(out / name)) << name;
   fs::copy_file(out / "map.dkb", temp / "map.dkb");
+  const std::vector<std::string> of_maps = {"trajectory_map3.txt", "trajectory_online_map12.txt", "keyframes_map4.txt"};
+  for (const std::string& name : of_maps) write_text(out / name, "earlier");
+  write_text(out / "trajectory_map_notes.txt", "mine");
   ASSERT_EQ(SlamRun(sequence(), out, short_run).finished.exit_code, 0);
   for (const char* name :
        {"dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs", "features.csv", "debug.log", "cv_orb.json"})
     EXPECT_FALSE(fs::exists(out / name)) << name;
+  for (const std::string& name : of_maps) EXPECT_FALSE(fs::exists(out / name)) << name;
+  EXPECT_TRUE(fs::exists(out / "trajectory_map_notes.txt"));
   EXPECT_TRUE(fs::exists(out / "map.dkb"));
   std::vector<std::string> localising = {"--max-frames", "12", "--localize", "--load-map", (out / "map.dkb").string()};
   ASSERT_EQ(SlamRun(sequence(), out, localising).finished.exit_code, 0);
@@ -148,6 +154,60 @@ TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
   ASSERT_EQ(SlamRun(sequence(), out, localising).finished.exit_code, 0);
   EXPECT_FALSE(fs::exists(out / "map.dkb"));
   EXPECT_FALSE(fs::exists(out / "map.ply"));
+}
+
+TEST(RunEnding, RunsThatStartTogetherHaveFoldersOfTheirOwn) {
+  const TempFolder temp;
+  const std::string run = "@ run " + sequence().string() + " --detector none --max-frames 3 --quiet";
+  ASSERT_EQ(shell("cd " + temp.path().string() + " && { " + run + " & " + run + " & " + run + "; wait; }"), 0);
+  size_t folders = 0;
+  for (const auto& entry : fs::directory_iterator(temp / "dkb-out")) {
+    ++folders;
+    EXPECT_TRUE(fs::exists(entry.path() / "report.html")) << entry.path();
+  }
+  EXPECT_EQ(folders, 3U);
+}
+
+// What the shell's line prints to standard error where that is a terminal.
+std::string told_to_a_terminal(const std::string& line) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) throw std::runtime_error("no terminals here");
+  const int held = open(ptsname(terminal), O_RDWR | O_NOCTTY);  // else what was told is lost with the program
+  shell(line + " 2>" + ptsname(terminal));
+  std::string told(1 << 16, '\0');
+  told.resize(static_cast<size_t>(std::max<ssize_t>(0, read(terminal, told.data(), told.size()))));
+  close(held);
+  close(terminal);
+  return told;
+}
+
+TEST(RunEnding, OnATerminalWarningsAndErrorsHaveLinesOfTheirOwn) {
+  const TempFolder temp;
+  copy_sequence(temp / "data", 12, true);
+  write_text(temp / "data" / rows_of(temp / "data/associations.txt")[6][1], "no image");
+  const std::string warned = told_to_a_terminal("@ run " + (temp / "data").string() + " --detector none --out " +
+                                                (temp / "out").string() + " >/dev/null");
+  EXPECT_NE(warned.find("frame 1/12"), std::string::npos) << warned;
+  EXPECT_NE(warned.find("\nwarning: frame 6"), std::string::npos) << warned;
+
+  fs::create_directories(temp / "made/associations.txt/full");
+  const std::string failed =
+      told_to_a_terminal("@ simulate --size 64x64 --frames 2 --out " + (temp / "made").string() + " >/dev/null");
+  EXPECT_NE(failed.find("frame 2 of 2"), std::string::npos) << failed;
+  EXPECT_NE(failed.find("\nerror: "), std::string::npos) << failed;
+}
+
+TEST(RunEnding, WhyTheUnitOfTimesIsNotMeasuredIsTold) {
+  const TempFolder temp;
+  fs::copy_file(DKB_SLAM_EXECUTABLE, temp / "alone");
+  const std::string told = (temp / "told").string();
+  EXPECT_EQ(shell((temp / "alone").string() + " run " + sequence().string() +
+                  " --detector none --max-frames 6 --cv-orb --quiet --out " + (temp / "out").string() + " 2>" + told),
+            0);
+  EXPECT_NE(read_text(told).find("warning: --cv-orb: not measured: this build has no libdkb_cv_orb.so ("),
+            std::string::npos)
+      << read_text(told);
+  EXPECT_NE(read_text(temp / "out/cv_orb.json").find("null"), std::string::npos);
 }
 
 TEST(RunEnding, APortThatIsTakenCostsNoEarlierRecording) {
@@ -170,12 +230,12 @@ TEST(RunEnding, APortThatIsTakenCostsNoEarlierRecording) {
   close(listener);
 }
 
-TEST(RunEnding, ASessionThatCannotBeWrittenIsAFailedRunAndNoBadInput) {
+TEST(RunEnding, AFolderInThePlaceOfTheSessionIsABadInput) {
   const TempFolder temp;
   fs::create_directories(temp / "out" / "session.dkbs");
   const Finished run =
       run_program({"run", sequence().string(), "--detector", "none", "--out", (temp / "out").string(), "--record"});
-  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_EQ(run.exit_code, 2) << run.err;
   EXPECT_EQ(run.error_lines(), 1U) << run.err;
 }
 
@@ -188,7 +248,7 @@ TEST(RunEnding, WarningsOfTheEndAreToldEvenWhenResultsCannotBeWritten) {
              std::to_string(first - 100) + " 0 0 0 0 0 0 1\n" + std::to_string(first + 100) + " 0 0 0 0 0 0 1\n");
   const Finished run = run_program({"run", sequence().string(), "--detector", "none", "--max-frames", "12", "--out",
                                     (temp / "out").string(), "--prior-file", (temp / "wheels.txt").string()});
-  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_EQ(run.exit_code, 2) << run.err;
   EXPECT_NE(run.err.find("tells of no frame's motion"), std::string::npos) << run.err;
 }
 

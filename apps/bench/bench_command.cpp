@@ -15,6 +15,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "interrupt.h"
+#include "number_check.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -108,14 +109,19 @@ int measure(const BenchArguments& args) {
     tell(stderr, "interrupted: start the same command again to go on\n");
     return 130;
   }
+  const auto failed = [&](const Job& job) {
+    const auto record = folder.record(job);
+    return !record || !record->ok();
+  };
+  const int exit_code = !jobs.empty() && std::all_of(jobs.begin(), jobs.end(), failed) ? 1 : 0;
   if (shard.count > 1) {
     tell(stdout, "shard {}/{} is complete; when all are: dkb-slam bench --merge {}\n", shard.index, shard.count,
          out.string());
-    return 0;
+    return exit_code;
   }
   write_report(out, make_report(folder, args.report));
   say_report(out);
-  return 0;
+  return exit_code;
 }
 
 int bench_main(BenchArguments& args) {
@@ -136,6 +142,7 @@ void register_bench(CLI::App& app, int& exit_code) {
   command->add_option("--out", args->out,
                       "Folder of the results; a bench that stopped goes on there (dkb-out/bench-NAME)");
   command->add_option("--jobs", args->runner.parallel, "Runs at a time; each keeps two threads busy")
+      ->transform(whole_number<int>())
       ->capture_default_str();
   command->add_option("--shard", args->shard, "I/N: only the I-th of N parts, without a report");
   CLI::Option* merging = command->add_option(
@@ -144,9 +151,9 @@ void register_bench(CLI::App& app, int& exit_code) {
   command->add_option("--sequence", args->sequences, "Only this sequence; may be repeated")->allow_extra_args(false);
   command->add_option("--variant", args->variants, "Only this variant; may be repeated")->allow_extra_args(false);
   command->add_option("--seeds", args->seeds, "Runs per sequence and variant, instead of the suite's")
-      ->check(CLI::Range(1, 1000));
+      ->transform(whole_number(1, 1000));
   command->add_option("--max-frames", args->max_frames, "Pairs per run at most, instead of the suite's")
-      ->check(CLI::Range(1, 1000000000));
+      ->transform(whole_number<int64_t>(1, 1000000000));
   command->add_option("--program", args->runner.program, "Another build of dkb-slam to run");
   command->add_flag("--retry", args->runner.retry, "Repeat runs that failed");
   command->add_flag("--no-times", args->no_times, "Leave times and memory out of the report, so that reports compare");

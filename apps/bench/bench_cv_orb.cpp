@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "bench/bench_cv_orb_module.h"
 #include "dkb/dataset/rgbd_reader.h"
@@ -17,11 +18,13 @@ namespace {
 
 using Measure = decltype(&dkb_cv_orb_1);
 
-// Null when this build has none.
+// Throws with the reason when this build has none.
 Measure load_module() {
   std::string reason;
   const Module module{"libdkb_cv_orb.so", DKB_MODULE_LIBDIR, {DKB_MODULE_INSTALL_DIR}};
-  return reinterpret_cast<Measure>(module_symbol(module, "dkb_cv_orb_1", &reason));
+  void* symbol = module_symbol(module, "dkb_cv_orb_1", &reason);
+  if (symbol == nullptr) throw std::runtime_error("this build has no libdkb_cv_orb.so (" + reason + ")");
+  return reinterpret_cast<Measure>(symbol);
 }
 
 constexpr size_t kImages = 60;
@@ -29,7 +32,6 @@ constexpr size_t kImages = 60;
 class CvOrb {
  public:
   void add(const GreyImage& grey) {
-    if (measure_ == nullptr) return;
     if (frames_ == 0) measure_(grey.data(), grey.width(), grey.height());  // first use sets up tables
     const double ms = measure_(grey.data(), grey.width(), grey.height());
     failed_ = failed_ || ms < 0;

@@ -231,6 +231,7 @@ class Runner {
         open.push_back(job);
     }
     leave_out_missing(jobs, &open);
+    ::unsetenv("DKB_SLAM_MODEL");  // a run's detector is what the suite says, whatever the machine's is
     const WorkFolder work(folder_.path() / "work");
     Progress progress(open.size(), options_.quiet);
     try {

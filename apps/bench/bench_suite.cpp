@@ -12,12 +12,12 @@
 #include <set>
 
 #include "dkb/dataset/detector_choice.h"
-#include "dkb/detection/onnx_network.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 #include "dkb_slam/options.h"
+#include "run_session.h"
 
 namespace dkb::bench {
 namespace fs = std::filesystem;
@@ -180,8 +180,16 @@ void check_options(const SuiteVariant& v, const Reader& reader) {
     if (!v.filter.empty()) options.set("dynamics.filter", v.filter, "filter");
     options.disable(v.disabled());
     options.check();
-    if (!v.detector.empty()) detector_kinds(v.detector, false);
-    if (!v.inference.empty()) inference_named(v.inference);
+    DetectorChoice choice;
+    if (!v.detector.empty()) choice.kinds = v.detector;
+    if (!v.inference.empty()) choice.inference = v.inference;
+    choice.model = v.model;
+    choice.labels = v.labels;
+    choice.classes = v.classes;
+    choice.boxes = v.boxes;
+    check_detector(choice, !v.model.empty());
+    choice = choice_beside(options, v.disabled(), choice);
+    check_kinds(choice, !choice.model.empty());
   } catch (const InputError& e) {
     reader.fail(e.what());
   }

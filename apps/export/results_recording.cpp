@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -139,22 +140,27 @@ size_t write_results_recording(const std::filesystem::path& results, Source* pic
     message.data = jpeg;
     writer->write(image_topic, stamp, encode(message));
   };
-  SourceFrame waiting;  // the next picture, by time between the poses
+  SourceFrame waiting;                    // the next picture, by time between the poses
+  bool of_the_run = pictures == nullptr;  // a picture had the stamp of a pose
   const auto next_picture = [&] {
     do waiting = pictures->next();
     while (waiting.state == SourceState::skipped);
+  };
+  const auto write_pictures_until = [&](int64_t stamp) {
+    Interrupt::check();
+    while (waiting.state == SourceState::frame && waiting.frame.stamp_ns() <= stamp) {
+      Interrupt::check();
+      of_the_run = of_the_run || waiting.frame.stamp_ns() == stamp;
+      write_picture(waiting);
+      next_picture();
+    }
   };
   if (pictures != nullptr) next_picture();
   PathMessage path;
   path.header = header_at(stamp_of(trajectory.front()), kMapFrame);
   for (const StampedPose& p : trajectory) {
     const int64_t stamp = stamp_of(p);
-    Interrupt::check();
-    while (waiting.state == SourceState::frame && waiting.frame.stamp_ns() <= stamp) {
-      Interrupt::check();
-      write_picture(waiting);
-      next_picture();
-    }
+    write_pictures_until(stamp);
     PoseStampedMessage pose;
     pose.header = header_at(stamp, kMapFrame);
     pose.pose = {p.world_from_cam.translation, p.world_from_cam.rotation};
@@ -166,12 +172,15 @@ size_t write_results_recording(const std::filesystem::path& results, Source* pic
     writer->write(pose_topic, stamp, encode(pose));
     path.poses.push_back(std::move(pose));
   }
+  if (!of_the_run)
+    throw InputError("--images: no picture has the stamp of a pose; give the source of the run in " + results.string());
   const int64_t last = stamp_of(trajectory.back());
   writer->write(path_topic, last, encode(path));
   if (map) {
     std::vector<char> bytes;
     writer->write(cloud_topic, last, encode(cloud_of(map->map, last, bytes)));
   }
+  write_pictures_until(std::numeric_limits<int64_t>::max());
   writer->close();
   return trajectory.size();
 }

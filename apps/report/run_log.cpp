@@ -91,8 +91,9 @@ void RunLog::keep_pictures(const Frame& frame, const FrameResult& result) {
   if (was_tracked && !result.tracked() && lost_.size() < kLostPictures)
     lost_.push_back(take_picture(row, frame, result));
   // Each a tenth below the one before, so that a slow decline does not cost a picture a frame.
-  if (result.tracked() && row > 0 &&
-      10 * result.inliers < 9 * (fewest_ ? rows_[fewest_->row].inliers : rows_[0].inliers))
+  if (!result.tracked()) return;
+  if (!first_tracked_) first_tracked_ = row;
+  if (10 * result.inliers < 9 * rows_[fewest_ ? fewest_->row : *first_tracked_].inliers)
     fewest_ = take_picture(row, frame, result);
 }
 

@@ -62,6 +62,7 @@ class RunLog {
   std::vector<Happening> happenings_;
   std::optional<Rigid3> last_pose_;
   size_t stride_;
+  std::optional<size_t> first_tracked_;  // row
   std::vector<OverlayPicture> even_, lost_;
   std::optional<OverlayPicture> fewest_;
 };

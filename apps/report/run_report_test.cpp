@@ -121,5 +121,25 @@ TEST(RunLog, KeepsPicturesSpreadOverTheRun) {
   EXPECT_EQ(run.log.lost()[1].row, 990u);
 }
 
+TEST(RunLog, KeepsTheFrameOfFewestInliersAlsoWhereTheFirstHasNoPose) {
+  Camera camera;
+  camera.width = 32;
+  camera.height = 24;
+  const GreyImage grey(32, 24, 100);
+  const DepthImage depth(32, 24, 1.0F);
+  const ImageView grey_view{grey.data(), 32, 24, 0, PixelFormat::grey8},
+      depth_view{depth.data(), 32, 24, 0, PixelFormat::depth_f32};
+  RunLog log;
+  for (const int inliers : {0, 100, 95, 40, 80}) {
+    FrameResult result;
+    result.stamp_ns = static_cast<int64_t>(1 + log.rows().size()) * 33'000'000;
+    result.state = inliers == 0 ? TrackingState::lost : TrackingState::tracking;
+    result.inliers = inliers;
+    log.frame(Frame(camera, {result.stamp_ns, grey_view, depth_view}), result);
+  }
+  ASSERT_TRUE(log.fewest());
+  EXPECT_EQ(log.fewest()->row, 3u);
+}
+
 }  // namespace
 }  // namespace dkb::report

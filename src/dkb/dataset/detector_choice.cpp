@@ -62,6 +62,23 @@ void check_no_network(const DetectorChoice& choice) {
   if (!choice.model.empty()) refuse_option(choice, "--model", "network");
   if (!choice.labels.empty()) refuse_option(choice, "--labels", "network");
   if (!choice.classes.empty()) refuse_option(choice, "--classes", "network");
+  if (choice.inference != DetectorChoice().inference) refuse_option(choice, "--inference", "network");
+}
+
+void check_kinds(const DetectorChoice& choice, bool has_model) {
+  inference_named(choice.inference);
+  const std::vector<std::string> kinds = detector_kinds(choice.kinds, has_model);
+  const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
+  if (!has("yolo")) check_no_network(choice);
+  if (has("yolo") && !has_model)
+    throw InputError(
+        "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
+  if (has("yolo") && kinds.back().starts_with(kExec))
+    throw InputError("--detector: yolo and exec cannot be joined; leave one of them out");
+  if (!choice.boxes.empty() && !has("file"))
+    throw InputError("--boxes: --detector " + choice.kinds + " does not read boxes; add --detector file" +
+                     (kinds.empty() || choice.kinds == "auto" ? "" : ", or join it: " + choice.kinds + "+file"));
+  if (has("file") && choice.boxes.empty()) throw InputError("--detector file: no boxes; name their file with --boxes");
 }
 
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
@@ -73,6 +90,7 @@ DetectorChoice choice_beside(const Options& options, const std::string& disabled
   choice.model.clear();
   choice.labels.clear();
   choice.classes.clear();
+  choice.inference = DetectorChoice().inference;
   return choice;
 }
 
@@ -80,13 +98,10 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   Detectors made;
   const Inference inference = inference_named(choice.inference);
   const std::filesystem::path model = model_of(choice);
+  check_kinds(choice, !model.empty());
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, !model.empty());
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
-  if (!has("yolo")) check_no_network(choice);
   if (has("yolo")) {
-    if (model.empty())
-      throw InputError(
-          "--detector yolo: no model; name an ONNX file with --model or in the environment variable DKB_SLAM_MODEL");
     OnnxOptions options{.model = model, .labels = choice.labels, .inference = inference};
     if (!choice.classes.empty()) options.classes = choice.classes;
     auto detector = std::make_shared<OnnxDetector>(options, camera.width, camera.height);
@@ -97,18 +112,11 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
     made.slow = std::move(detector);
   }
   if (!kinds.empty() && kinds.back().starts_with(kExec)) {
-    if (made.slow != nullptr) throw InputError("--detector: yolo and exec cannot be joined; leave one of them out");
     made.slow = std::make_shared<ExecDetector>(kinds.back().substr(kExec.size()));
     if (choice.every > 0) made.schedule.every = choice.every;
     if (choice.latency > 0) made.schedule.latency = choice.latency;
   }
-  if (!choice.boxes.empty() && !has("file"))
-    throw InputError("--boxes: --detector " + choice.kinds + " does not read boxes; add --detector file" +
-                     (kinds.empty() || choice.kinds == "auto" ? "" : ", or join it: " + choice.kinds + "+file"));
-  if (has("file")) {
-    if (choice.boxes.empty()) throw InputError("--detector file: no boxes; name their file with --boxes");
-    made.prompt.push_back(std::make_shared<FileDetector>(choice.boxes, camera.width, camera.height));
-  }
+  if (has("file")) made.prompt.push_back(std::make_shared<FileDetector>(choice.boxes, camera.width, camera.height));
   if (!choice.masks.empty()) {
     std::vector<double> stamps;
     for (int64_t stamp : choice.stamps_ns) stamps.push_back(seconds_from_ns(stamp));

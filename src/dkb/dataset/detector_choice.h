@@ -23,6 +23,9 @@ std::filesystem::path model_of(const DetectorChoice& choice);
 // Throws InputError where a choice without a network names what only networks have.
 void check_no_network(const DetectorChoice& choice);
 
+// Throws InputError where the detectors of the choice lack what they need, or cannot be joined. No file is read.
+void check_kinds(const DetectorChoice& choice, bool has_model);
+
 // What of the choice holds beside the options: without a filter nothing is detected.
 // `disabled`: the parts given to Options::disable(); without `dr` masks are not read either.
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice);

@@ -201,7 +201,7 @@ void write_image_file(const std::filesystem::path& path, std::string_view bytes)
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) throw OutputError(path.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  if (!out) fail_to_write(path, "write", errno);
 }
 
 }  // namespace dkb

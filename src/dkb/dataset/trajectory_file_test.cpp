@@ -59,7 +59,7 @@ TEST(TrajectoryFile, WrittenFileReadsBackTheSame) {
   EXPECT_EQ(trajectory_to_text(read_trajectory(path)), trajectory_to_text(t));
   std::filesystem::remove(path);
   EXPECT_THROW(read_trajectory(path), InputError);
-  EXPECT_THROW(write_trajectory("/proc/none/t.txt", t), OutputError);
+  EXPECT_THROW(write_trajectory("/proc/none/t.txt", t), InputError);
 }
 
 TEST(TrajectoryFile, NineDecimalsAreWrittenAsTheyWereRead) {

@@ -393,7 +393,7 @@ TEST_F(MapFileOnDisk, ErrorsNameTheFile) {
   } catch (const InputError& e) {
     EXPECT_EQ(std::string(e.what()).find(path.string() + ":"), 0u) << e.what();
   }
-  EXPECT_THROW(save_map(folder_ / "no" / "such" / "map.dkb", Map(), fr1_context()), OutputError);
+  EXPECT_THROW(save_map(folder_ / "no" / "such" / "map.dkb", Map(), fr1_context()), InputError);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/files.h"
 
 namespace dkb {
 
@@ -19,7 +20,7 @@ OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   temporary_ = folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()));
   fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd_ < 0) fail("open");
+  if (fd_ < 0) fail_to_write(path_, "open", errno);
 }
 
 OutputFile::~OutputFile() {

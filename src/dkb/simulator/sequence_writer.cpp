@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -48,13 +49,13 @@ std::string camera_file(const CameraModel& camera) {
 }
 
 // What a robot's wheels would tell that is off by `drift` in length and turns by `drift` rad more in every metre, about
-// the world's vertical. The body is the camera; it starts where the camera does.
-Trajectory wheel_odometry(const std::vector<FrameRecord>& records, double drift) {
+// the vertical `up` of the world. The body is the camera; it starts where the camera does.
+Trajectory wheel_odometry(const std::vector<FrameRecord>& records, double drift, const Eigen::Vector3d& up) {
   Trajectory odometry;
   Rigid3 odom_from_cam = records.front().world_from_cam, world_from_before = odom_from_cam;
   for (const FrameRecord& r : records) {
     Rigid3 step = world_from_before.inverse() * r.world_from_cam;
-    const Eigen::Vector3d up_in_cam = world_from_before.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d up_in_cam = world_from_before.rotation.conjugate() * up;
     const Eigen::AngleAxisd turn(drift * step.translation.norm(), up_in_cam);
     step.translation *= 1 + drift;
     step.rotation = (Eigen::Quaterniond(turn) * step.rotation).normalized();
@@ -88,7 +89,8 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
   write_trajectory(folder / "groundtruth.txt", truth);
   if (const auto drift = simulator.odometry_drift())
     write_file_atomically(folder / "odometry.txt",
-                          fmt::format("# drift {}\n", *drift) + trajectory_to_text(wheel_odometry(records, *drift)));
+                          fmt::format("# drift {}\n", *drift) +
+                              trajectory_to_text(wheel_odometry(records, *drift, simulator.up_in_world())));
   write_file_atomically(folder / "boxes.txt", boxes);
   write_file_atomically(folder / "movers.csv", movers);
   write_file_atomically(folder / "rgb.txt", rgb);
@@ -108,6 +110,11 @@ void write_sequence(const Simulator& simulator, const std::filesystem::path& fol
   options.check();
   make_output_folder(folder);
   for (const char* sub : {"rgb", "depth", "masks"}) make_output_folder(folder / sub);
+  std::error_code ignored;
+  // Lists of an earlier sequence would make one that is not finished look whole.
+  for (const char* list :
+       {"associations.txt", "rgb.txt", "depth.txt", "groundtruth.txt", "boxes.txt", "movers.csv", "odometry.txt"})
+    std::filesystem::remove(folder / list, ignored);
 
   std::vector<FrameRecord> records(static_cast<size_t>(simulator.frames()));
   std::mutex mutex;

@@ -54,6 +54,35 @@ TEST(SequenceWriter, SequenceReadsBackAsATumDataset) {
   for (const DatasetPair& p : data.pairs) EXPECT_TRUE(fs::exists(folder / "masks" / (p.stamp + ".png")));
 }
 
+TEST(SequenceWriter, WhatIsInterruptedDoesNotLookWhole) {
+  const test::TempFolder folder;
+  SimulatorOptions o = small("rush", 2);
+  o.odometry_drift = 0.02;
+  write_sequence(Simulator(o), folder.path());
+  const auto stop = [](int) { throw InputError("interrupted"); };
+  EXPECT_THROW(write_sequence(Simulator(small("room", 3)), folder.path(), stop), InputError);
+  for (const char* list :
+       {"associations.txt", "rgb.txt", "depth.txt", "groundtruth.txt", "boxes.txt", "movers.csv", "odometry.txt"})
+    EXPECT_FALSE(fs::exists(folder / list)) << list;
+}
+
+TEST(SequenceWriter, OdometryOfAPathDriftsAboutTheVerticalOfItsWorld) {
+  const test::TempFolder folder;
+  // The world is that of an upright camera: its y axis points down.
+  std::string path;
+  for (int i = 0; i <= 100; ++i) path += std::to_string(0.02 * i) + " " + std::to_string(0.01 * i) + " 0 0 0 0 0 1\n";
+  write_file_atomically(folder / "path.txt", path);
+  SimulatorOptions o = small("room", 20);
+  o.path = (folder / "path.txt").string();
+  o.odometry_drift = 0.2;
+  write_sequence(Simulator(o), folder / "made");
+  const Trajectory odometry = read_trajectory(folder / "made/odometry.txt");
+  const Eigen::Quaterniond turned =
+      odometry.front().world_from_cam.rotation.conjugate() * odometry.back().world_from_cam.rotation;
+  EXPECT_GT(turned.vec().norm(), 0.01);
+  EXPECT_LT(turned.vec().normalized().y(), -0.99) << turned.vec().transpose();
+}
+
 TEST(SequenceWriter, FolderThatCannotBeMadeIsABadInput) {
   const test::TempFolder folder;
   std::ofstream(folder / "taken") << "";

@@ -265,6 +265,10 @@ std::optional<double> Simulator::odometry_drift() const {
 const std::vector<std::string>& Simulator::notes() const {
   return impl_->scene.notes;
 }
+Eigen::Vector3d Simulator::up_in_world() const {
+  return impl_->scene.world_from_scene.rotation * Eigen::Vector3d::UnitZ();
+}
+
 Rigid3 Simulator::world_from_cam(double seconds) const {
   return impl_->scene.world_from_scene * impl_->scene.path(seconds);
 }

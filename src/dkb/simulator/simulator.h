@@ -82,6 +82,7 @@ class Simulator {
   const CameraModel& camera() const;
   double exposure() const;  // [s]
   std::optional<double> odometry_drift() const;
+  Eigen::Vector3d up_in_world() const;  // a unit vector
   // Remarks for the user, one line each, e.g. that a path was shorter than the frames asked for.
   const std::vector<std::string>& notes() const;
 

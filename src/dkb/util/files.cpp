@@ -40,17 +40,31 @@ std::string read_file(const fs::path& path) {
   return content;
 }
 
+void fail_to_write(const fs::path& path, const std::string& what, int error, const std::string& kept) {
+  const std::string message = path.string() + ": cannot be written (" + what + ": " + std::strerror(error) + ")";
+  if (error == ENOENT || error == ENOTDIR) throw InputError(message + "; make the folder, or choose another");
+  for (const int place : {EISDIR, EACCES, EPERM, ENAMETOOLONG, ELOOP, EEXIST, ENOTEMPTY})
+    if (error == place) throw InputError(message + "; choose another place");
+  throw OutputError(message + kept);
+}
+
 void write_file_atomically(const fs::path& path, std::string_view content) {
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code unknown;
+  const fs::file_status there = fs::status(path, unknown);
+  // A device or a pipe is no file to be replaced.
+  const bool straight = fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
+  fs::path target = fs::weakly_canonical(path, unknown);  // a link stays: what it leads to is replaced
+  if (unknown) target = path;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   const std::string temporary =
-      (folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()))).string();
+      (folder / ("." + target.filename().string() + ".tmp" + std::to_string(::getpid()))).string();
   const auto fail = [&](const char* what) {
-    const std::string reason = std::strerror(errno);
-    ::unlink(temporary.c_str());
-    throw OutputError(path.string() + ": cannot be written (" + what + ": " + reason +
-                      "); the previous file, if any, is kept");
+    const int error = errno;
+    if (!straight) ::unlink(temporary.c_str());
+    fail_to_write(path, what, error, straight ? "" : "; the previous file, if any, is kept");
   };
-  const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int fd = straight ? ::open(path.c_str(), O_WRONLY | O_CLOEXEC)
+                          : ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) fail("open");
   size_t done = 0;
   while (done < content.size()) {
@@ -71,7 +85,8 @@ void write_file_atomically(const fs::path& path, std::string_view content) {
     fail("fsync");
   }
   if (::close(fd) != 0) fail("close");
-  if (::rename(temporary.c_str(), path.c_str()) != 0) fail("rename");
+  if (straight) return;
+  if (::rename(temporary.c_str(), target.c_str()) != 0) fail("rename");
   const int dir = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (dir >= 0) {
     ::fsync(dir);

@@ -11,8 +11,15 @@ namespace dkb {
 std::string read_file(const std::filesystem::path& path);
 
 // Replaces `path` by `content` atomically: temporary file in the same folder, fsync, rename, fsync of the folder.
-// A reader sees the old file or the new one, never a part. Throws OutputError naming the file and the reason.
+// A reader sees the old file or the new one, never a part. Links are followed; a device or a pipe is written straight.
+// Throws as fail_to_write() does.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+// Throws that `path` cannot be written, with what was tried and the errno that it met: an InputError with the remedy
+// where the place is wrong (no such folder, a folder of that name), an OutputError, with `kept` at its end, where the
+// disk is full or broken.
+[[noreturn]] void fail_to_write(const std::filesystem::path& path, const std::string& what, int error,
+                                const std::string& kept = "");
 
 // Makes `path` (and its parents) and proves that files can be written there. Throws InputError for a folder that
 // cannot be used, OutputError for a full disk.

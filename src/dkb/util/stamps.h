@@ -49,12 +49,11 @@ auto find_same_stamp(const Items& items, double stamp, const StampOf& stamp_of) 
   const auto after = std::lower_bound(items.begin(), items.end(), stamp,
                                       [&](const auto& item, double at) { return stamp_of(item) < at; });
   decltype(&*items.begin()) nearest = nullptr;
-  double distance = kSameStamp;
-  for (auto it = after == items.begin() ? after : after - 1; it != items.end() && it <= after; ++it)
-    if (std::abs(stamp_of(*it) - stamp) <= distance) {
+  for (auto it = after == items.begin() ? after : after - 1; it != items.end() && it <= after; ++it) {
+    const double distance = std::abs(stamp_of(*it) - stamp);
+    if (distance <= kSameStamp && (nearest == nullptr || distance < std::abs(stamp_of(*nearest) - stamp)))
       nearest = &*it;
-      distance = std::abs(stamp_of(*it) - stamp);
-    }
+  }
   return nearest;
 }
 

@@ -97,6 +97,15 @@ TEST(Stamps, SecondsLeadBackToTheMicrosecond) {
   }
 }
 
+TEST(Stamps, OfTwoAsNearTheEarlierIsTheSame) {
+  const auto itself = [](double stamp) { return stamp; };
+  const std::vector<double> stamps = {1.0, 1.0 + 0x1p-9, 2.0};
+  const double middle = 1.0 + 0x1p-10;
+  EXPECT_EQ(find_same_stamp(stamps, middle, itself), &stamps[0]);
+  EXPECT_EQ(find_same_stamp(stamps, 1.0 + 0x1.8p-10, itself), &stamps[1]);
+  EXPECT_EQ(find_same_stamp(stamps, 1.5, itself), nullptr);
+}
+
 TEST(Stamps, AnyMutationIsReadOrRefused) {
   Random random(7);
   for (int i = 0; i < 50000; ++i) {

@@ -120,6 +120,35 @@ TEST(Files, AtomicWriteReplacesTheWholeFile) {
   fs::remove_all(folder);
 }
 
+TEST(Files, AtomicWriteLeavesLinksAndPipesWhatTheyAre) {
+  const test::TempFolder folder;
+  write_file_atomically(folder / "file", "before");
+  fs::create_symlink("file", folder / "link");
+  write_file_atomically(folder / "link", "after");
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "file"), "after");
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  std::string got;
+  std::thread reader([&] { got = read_file(folder / "pipe"); });
+  write_file_atomically(folder / "pipe", "through");
+  reader.join();
+  EXPECT_EQ(got, "through");
+  EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+}
+
+TEST(Files, AFolderInTheirPlaceStays) {
+  const test::TempFolder folder;
+  fs::create_directory(folder / "a");
+  try {
+    write_file_atomically(folder / "a", "x");
+    FAIL() << "must throw";
+  } catch (const OutputError& e) {
+    FAIL() << "the disk is not full: " << e.what();
+  } catch (const InputError&) {
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "a"));
+}
+
 TEST(Files, AreReadWholeWhetherTheyTellTheirSizeOrNot) {
   const test::TempFolder folder;
   const fs::path path = folder / "file";
@@ -142,7 +171,10 @@ TEST(Files, AnUnwritablePlaceIsNamed) {
     write_file_atomically("/proc/nowhere/a.txt", "x");
     FAIL() << "must throw";
   } catch (const OutputError& e) {
+    FAIL() << "the disk is not full: " << e.what();
+  } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find("/proc/nowhere/a.txt"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("make the folder, or choose another"), std::string::npos);
   }
   EXPECT_THROW(make_output_folder("/proc/nowhere"), InputError);
   EXPECT_THROW(read_file("/nowhere/at/all"), InputError);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/files.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/viewer/session_file.h"
 
@@ -25,7 +26,7 @@ SessionRecorder::SessionRecorder(SessionModel& model, const std::filesystem::pat
     : model_(model), path_(file), realtime_(realtime), left_free_(left_free), file_(nullptr, &std::fclose) {
   require_room(0);  // before a file that may be there is emptied
   file_.reset(std::fopen(file.c_str(), "wbe"));
-  if (file_ == nullptr) throw OutputError(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  if (file_ == nullptr) fail_to_write(file, "open", errno);
   std::setvbuf(file_.get(), nullptr, _IONBF, 0);  // else what could not be written would be tried again at the end
   client_.images = client_.depth = true;
   thread_ = std::thread([this] { run(); });

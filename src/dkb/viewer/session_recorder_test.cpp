@@ -213,7 +213,7 @@ TEST(SessionRecorder, LeavesRoomOnTheDiskAndTheFileThatIsThere) {
 
 TEST(SessionRecorder, SaysThatItsFileCannotBeWritten) {
   SessionModel model(options());
-  EXPECT_THROW(SessionRecorder(model, "/no/such/folder/session.dkbs", true), OutputError);
+  EXPECT_THROW(SessionRecorder(model, "/no/such/folder/session.dkbs", true), InputError);
 }
 
 }  // namespace
