@@ -329,7 +329,11 @@ void RunSession::write(double seconds) {
   facts_.wall_s = seconds;
   facts_.config_yaml = options_.to_yaml();
   if (reader_ != nullptr) facts_.times = reader_->times();
-  std::set<std::string> written;  // of what not every run writes
+  std::set<std::string> written;           // of what not every run writes
+  if (slam_->statistics().tracked == 0) {  // an earlier map is better than none
+    facts_.writes_map = false;
+    written.insert({"map.dkb", "map.ply"});
+  }
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
   write_outputs(out_, *slam_, trajectories, facts_);
   std::exception_ptr no_dense_map;

@@ -283,6 +283,7 @@ py::dict statistics(const PySlam& slam) {
   d["detector"] = s.detector;
   d["detector_rate_hz"] = s.detector_rate_hz;
   d["detector_inference"] = s.detector_inference;
+  d["detector_failed"] = s.detector_failed;
   py::dict stages;
   for (const auto& [name, stage] : s.stages) {
     py::dict times;

@@ -463,6 +463,7 @@ void Pipeline::collect_times() {
     s.detector_rate_hz = scenes_.detector_rate_hz();
     s.detector_latency_frames = scenes_.detector_latency();
     s.detector_inference = scenes_.detector_inference();
+    s.detector_failed = scenes_.detector_failed();
     if (load_) s.degraded_s = load_->seconds_by_name();
   };
   record_.add_stages(fill, times);
