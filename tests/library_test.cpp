@@ -108,6 +108,17 @@ TEST_F(Library, ARunThatIsNotInRealTimeLeavesNothingOutHoweverLate) {
   for (const Event& event : slam.take_events()) EXPECT_NE(event.kind, Kind::warning);
 }
 
+TEST_F(Library, TrackingThatCannotBeginIsToldOnce) {
+  Slam slam = slam_with();
+  for (int i = 0; i < 70; ++i)
+    EXPECT_EQ(slam.process(world.frame(i, {.dark = true})).state, TrackingState::initialising);
+  const std::vector<Event> events = slam.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].kind, Kind::warning);
+  EXPECT_EQ(events[0].frame, 29);
+  EXPECT_NE(events[0].text.find("100 features with depth"), std::string::npos) << events[0].text;
+}
+
 // Motion priors.
 
 TEST_F(Library, APriorGuidesAJumpThatTheMotionModelMisses) {
