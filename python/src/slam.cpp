@@ -346,6 +346,19 @@ frame is not counted then and the next one goes on. Shows a SlamWarning when a d
           "localize_only", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.localize_only(on); }); },
           py::arg("on") = true, "localize_only(on=True)\n\nWhile on, the map is not changed.")
       .def(
+          "suggest_pose",
+          [](PySlam& s, const py::object& pose, const py::object& covariance) {
+            const Rigid3 world_from_cam = pose_of(pose, "world_from_cam");
+            const Matrix6d sure = covariance_of(covariance, "covariance");
+            s.feed([&](Slam& slam) { slam.suggest_pose(world_from_cam, sure); });
+          },
+          py::arg("world_from_cam"), py::arg("covariance"),
+          R"(suggest_pose(world_from_cam, covariance)
+
+Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new map
+begins, at that place. world_from_cam: float64 [4, 4] in the map's world, [m]; covariance: float64 [6, 6] of its right
+perturbation, [translation m, rotation rad], camera axes. Raises InputError for what is no pose or no covariance.)")
+      .def(
           "explain_keyframes", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.explain_keyframes(on); }); },
           py::arg("on") = true,
           "explain_keyframes(on=True)\n\nEvery result's keyframe_explanation then says which test said what.")
