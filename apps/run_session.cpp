@@ -174,8 +174,8 @@ std::string depths_of(const RunArguments& args) {
       const double z = depths.data()[i];
       if (z > 0) nearest = std::min(nearest, z), farthest = std::max(farthest, z);
     }
-    if (farthest == 0) return "; the first depth image is empty";
-    return fmt::format("; those of the first image are {:.3g} ... {:.3g} m{}", nearest, farthest,
+    if (farthest == 0) return " (the first depth image is empty)";
+    return fmt::format(" (the first image holds {:.3g} ... {:.3g} m{})", nearest, farthest,
                        farthest > 100 ? ": millimetres?" : "");
   } catch (const std::exception&) {
     return "";
