@@ -45,7 +45,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
                    "[frames] until a detection is used (default: by the model's size)")
       ->transform(whole_number(1, 10000));
   command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
-  command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, 255 = mover");
+  command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, above 0 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
   command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else")
@@ -62,7 +62,8 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_option("--imu-topic", reading.imu_topic, "Likewise of an inertial unit");
   command->add_option("--prior", args->prior, "What of a recording guides tracking: none, odom, imu, auto");
   command->add_option("--prior-file", args->prior_file,
-                      "Wheel odometry in TUM format: guides tracking, and bridges what the images do not tell");
+                      "Odometry in TUM format, poses of the camera (x right, y down, z forward) as in trajectory.txt: "
+                      "guides tracking, and bridges what the images do not tell");
   command->add_flag("--localize", args->localize, "Track in that map without changing it");
   command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");

@@ -88,6 +88,7 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
   j["detector"] = {
       {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
   if (!s.detector_inference.empty()) j["detector"]["inference"] = s.detector_inference;
+  if (s.detector_failed) j["detector"]["failed"] = true;
   if (facts.dropped) j["realtime"] = {{"dropped", *facts.dropped}, {"degraded_s", s.degraded_s}};
   j["mapping"] = {{"points_created", s.points_created},
                   {"points_culled", s.points_culled},

@@ -9,6 +9,7 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -164,6 +165,29 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   return r;
 }
 
+// What the first frame's depth image holds, whatever the limits of the camera; empty where that cannot be told.
+std::string depths_of(const RunArguments& args) {
+  SourceOptions options = args.reading;
+  options.depth_limits = options.threaded = false;
+  options.prior = PriorKind::none;
+  try {
+    const std::unique_ptr<Source> again = open_source(args.source, options);
+    const SourceFrame first = again->next();
+    if (first.state != SourceState::frame) return "";
+    double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+    const DepthImage& depths = first.frame.image()->depth;
+    for (size_t i = 0; i < depths.size(); ++i) {
+      const double z = depths.data()[i];
+      if (z > 0) nearest = std::min(nearest, z), farthest = std::max(farthest, z);
+    }
+    if (farthest == 0) return " (the first depth image is empty)";
+    return fmt::format(" (the first image holds {:.3g} ... {:.3g} m{})", nearest, farthest,
+                       farthest > 100 ? ": millimetres?" : "");
+  } catch (const std::exception&) {
+    return "";
+  }
+}
+
 Options checked(const RunArguments& args) {
   Options options = options_of(args);
   check_arguments(args, options);
@@ -303,7 +327,7 @@ void RunSession::track() {
       facts_.stamps.push_back(next.stamp);
       had_prior_ = had_prior_ || next.frame.prior();
       if (boxes_ && boxes_->at(next.frame.stamp_ns()) != nullptr) boxes_.reset();
-      if (masks_ && masks_->has(next.frame.stamp_ns())) masks_.reset();
+      without_mask_ += masks_ && !masks_->has(next.frame.stamp_ns());
       show(next, slam_->process(next.frame));
     }
   }
@@ -346,7 +370,11 @@ void RunSession::write(double seconds) {
   facts_.wall_s = seconds;
   facts_.config_yaml = options_.to_yaml();
   if (reader_ != nullptr) facts_.times = reader_->times();
-  std::set<std::string> written;  // of what not every run writes
+  std::set<std::string> written;           // of what not every run writes
+  if (slam_->statistics().tracked == 0) {  // an earlier map is better than none
+    facts_.writes_map = false;
+    written.insert({"map.dkb", "map.ply"});
+  }
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
   write_outputs(out_, *slam_, trajectories, facts_);
   std::exception_ptr no_dense_map;
@@ -419,8 +447,8 @@ int RunSession::tell_the_end() {
   else
     tell(stderr,
          "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
-         "units of the camera's depth_factor ({} per metre)?\n",
-         options_.tracking.initial_points, opened_.camera().depth_factor);
+         "units of the camera's depth_factor ({} per metre; float images are in metres)?{}\n",
+         options_.tracking.initial_points, opened_.camera().depth_factor, live_ ? "" : depths_of(args_));
   return 1;
 }
 
@@ -436,9 +464,12 @@ void RunSession::warn_of_unused() {
   if (boxes_ && !facts_.stamps.empty())
     warnings_.warn("--boxes",
                    args_.detection.boxes.string() + ": no box has the stamp of a frame; are they of this run?");
-  if (masks_ && !facts_.stamps.empty())
+  if (without_mask_ > 0)
     warnings_.warn("--masks",
-                   args_.detection.masks.string() + ": no mask has the stamp of a frame; are they of this run?");
+                   without_mask_ == facts_.stamps.size()
+                       ? args_.detection.masks.string() + ": no mask has the stamp of a frame; are they of this run?"
+                       : fmt::format("{}: {} of {} frames have no mask", args_.detection.masks.string(), without_mask_,
+                                     facts_.stamps.size()));
   if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)
     warnings_.warn("--prior-file",
                    args_.prior_file + ": tells of no frame's motion; are its times those of the images?");

@@ -95,7 +95,8 @@ class RunSession {
   RunFacts facts_;
   std::optional<report::RunLog> log_;
   std::shared_ptr<const FileDetector> boxes_;  // while no frame had one of its boxes
-  std::shared_ptr<const MaskFolder> masks_;    // likewise
+  std::shared_ptr<const MaskFolder> masks_;    // where there are any
+  size_t without_mask_ = 0;                    // frames that none of them belongs to
   bool had_prior_ = false;
   LiveReport camera_;
   std::optional<Progress> progress_;

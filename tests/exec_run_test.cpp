@@ -42,6 +42,7 @@ TEST(ExecRun, ACommandThatFailsIsOneWarningAndTheRunGoesOn) {
     const SlamRun run(sequence(), temp / "out", {"--detector", "exec:" + command});
     ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
     EXPECT_EQ(run.stats.at("tracked"), kSequenceFrames);
+    EXPECT_TRUE(run.stats.at("detector").value("failed", false));
     const size_t at = run.finished.err.find("warning");
     EXPECT_NE(run.finished.err.find(reason), std::string::npos) << run.finished.err;
     EXPECT_NE(run.finished.err.find("it is not asked again"), std::string::npos) << run.finished.err;

@@ -210,6 +210,19 @@ TEST(RunEnding, WhyTheUnitOfTimesIsNotMeasuredIsTold) {
   EXPECT_NE(read_text(temp / "out/cv_orb.json").find("null"), std::string::npos);
 }
 
+TEST(RunEnding, ARunWithoutAPoseKeepsAnEarlierMap) {
+  const TempFolder temp;
+  const fs::path out = temp / "out";
+  ASSERT_EQ(SlamRun(sequence(), out, {"--max-frames", "12"}).finished.exit_code, 0);
+  const std::string map = read_text(out / "map.dkb");
+  const std::vector<std::string> blind = {"--max-frames", "12", "--set", "tracking.initial_points=8000"};
+  EXPECT_EQ(SlamRun(sequence(), out, blind).finished.exit_code, 1);
+  EXPECT_TRUE(read_text(out / "map.dkb") == map);
+  EXPECT_TRUE(fs::exists(out / "map.ply"));
+  EXPECT_EQ(SlamRun(sequence(), temp / "other", blind).finished.exit_code, 1);
+  EXPECT_FALSE(fs::exists(temp / "other" / "map.dkb"));
+}
+
 TEST(RunEnding, APortThatIsTakenCostsNoEarlierRecording) {
   const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in at{};

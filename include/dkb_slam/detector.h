@@ -79,7 +79,7 @@ struct DetectorChoice {
   std::filesystem::path labels;    ///< its class names, one per line; default: the 80 of COCO
   std::string classes;             ///< those of them that may move, by comma; default: people and what they handle
   std::filesystem::path boxes;     ///< of the file kind: `stamp class x y w h [score]` per line
-  std::filesystem::path masks;     ///< folder of STAMP.png, 255 = mover; stamps in seconds
+  std::filesystem::path masks;     ///< folder of STAMP.png, above 0 = mover; stamps in seconds
   std::vector<int64_t> stamps_ns;  ///< of the images to come, where known: the masks' are held against them
   int every = 0, latency = 0;      ///< [frames] the network's DetectionSchedule; 0 = by its size and what computes it
   /// What computes it: "onnxruntime", "opencv", or "auto": ONNX Runtime where its library is found, else OpenCV. The

@@ -28,7 +28,7 @@ class Slam(_core.Slam):
     classes: those of them that may move, separated by commas or as a list (None: people, pets, and what people carry
         or ride).
     inference: what computes it: "onnxruntime", "opencv", or "auto" (ONNX Runtime where it is found, else OpenCV).
-    boxes, masks: of the file detector, `stamp class x y w h [score]` per line; folder of STAMP.png, 255 = mover.
+    boxes, masks: of the file detector, `stamp class x y w h [score]` per line; folder of STAMP.png, above 0 = mover.
     detect_every, detect_latency: [frames] from one image that the network is asked for to the next, and until its
         answer counts; 0 = by its size. Without a network: a function of one's own is asked every so many frames, on a
         thread of its own, in the place of every frame on the thread that calls process().

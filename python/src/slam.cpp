@@ -283,6 +283,7 @@ py::dict statistics(const PySlam& slam) {
   d["detector"] = s.detector;
   d["detector_rate_hz"] = s.detector_rate_hz;
   d["detector_inference"] = s.detector_inference;
+  d["detector_failed"] = s.detector_failed;
   py::dict stages;
   for (const auto& [name, stage] : s.stages) {
     py::dict times;
@@ -344,6 +345,19 @@ frame is not counted then and the next one goes on. Shows a SlamWarning when a d
       .def(
           "localize_only", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.localize_only(on); }); },
           py::arg("on") = true, "localize_only(on=True)\n\nWhile on, the map is not changed.")
+      .def(
+          "suggest_pose",
+          [](PySlam& s, const py::object& pose, const py::object& covariance) {
+            const Rigid3 world_from_cam = pose_of(pose, "world_from_cam");
+            const Matrix6d sure = covariance_of(covariance, "covariance");
+            s.feed([&](Slam& slam) { slam.suggest_pose(world_from_cam, sure); });
+          },
+          py::arg("world_from_cam"), py::arg("covariance"),
+          R"(suggest_pose(world_from_cam, covariance)
+
+Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new map
+begins, at that place. world_from_cam: float64 [4, 4] in the map's world, [m]; covariance: float64 [6, 6] of its right
+perturbation, [translation m, rotation rad], camera axes. Raises InputError for what is no pose or no covariance.)")
       .def(
           "explain_keyframes", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.explain_keyframes(on); }); },
           py::arg("on") = true,

@@ -115,6 +115,18 @@ def test_a_saved_map_serves_again(whole, frames, camera, tmp_path):
         slam.load_map(tmp_path / "nothing.dkb")
 
 
+def test_a_suggested_pose_is_where_a_map_begins(frames, camera):
+    slam = dkb_slam.Slam(camera)
+    place = np.eye(4)
+    place[:3, 3] = [1, 2, 3]
+    slam.suggest_pose(place, 1e-4 * np.eye(6))
+    assert np.abs(slam.process(frames[0]).world_from_cam - place).max() < 1e-6
+    with pytest.raises(dkb_slam.InputError, match="covariance"):
+        slam.suggest_pose(place, np.zeros((6, 6)))
+    with pytest.raises(dkb_slam.InputError, match="world_from_cam"):
+        slam.suggest_pose(2 * place, np.eye(6))
+
+
 def test_pause_answers_without_looking(frames, camera):
     slam = dkb_slam.Slam(camera, threads=1)
     slam.process(frames[0])

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/camera_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <limits>
@@ -69,6 +71,11 @@ std::string camera_named_by(const std::string& folder_name) {
   return "";
 }
 
+CameraChoice from_file(const fs::path& path) {
+  const Camera camera = Camera::load(path);
+  return {camera, path.string(), doubt_of(camera, path.string())};
+}
+
 std::string folder_name(const fs::path& folder) {
   const fs::path normal = fs::absolute(folder).lexically_normal();
   return (normal.has_filename() ? normal : normal.parent_path()).filename().string();
@@ -115,6 +122,18 @@ Camera without_limits(Camera camera) {
   return camera;
 }
 
+std::string doubt_of(const Camera& camera, const std::string& name) {
+  constexpr double kAspect = 1.5;   // of pixels, which are square in all cameras of this kind
+  constexpr double kTan85 = 11.43;  // half of a field of view of 170 degrees, which no lens without fisheye has
+  const double fx = camera.fx, fy = camera.fy;
+  if (std::max(fx, fy) > kAspect * std::min(fx, fy))
+    return fmt::format("{}: fx {:g} and fy {:g} are far apart; most cameras have square pixels", name, fx, fy);
+  if (camera.width > 2 * kTan85 * fx || camera.height > 2 * kTan85 * fy)
+    return fmt::format("{}: with fx {:g} and fy {:g} px the field of view is wider than 170 degrees; are they pixels?",
+                       name, fx, fy);
+  return "";
+}
+
 CameraChoice choose_camera(const std::string& option, const fs::path& dataset) {
   if (!option.empty()) {
     if (const auto camera = builtin_camera(option)) return {*camera, option + " (built in)"};
@@ -122,11 +141,11 @@ CameraChoice choose_camera(const std::string& option, const fs::path& dataset) {
     if (!fs::exists(option, ec))
       throw InputError(option + ": neither a camera file nor a built-in camera (" + builtin_names() + ")" +
                        did_you_mean(option, kBuiltin));
-    return {Camera::load(option), option};
+    return from_file(option);
   }
   std::error_code ec;
   const fs::path beside = dataset / "camera.yaml";
-  if (fs::exists(beside, ec)) return {Camera::load(beside), beside.string()};
+  if (fs::exists(beside, ec)) return from_file(beside);
   const std::string name = camera_named_by(folder_name(dataset));
   if (const auto camera = builtin_camera(name)) return {*camera, name + " (from the folder's name)"};
   throw InputError(dataset.string() +

@@ -16,8 +16,12 @@ Camera without_limits(Camera camera);
 
 struct CameraChoice {
   CameraModel camera;
-  std::string origin;  // for people: `fr1 (from the folder's name)`, `data/camera.yaml`
+  std::string origin;      // for people: `fr1 (from the folder's name)`, `data/camera.yaml`
+  std::string doubt = {};  // why it may be another one; empty = no reason
 };
+
+// What is strange about a camera's numbers, which `name` opens; empty when nothing is.
+std::string doubt_of(const Camera& camera, const std::string& name);
 
 // `option` (the value of --camera: a built-in name or a file) if not empty; else camera.yaml in the dataset's folder;
 // else what the folder's name says (freiburg1 or fr1, freiburg2, freiburg3, bonn, as a word). Throws InputError.

@@ -37,6 +37,16 @@ TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
   EXPECT_EQ(c.depth_max, 4);
 }
 
+TEST(CameraFile, StrangeNumbersAreDoubted) {
+  const auto doubt = [](const std::string& text) { return doubt_of(parse_camera(text, "c"), "c"); };
+  EXPECT_EQ(doubt(kCamera), "");
+  EXPECT_EQ(doubt(replaced(kCamera, "fx: 517.3", "fx: 775")).find("c: fx 775 and fy 516.5 are far apart"), 0u);
+  EXPECT_EQ(doubt(replaced(kCamera, "fx: 517.3", "fx: 774")), "");
+  // 320 px of 27 px: 85.2 degrees to each side.
+  const std::string wide = replaced(replaced(kCamera, "517.3", "27"), "516.5", "27");
+  EXPECT_NE(doubt(wide).find("wider than 170 degrees"), std::string::npos) << doubt(wide);
+}
+
 TEST(CameraFile, MessagesSayWhereWhatAndWhatToDo) {
   EXPECT_EQ(parse_message(replaced(kCamera, "depth_factor", "depth_factr")),
             "camera.yaml:7: unknown key \"depth_factr\" (did you mean \"depth_factor\"?)");

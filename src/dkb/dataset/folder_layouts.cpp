@@ -106,6 +106,7 @@ TumDataset paired_by_number(const fs::path& folder, const std::string& layout, c
     pair.colour_path = image.path, pair.depth_path = other->second.path;
     dataset.pairs.push_back(std::move(pair));
   }
+  dataset.unpaired = colour.size() + depth.size() - 2 * dataset.pairs.size();
   if (dataset.pairs.empty())
     throw InputError(folder.string() + ": looks like " + layout +
                      ", but no colour image has a depth image of the same number");
@@ -189,7 +190,10 @@ FolderLayout open_redwood(const fs::path& folder, const std::string& colour) {
   if (const auto file = first_of({folder}, {"camera_intrinsic.json", "intrinsic.json"}))
     layout.camera = {parse_open3d_camera(read_file(*file), file->string()), file->string()};
   else
-    layout.camera = {kinect(525, 319.5, 239.5), "of Redwood (no camera_intrinsic.json)"};
+    layout.camera = {kinect(525, 319.5, 239.5), "of Redwood (no camera_intrinsic.json)",
+                     folder.string() +
+                         ": tells no camera; that of Redwood is assumed, 525 px and depth in millimetres: "
+                         "put a camera.yaml into the folder, or give --camera FILE"};
   return layout;
 }
 

@@ -92,6 +92,27 @@ TEST_F(Layouts, ReplicaTellsItsCameraBesideOrAbove) {
             (folder / "cam_params.json").string() + ": key \"w\" is missing; give --camera FILE or mend the file");
 }
 
+TEST_F(Layouts, ACameraThatIsAssumedAndStampsThatAreNoSecondsAreWarnedOf) {
+  SourceOptions options;
+  options.threaded = false;
+  const auto open = [&] { return open_folder(folder, options); };
+  colour("color/0.jpg", 640, 480), colour("color/1.jpg", 640, 480), colour("color/7.jpg", 640, 480);
+  depth("depth/0.png", 640, 480), depth("depth/1.png", 640, 480);
+  const auto guessed = open();
+  const auto warnings = guessed->take_warnings();
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("that of Redwood is assumed, 525 px"), std::string::npos) << warnings[0];
+  EXPECT_NE(guessed->description().find("2 pairs by the layout of Redwood, stamps by number at 30/s, 1 images without"),
+            std::string::npos)
+      << guessed->description();
+  write("camera.yaml", guessed->camera().to_yaml());
+  EXPECT_TRUE(open()->take_warnings().empty());
+  write("associations.txt", "0 color/0.jpg 0 depth/0.png\n33.3 color/1.jpg 33.3 depth/1.png\n");
+  const auto milliseconds = open()->take_warnings();
+  ASSERT_EQ(milliseconds.size(), 1u);
+  EXPECT_NE(milliseconds[0].find("33.3 s apart"), std::string::npos) << milliseconds[0];
+}
+
 TEST_F(Layouts, AFolderOfResultsMakesNoReplica) {
   const auto list = [&] { return open_folder_layout(folder).dataset.list; };
   write("results/trajectory.txt", "");

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/folder_source.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
 
@@ -14,7 +18,23 @@ FolderLayout selected_pairs(const std::filesystem::path& folder, const SourceOpt
 }
 
 std::string described(const TumDataset& dataset, const CameraChoice& camera) {
-  return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + ", camera " + camera.origin;
+  const std::string unpaired =
+      dataset.unpaired == 0 ? "" : ", " + std::to_string(dataset.unpaired) + " images without a partner of their time";
+  return std::to_string(dataset.pairs.size()) + " pairs by " + dataset.list + unpaired + ", camera " + camera.origin;
+}
+
+// Why stamps may be no seconds; empty when nothing speaks for it.
+std::string doubt_of_stamps(const TumDataset& dataset) {
+  constexpr double kSlow = 2;  // [s] between frames; nothing can be tracked from one to the next
+  std::vector<double> intervals;
+  for (size_t i = 1; i < dataset.pairs.size(); ++i)
+    intervals.push_back(dataset.pairs[i].timestamp - dataset.pairs[i - 1].timestamp);
+  if (intervals.empty()) return "";
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  if (*middle <= kSlow) return "";
+  return fmt::format("{}: the stamps of {} are {:g} s apart in the median; they must be in seconds",
+                     dataset.folder.string(), dataset.list, *middle);
 }
 
 }  // namespace
@@ -36,6 +56,8 @@ FolderSource::FolderSource(const std::filesystem::path& folder, const SourceOpti
   const CameraChoice choice = choose_folder_camera(folder, layout_, options);
   choice.camera.check();
   description_ = described(layout_.dataset, choice);
+  for (const std::string& doubt : {choice.doubt, doubt_of_stamps(layout_.dataset)})
+    if (!doubt.empty()) warnings_.push_back(doubt);
   const Camera reading = options.depth_limits ? choice.camera : without_limits(choice.camera);
   start(pairs_in_files(layout_.dataset.pairs, reading, layout_.fit_colour), choice.camera, options.threaded);
 }

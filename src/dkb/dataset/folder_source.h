@@ -17,6 +17,7 @@ class FolderSource final : public ReaderSource {
 
   std::optional<size_t> size() const override { return layout_.dataset.pairs.size(); }
   std::string description() const override { return description_; }
+  std::vector<std::string> take_warnings() override { return std::exchange(warnings_, {}); }
   std::vector<int64_t> stamps_ns() const override;
 
   const std::vector<DatasetPair>& pairs() const { return layout_.dataset.pairs; }
@@ -24,6 +25,7 @@ class FolderSource final : public ReaderSource {
  private:
   FolderLayout layout_;
   std::string description_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace dkb

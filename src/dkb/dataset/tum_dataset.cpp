@@ -182,7 +182,9 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
   }
   for (const fs::path& list : {rgb, depth})
     if (!fs::exists(list, ec))
-      throw InputError(list.string() + ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt");
+      throw InputError(list.string() +
+                       ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt, with a line " +
+                       "`seconds image` for each image (docs/sources.md, \"Your own images\")");
   return pair_image_lists(folder, "rgb.txt", "depth.txt", options);
 }
 
@@ -205,6 +207,7 @@ TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_li
     throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
                      std::to_string(options.max_difference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
+  dataset.unpaired = colour_rows.size() + depth_rows.size() - 2 * dataset.pairs.size();
   set_exact_stamps(dataset.pairs, rgb.string());
   return dataset;
 }

@@ -30,6 +30,7 @@ struct TumDataset {
   std::filesystem::path folder;
   std::string list;                // "associations.txt" or "rgb.txt and depth.txt"
   std::vector<DatasetPair> pairs;  // colour stamps strictly rising, at least one
+  size_t unpaired = 0;             // images without a partner, of the whole folder
 };
 
 // Whether a folder is in TUM layout, by what lies in it.

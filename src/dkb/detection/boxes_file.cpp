@@ -17,6 +17,7 @@ constexpr double kLimit = 1e12;  // of stamps, pixels and scores alike; floats h
 
 struct Row {
   double timestamp = 0;
+  bool within_one = false;  // all of its numbers are at most 1, as are shares of the image
   Detection detection;
 };
 
@@ -32,6 +33,7 @@ Row parse_row(const std::vector<std::string_view>& columns, const std::string& p
   row.detection.class_name = std::string(columns[1]);
   const double x = number(2, "x"), y = number(3, "y"), w = number(4, "w"), h = number(5, "h");
   if (columns.size() > 6) row.detection.score = static_cast<float>(number(6, "score"));
+  row.within_one = x <= 1 && y <= 1 && w <= 1 && h <= 1;
   if (!(w > 0) || !(h > 0))
     throw InputError(place + fmt::format(": the box is {} x {} px; its size must be positive", w, h));
   const Box box{static_cast<float>(x), static_cast<float>(y), static_cast<float>(w), static_cast<float>(h)};
@@ -47,9 +49,15 @@ Row parse_row(const std::vector<std::string_view>& columns, const std::string& p
 
 BoxesByTime parse_boxes(std::string_view text, const std::string& name, int width, int height) {
   std::vector<Row> rows;
+  std::string first;  // row
   for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
     rows.push_back(parse_row(columns, place, width, height));
+    if (first.empty()) first = place;
   });
+  if (!rows.empty() && std::all_of(rows.begin(), rows.end(), [](const Row& r) { return r.within_one; }))
+    throw InputError(first +
+                     ": this box and all others are within 0 ... 1; x, y, w and h are pixels: multiply x and w " +
+                     "by the image's width, y and h by its height");
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.timestamp < b.timestamp; });
   BoxesByTime boxes;
   for (Row& row : rows) {

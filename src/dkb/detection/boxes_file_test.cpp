@@ -40,6 +40,11 @@ TEST(BoxesFile, BadLinesAreNamedByLine) {
     EXPECT_EQ(error_of(good + bad + "\n").find("b.txt:3: "), 0u) << bad << ": " << error_of(good + bad);
 }
 
+TEST(BoxesFile, SharesOfTheImageAreRefused) {
+  EXPECT_EQ(error_of("# head\n1 person 0.25 0.5 0.1 0.2\n2 person 0.3 0.5 0.1 0.2\n").find("b.txt:2: "), 0u);
+  EXPECT_EQ(parse_boxes("1 person 0 0 1 1\n1 person 1 2 3 4\n", "b.txt", 640, 480)[0].boxes.size(), 2u);
+}
+
 TEST(BoxesFile, MissingFilesAreNamed) {
   EXPECT_THROW(read_boxes("/nowhere/b.txt", 640, 480), InputError);
 }

@@ -112,7 +112,7 @@ GreyImage MaskFolder::read(const fs::path& path) const {
     throw InputError(path.string() + ": the mask is " + std::to_string(mask.width()) + " x " +
                      std::to_string(mask.height()) + " px, the images are " + std::to_string(width_) + " x " +
                      std::to_string(height_));
-  for (size_t i = 0; i < mask.size(); ++i) mask.data()[i] = mask.data()[i] >= 128 ? 255 : 0;
+  for (size_t i = 0; i < mask.size(); ++i) mask.data()[i] = mask.data()[i] > 0 ? 255 : 0;
   return mask;
 }
 

@@ -12,7 +12,7 @@
 
 namespace dkb {
 
-// Masks from any segmenter: FOLDER/STAMP.png, where STAMP is the colour image's stamp [s] and 255 = mover. An image
+// Masks from any segmenter: FOLDER/STAMP.png, where STAMP is the colour image's stamp [s] and above 0 = mover. An image
 // gets the mask of the nearest stamp within 2 ms, or none. A mask comes with one box of class "mover" per connected
 // region (8-neighbourhood) of at least `min_region` pixels, largest first.
 class MaskFolder final : public Detector {

@@ -84,6 +84,23 @@ TEST_F(MaskFolderTest, FoldersThatCannotServeAreRefusedAtOnce) {
   EXPECT_NO_THROW(open(folder_, 12.5, 40));
 }
 
+TEST_F(MaskFolderTest, EveryValueAboveZeroIsAMover) {
+  touch("1.png");
+  const auto ones = [](const fs::path&) {
+    GreyImage mask(40, 30);
+    for (int x = 0; x < 20; ++x)
+      for (int y = 0; y < 30; ++y) mask(x, y) = 1;
+    return mask;
+  };
+  MaskFolder detector(folder_, ones, {1.0}, 40, 30);
+  DetectorInput image;
+  image.stamp_ns = 1'000'000'000;
+  const Detections found = detector.detect(image);
+  EXPECT_EQ(found.boxes, (std::vector<Detection>{{"mover", {0, 0, 20, 30}, 1.0f}}));
+  EXPECT_EQ(found.mask(0, 0), 255);
+  EXPECT_EQ(found.mask(20, 0), 0);
+}
+
 TEST_F(MaskFolderTest, StampsNeedNotBeKnownBeforehand) {
   touch("12.500000.png");
   EXPECT_NO_THROW(MaskFolder(folder_, square, {}, 40, 30));

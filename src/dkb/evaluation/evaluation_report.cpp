@@ -42,6 +42,7 @@ std::string evaluation_table(const Evaluation& e) {
   const std::string rpe = "RPE " + to_string(e.options.rpe_delta);
   out += table_row((rpe + " transl.").c_str(), "m", e.rpe.translation, 6);
   out += table_row((rpe + " rotation").c_str(), "deg", e.rpe.rotation, 4);
+  if (!e.rpe_pairs.empty()) out += fmt::format("{} of {} pairs of poses\n", rpe, e.rpe_pairs.size());
   return out;
 }
 

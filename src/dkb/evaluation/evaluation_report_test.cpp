@@ -90,6 +90,8 @@ TEST(EvaluationReport, TableNamesApeAndUnits) {
   EXPECT_EQ(table.rfind("30 poses matched (30 estimated, 30 true, stamps within 0.02 s)\n", 0), 0u) << table;
   EXPECT_NE(table.find("\nAPE translation     m "), std::string::npos) << table;
   EXPECT_NE(table.find("\nRPE 1f rotation   deg "), std::string::npos) << table;
+  EXPECT_NE(table.find("\nRPE 1f of " + std::to_string(example().rpe_pairs.size()) + " pairs"), std::string::npos)
+      << table;
 }
 
 TEST(EvaluationReport, PictureIsWholeAndEscapesNames) {

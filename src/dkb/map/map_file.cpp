@@ -151,7 +151,12 @@ MapFile load_map(const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
     throw InputError(path.string() + ": is a folder; give the map in it, as " + (path / "map.dkb").string());
-  return decode_map(read_file(path), path.string());
+  MapFile file = decode_map(read_file(path), path.string());
+  if (file.map.live_keyframe_count() == 0)
+    throw InputError(path.string() +
+                     ": holds no keyframes, so that nothing can be found in it; give the map of a run "
+                     "that tracked");
+  return file;
 }
 
 bool same_optics(const CameraModel& a, const CameraModel& b) {

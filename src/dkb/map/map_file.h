@@ -41,7 +41,7 @@ MapFile decode_map(std::string_view bytes, const std::string& name);
 // Replaces the file atomically. Throws OutputError.
 void save_map(const std::filesystem::path& path, const Map& map, const MapFileContext& context);
 
-// Throws InputError naming the file: unreadable, damaged, of a newer format, no map.
+// Throws InputError naming the file: unreadable, damaged, of a newer format, no map, one without keyframes.
 MapFile load_map(const std::filesystem::path& path);
 
 }  // namespace dkb

@@ -385,6 +385,17 @@ TEST_F(MapFileOnDisk, SavesAndLoads) {
   EXPECT_EQ(read_file(folder_ / "map.dkb"), encode_map(map, fr1_context()));
 }
 
+TEST_F(MapFileOnDisk, AMapWithoutKeyframesIsRefused) {
+  const auto path = folder_ / "map.dkb";
+  save_map(path, Map(), fr1_context());
+  try {
+    load_map(path);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_EQ(std::string(e.what()).find(path.string() + ": holds no keyframes"), 0u) << e.what();
+  }
+}
+
 TEST_F(MapFileOnDisk, ErrorsNameTheFile) {
   const auto path = folder_ / "nothing.dkb";
   try {

@@ -35,7 +35,9 @@ std::string camera_text(const Camera& camera, const std::string& option, const f
 Converted convert_folder(const fs::path& in, const fs::path& out, const ConvertOptions& options) {
   const FolderLayout layout = open_folder_layout(in);
   const TumDataset& dataset = layout.dataset;
-  const Camera camera = choose_folder_camera(in, layout, options.source).camera;
+  const CameraChoice choice = choose_folder_camera(in, layout, options.source);
+  if (!choice.doubt.empty()) options.warn(choice.doubt);
+  const Camera& camera = choice.camera;
   const std::string text = camera_text(camera, options.source.camera, in);
   const auto writer = write_pairs(out, camera, text, {.compression = options.compression, .warn = options.warn});
   Converted converted{0, "pairs"};

@@ -105,6 +105,7 @@ class Chooser {
     if (!options_.camera.empty()) {
       const CameraChoice choice = dkb::choose_camera(options_.camera, "");
       made_.camera = choice.camera, made_.camera_origin = choice.origin;
+      if (!choice.doubt.empty()) made_.warnings.push_back(choice.doubt);
       return;
     }
     if (survey_.camera_file) {

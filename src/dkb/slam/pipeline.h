@@ -115,6 +115,7 @@ class Pipeline {
   FrameIndex next_frame_ = 0;
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
+  int frames_before_map_ = 0;
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.

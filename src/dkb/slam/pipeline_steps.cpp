@@ -12,6 +12,7 @@ namespace dkb {
 namespace {
 
 constexpr int kFeatureShare = 2;         // by which the features are cut in a real-time run that is late
+constexpr int kPatience = 30;            // [frames] without a map before that is told: about a second
 constexpr double kUsualFeatures = 1000;  // of a frame, that the numbers of keyframe rules are meant for
 
 std::unique_ptr<KeyframeDecider> make_decider(const PipelineContext& context) {
@@ -444,6 +445,11 @@ void Pipeline::note_changes(const TrackedFrame& tracked) {
   if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map);
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
+  if (tracked.state == TrackingState::initialising && !localize_only_ && ++frames_before_map_ == kPatience)
+    note(Event::Kind::warning,
+         "tracking has not begun: none of the first " + std::to_string(kPatience) + " frames has " +
+             std::to_string(options_.tracking.initial_points) +
+             " features with depth; are there depth images, in units of the camera's depth_factor?");
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
 }
 
@@ -463,6 +469,7 @@ void Pipeline::collect_times() {
     s.detector_rate_hz = scenes_.detector_rate_hz();
     s.detector_latency_frames = scenes_.detector_latency();
     s.detector_inference = scenes_.detector_inference();
+    s.detector_failed = scenes_.detector_failed();
     if (load_) s.degraded_s = load_->seconds_by_name();
   };
   record_.add_stages(fill, times);

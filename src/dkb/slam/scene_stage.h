@@ -106,6 +106,7 @@ class SceneStage {
   std::string detector_kind() const;
   double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
   int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
+  bool detector_failed() const { return slow_stage_ && slow_stage_->failed(); }
   std::string detector_inference() const { return slow_stage_ ? inference_ : std::string(); }
   // Durations since they were taken last. Parts of tracking: flow and motion (what it waits for carrying and for the
   // segmentation, and what it does of them itself), filter. Beside it: carrying, segmentation, and those of the

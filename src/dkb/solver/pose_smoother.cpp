@@ -14,6 +14,9 @@ using Matrix12x6d = Eigen::Matrix<double, 12, 6>;
 // After so long without a pose the speed before says nothing: at half the density that noise starts with, the
 // prediction is 0.1 m off.
 constexpr double kMaxGap = 1.0;  // [s]
+// Stamps closer than this do not tell how the camera moves from one to the other: at 1 m/s it is 0.1 mm, less than any
+// pose is known to, and the noise of a motion is learned by dividing by the third power of its time.
+constexpr double kLeastStep = 1e-4;  // [s]
 // A pose is hardly told anything by one that is as many poses away as kMargin. Parts are bounded so that memory is, and
 // so that each has the noise of its own time.
 constexpr size_t kPart = 512, kMargin = 64;
@@ -86,7 +89,11 @@ class Smoother {
     forward();
     backward();
     std::vector<Rigid3> poses;
-    for (const Step& s : steps_) poses.push_back({s.smoothed.rotation, s.smoothed.position});
+    for (size_t k = 0; k < steps_.size(); ++k) {
+      const Motion& m = steps_[k].smoothed;
+      const bool finite = m.position.allFinite() && m.rotation.coeffs().allFinite();
+      poses.push_back(finite ? Rigid3{m.rotation, m.position} : measured_[k].world_from_cam);
+    }
     return poses;
   }
 
@@ -208,7 +215,9 @@ std::vector<Rigid3> smoothed_poses(std::span<const MeasuredPose> measured, Motio
   while (poses.size() < measured.size()) {
     // The poses from here to the next gap, or a part of them.
     const size_t from = poses.size();
-    const auto breaks = [](const MeasuredPose& a, const MeasuredPose& b) { return b.time - a.time > kMaxGap; };
+    const auto breaks = [](const MeasuredPose& a, const MeasuredPose& b) {
+      return b.time - a.time > kMaxGap || b.time - a.time < kLeastStep;
+    };
     const auto stretch = measured.subspan(from, std::min(kPart + kMargin, measured.size() - from));
     const auto gap = std::adjacent_find(stretch.begin(), stretch.end(), breaks);
     size_t end = from + (gap == stretch.end() ? stretch.size() : static_cast<size_t>(gap - stretch.begin()) + 1);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace dkb {
@@ -148,6 +149,23 @@ TEST(PoseSmoother, LongSequencesHaveNoSeams) {
   for (const size_t seam : {size_t{512}, size_t{1024}})
     for (size_t k = seam - 5; k < seam + 5; ++k) seams += error(k) / 20;
   EXPECT_LT(seams, 1.5 * all);
+}
+
+TEST(PoseSmoother, FramesMayBeANanosecondApart) {
+  auto one = measured(100, 0.002, 0.002), all = one;
+  for (size_t k = 50; k < 100; ++k) one[k].time += 1e-9 - kStep;
+  for (size_t k = 0; k < 100; ++k) all[k].time = 1e-9 * static_cast<double>(k);
+  for (const auto& poses : {one, all}) {
+    const std::vector<Rigid3> smoothed = smoothed_poses(poses);
+    for (size_t k = 0; k < 100; ++k)  // the camera goes at most 20 mm from frame to frame
+      EXPECT_LT((smoothed[k].translation - poses[k].world_from_cam.translation).norm(), 0.02) << k;
+  }
+}
+
+TEST(PoseSmoother, APoseThatCannotBeSmoothedStaysAsMeasured) {
+  auto poses = measured(10, 0.002, 0.002);
+  poses[5].covariance *= std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(smoothed_poses(poses)[5].translation, poses[5].world_from_cam.translation);
 }
 
 TEST(PoseSmoother, FewPosesStayAsTheyAre) {
