@@ -272,8 +272,13 @@ void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   if (self == nullptr) return;
   std::vector<Covisible> found = observers_of(self->points);
   drop_covisible(found, id);
-  // The best one stays, however little they share.
-  while (found.size() > 1 && found.back().shared_points < min_shared_points) found.pop_back();
+  // The best one stays, however little they share, and whoever has nobody else.
+  const auto has_others = [&](const Covisible& c) {
+    const std::vector<Covisible>& its = keyframe(c.keyframe)->covisible;
+    return its.size() != 1 || its[0].keyframe != id;
+  };
+  for (size_t i = found.size(); i-- > 1 && found[i].shared_points < min_shared_points;)
+    if (has_others(found[i])) found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
   const std::vector<Covisible> before = std::exchange(edit(id).covisible, found);
   for (const Covisible& c : before)
     if (points_shared_with(c.keyframe, found) == 0) drop_covisible(edit(c.keyframe).covisible, id);
