@@ -104,9 +104,9 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vect
         correction.same.emplace_back(own, point);
   }
   const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
+  const auto added = loop_edges(map, finding);
+  edges->insert(edges->end(), added.begin(), added.end());
   if (!finding.merge) {
-    const auto added = loop_edges(map, finding);
-    edges->insert(edges->end(), added.begin(), added.end());
     move_by_pose_graph(map, *edges, map.root(near), correction);
     return correction;
   }
