@@ -280,6 +280,7 @@ TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
     world.add(truth, truth * other_from_world.inverse(), k == 12);
   }
   ASSERT_EQ(world.map.roots().size(), 2U);
+  for (KeyframeId k = 0; k < 12; ++k) world.map.set_covariance(k, 1e-4 * Matrix6d::Identity());
   LoopCloser closer(world.optics(), {}, 1);
   const auto correction = closer.process(world.map, 23);
   ASSERT_TRUE(correction);
@@ -287,6 +288,11 @@ TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
   LocalMapper mapper = mapper_of(world, world.map);
   const MapView view = mapper.apply(*correction);
   EXPECT_EQ(view->roots(), std::vector<KeyframeId>{0});
+  for (KeyframeId k = 12; k < 24; ++k) {  // turns are as uncertain everywhere as at the joint
+    const double variance = view->keyframe(k)->covariance.bottomRightCorner<3, 3>().trace();
+    EXPECT_GT(variance, 3e-4) << "keyframe " << k;
+    EXPECT_LT(variance, 4e-4) << "keyframe " << k;
+  }
   for (KeyframeId k = 0; k < 12; ++k)
     EXPECT_EQ(view->cam_from_world(k).translation, world.map.cam_from_world(k).translation) << "the older one stays";
   for (KeyframeId k = 12; k < 24; ++k) EXPECT_LT(world.error(*view, k), 0.05) << "keyframe " << k;
