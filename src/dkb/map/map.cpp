@@ -89,6 +89,15 @@ std::vector<KeyframeId> Map::roots() const {
   return ids;
 }
 
+std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
+  std::vector<KeyframeId> newest;
+  if (keyframe(id) == nullptr) return newest;
+  for (KeyframeId k = keyframe_count(); k-- > 0 && static_cast<int>(newest.size()) < most;)
+    if (live_keyframe(k) != nullptr && root(k) == root(id)) newest.push_back(k);
+  std::reverse(newest.begin(), newest.end());
+  return newest;
+}
+
 std::vector<KeyframeId> Map::live_keyframes() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)

@@ -488,6 +488,17 @@ TEST(Map, TheRootIsTheEndOfTheWayUp) {
   EXPECT_THROW(map.root(10), std::logic_error);
 }
 
+TEST(Map, TheNewestBesideAKeyframeAreOfItsOwnMap) {
+  ThreeKeyframes m;
+  Keyframe apart = keyframe_at(3, 0);
+  apart.parent = kNoKeyframe;
+  m.map.add_keyframe(apart);
+  EXPECT_EQ(m.map.newest_beside(0, 2), (std::vector<KeyframeId>{1, 2}));
+  EXPECT_EQ(m.map.newest_beside(3, 2), std::vector<KeyframeId>{3});
+  EXPECT_TRUE(m.map.newest_beside(kNoKeyframe, 2).empty());
+  EXPECT_TRUE(m.map.newest_beside(4, 2).empty());
+}
+
 TEST(Map, KeyframesWithoutAParentAreTheRoots) {
   ThreeKeyframes m;
   EXPECT_EQ(m.map.roots(), std::vector<KeyframeId>{0});
