@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -399,6 +400,35 @@ TEST_F(Library, AMapIsSavedAndLoaded) {
   FrameResult r = second.process(world.frame(4, {.shift = 10}));
   EXPECT_EQ(r.state, TrackingState::relocalised);
   EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(10), 5e-3) << "in the first one's world";
+}
+
+TEST_F(Library, AKeyframeRuleIsToldHowLongAgoTheLastKeyframeOfALoadedMapWas) {
+  struct Listening final : KeyframePolicy {
+    KeyframeAnswer decide(const KeyframeQuery& q) override {
+      asked.push_back(q);
+      return {};
+    }
+    std::vector<KeyframeQuery> asked;
+  };
+  Slam first = slam_with();
+  feed(first, world.walk(0, 15));
+  first.finish();
+  first.save_map(folder / "a.dkb");
+  const auto rule = std::make_shared<Listening>();
+  Slam second(world.camera(), Options(), Detectors::none(), rule);
+  second.load_map(folder / "a.dkb");
+  second.process(world.frame(20, {.shift = 9}));
+  second.process(world.frame(21, {.shift = 10}));
+  ASSERT_FALSE(rule->asked.empty());
+  const KeyframeQuery& q = rule->asked.front();
+  const auto keyframes = second.map().keyframes();
+  EXPECT_TRUE(std::any_of(keyframes.begin(), keyframes.end(),
+                          [&q](const KeyframeInfo& k) {
+                            return q.frames_since_keyframe == q.frame - k.frame &&
+                                   std::abs(q.seconds_since_keyframe -
+                                            1e-9 * static_cast<double>(q.stamp_ns - k.stamp_ns)) < 1e-6;
+                          }))
+      << q.frames_since_keyframe << " frames, " << q.seconds_since_keyframe << " s";
 }
 
 TEST_F(Library, AMapThatDoesNotFitLeavesAllAsItWas) {

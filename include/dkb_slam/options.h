@@ -100,7 +100,7 @@ class DKB_SLAM_API Options {
     double voxel = 0.02;          ///< [m] side of a voxel of the dense map, 0.005 ... 0.2
     double truncation = 0.06;     ///< [m] distances to a surface are kept up to here, 2 ... 20 voxels
     double max_depth = 4.0;       ///< [m] depths beyond tell of free space only, 0.5 ... 16
-    double grid_cell = 0.05;      ///< [m] side of a cell of the occupancy grid, 0.01 ... 1
+    double grid_cell = 0.05;      ///< [m] side of a cell of the occupancy grid, 0.01 ... 1, at least 2 voxels
     double obstacle_low = 0.10;   ///< [m] above the floor: what is lower can be driven over, above 0
     double obstacle_high = 1.50;  ///< [m] what is higher can be driven under, above obstacle_low
     int threads = 2;              ///< of the fusion, whose result does not depend on it, 1 ... 64

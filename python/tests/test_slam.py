@@ -195,7 +195,8 @@ def test_a_prior_is_taken_as_matrix_or_object(frames, camera):
 
 def test_dense_map_has_the_still_world(sequence):
     slam, _ = track(dkb_slam.open(sequence, max_frames=40), dense=True, settings={"dense.voxel": 0.05,
-                                                                                  "dense.truncation": 0.15})
+                                                                                  "dense.truncation": 0.15,
+                                                                                  "dense.grid_cell": 0.1})
     dense = slam.dense_map()
     assert dense.vertices.shape == dense.colours.shape and len(dense.vertices) > 100
     assert dense.triangles.max() < len(dense.vertices) and dense.to_ply().startswith(b"ply")

@@ -41,7 +41,7 @@ std::vector<FilterFeature> RivalFilter::describe(const RivalFilterInput& input) 
 }
 
 // DKB section 3.1, with our decision: the motion comes from points outside all boxes; too few of them, or too lopsided,
-// and it comes from all points by RANSAC around the motion model's.
+// and it comes from all points by RANSAC; the expected motion stands where neither gives one.
 Rigid3 RivalFilter::own_motion(const std::vector<FilterFeature>& features, const RivalFilterInput& input) const {
   const auto box = box_of_each(features, input.boxes);
   const auto observe = [&](bool outside_only) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <system_error>
 #include <thread>
 
 namespace dkb {
@@ -209,7 +210,10 @@ TsdfVolume TsdfVolume::fuse(std::span<const PlacedView> views, const ViewCamera&
     for (size_t i = next++; i < volume.blocks_.size(); i = next++) fuser.fuse(&volume.blocks_[i]);
   };
   std::vector<std::thread> helpers;
-  for (int i = 1; i < options.threads; ++i) helpers.emplace_back(work);
+  try {
+    for (int i = 1; i < options.threads; ++i) helpers.emplace_back(work);
+  } catch (const std::system_error&) {  // the system has no more threads: those that there are do it all
+  }
   work();
   for (std::thread& t : helpers) t.join();
   return volume;

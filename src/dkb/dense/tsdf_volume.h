@@ -51,7 +51,7 @@ class TsdfVolume {
 
   // Fuses the views. Every view counts by the inverse variance of its depth. Blocks are made where a view sees a
   // surface, and every view then looks at all of them, whatever their order: what was a surface in some views and free
-  // space in more than `free_share` of them is not known, so that a person who slipped through the mask once is carved
+  // space in more than 8% of them is not known, so that a person who slipped through the mask once is carved
   // out by views from before and after. Nor is what was a surface for less than 0.2 s, as people are in the first
   // frames, before their motion can be told. Views are in the order of their time. Deterministic, also in the number of
   // threads.

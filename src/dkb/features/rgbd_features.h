@@ -19,10 +19,10 @@ struct Keypoint {
   Eigen::Vector2f pixel;        // [px] ideal (undistorted)
   Eigen::Vector2f image_pixel;  // [px] where it lies in the image as read
   float depth = 0;              // [m] along the optical axis at the colour image's time, 0 = unknown
-  float lent_depth = 0;  // [m] of the nearest surface around one of unknown depth, 0 = none; map files leave it out
-  float angle = 0;       // [rad]
+  float lent_depth = 0;         // [m] of the nearest surface around one of unknown depth, 0 = none
+  float angle = 0;              // [rad]
   float response = 0;
-  float place_sigma = 0;  // [px] see Corner; map files leave it out
+  float place_sigma = 0;  // [px] see Corner
   uint8_t octave = 0;
   Rgb colour;
 };

@@ -29,26 +29,26 @@ Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& ideal_pixel) const {
 
 namespace {
 
-// The rational model's factor is above / below, two polynomials in the squared tangent u of a ray's angle; their
-// slopes.
-struct RationalRadial {
+// The radial factor is above / below, two polynomials in the squared tangent u of a ray's angle; their slopes. Below is
+// 1 in Brown's model.
+struct Radial {
   double above, below, above_slope, below_slope;
 };
-RationalRadial rational_radial(const CameraModel& c, double u) {
+Radial radial_of(const CameraModel& c, double u) {
   return {1 + u * (c.k1 + u * (c.k2 + u * c.k3)), 1 + u * (c.k4 + u * (c.k5 + u * c.k6)),
           c.k1 + u * (2 * c.k2 + u * 3 * c.k3), c.k4 + u * (2 * c.k5 + u * 3 * c.k6)};
 }
 
-// The rational model turned round by Newton's method: its factor is steep towards the corners of a wide lens, where the
-// iteration that serves Brown's model is slow. Nothing where that does not settle.
-std::optional<Eigen::Vector2d> rational_ideal(const CameraModel& c, const Eigen::Vector2d& image_pixel) {
+// The distortion turned round by Newton's method, which serves where the factor is steep, towards the corners of a wide
+// lens. Nothing where it does not settle.
+std::optional<Eigen::Vector2d> ideal_pixel_of(const CameraModel& c, const Eigen::Vector2d& image_pixel) {
   Eigen::Vector2d at((image_pixel.x() - c.cx) / c.fx, (image_pixel.y() - c.cy) / c.fy);
   const auto pixel_of = [&] { return Eigen::Vector2d(c.fx * at.x() + c.cx, c.fy * at.y() + c.cy); };
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector2d off = image_pixel - c.distort(pixel_of());  // [px]
     if (off.norm() < 1e-9) return pixel_of();
     const double x = at.x(), y = at.y();
-    const RationalRadial r = rational_radial(c, at.squaredNorm());
+    const Radial r = radial_of(c, at.squaredNorm());
     const double radial = r.above / r.below, slope = (r.above_slope - radial * r.below_slope) / r.below;
     Eigen::Matrix2d jacobian;
     const double mixed = 2 * (slope * x * y + c.p1 * x + c.p2 * y);
@@ -61,25 +61,30 @@ std::optional<Eigen::Vector2d> rational_ideal(const CameraModel& c, const Eigen:
   return pixel_of();
 }
 
+// Brown's model turned round by dividing by its factor again and again; nothing where that does not settle. It comes
+// before Newton's method since map files hold pixels by how far they are from its answers, to the last bit.
+std::optional<Eigen::Vector2d> settled_brown(const CameraModel& c, const Eigen::Vector2d& image_pixel) {
+  const double xd = (image_pixel.x() - c.cx) / c.fx, yd = (image_pixel.y() - c.cy) / c.fy;
+  double x = xd, y = yd;
+  for (int i = 0; i < 20; ++i) {
+    const double r2 = x * x + y * y;
+    const double radial = 1.0 + r2 * (c.k1 + r2 * (c.k2 + r2 * c.k3));
+    const double nx = (xd - 2.0 * c.p1 * x * y - c.p2 * (r2 + 2.0 * x * x)) / radial;
+    const double ny = (yd - c.p1 * (r2 + 2.0 * y * y) - 2.0 * c.p2 * x * y) / radial;
+    const bool settled = std::abs(nx - x) + std::abs(ny - y) < 1e-10;
+    x = nx;
+    y = ny;
+    if (settled) return Eigen::Vector2d(c.fx * x + c.cx, c.fy * y + c.cy);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const {
   if (!distorted()) return image_pixel;
-  if (rational()) return rational_ideal(*this, image_pixel).value_or(image_pixel);
-  const double xd = (image_pixel.x() - cx) / fx, yd = (image_pixel.y() - cy) / fy;
-  double x = xd, y = yd;
-  for (int i = 0; i < 20; ++i) {
-    const double r2 = x * x + y * y;
-    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    if (!(std::abs(radial) > 1e-3)) return image_pixel;  // outside the range where the model can be inverted
-    const double nx = (xd - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial;
-    const double ny = (yd - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial;
-    const bool settled = std::abs(nx - x) + std::abs(ny - y) < 1e-10;
-    x = nx;
-    y = ny;
-    if (settled) break;
-  }
-  return {fx * x + cx, fy * y + cy};
+  if (rational()) return ideal_pixel_of(*this, image_pixel).value_or(image_pixel);
+  return settled_brown(*this, image_pixel).value_or(ideal_pixel_of(*this, image_pixel).value_or(image_pixel));
 }
 
 namespace {
@@ -90,7 +95,7 @@ bool rational_unfolded(const CameraModel& c, double u) {
   constexpr int kSteps = 24;
   for (int i = 1; i <= kSteps; ++i) {
     const double at = u * i / kSteps;
-    const RationalRadial r = rational_radial(c, at);
+    const Radial r = radial_of(c, at);
     if (!(r.below > 0 && r.above * r.below + 2 * at * (r.above_slope * r.below - r.above * r.below_slope) > 0))
       return false;
   }
@@ -111,13 +116,14 @@ bool unfolded(const CameraModel& c, double u) {
   return true;
 }
 
-// A ratio has poles: a calibration that puts one into the image would show walls where there are none.
+// A polynomial folds and a ratio has poles: a calibration that puts either into the image would show walls where there
+// are none.
 std::optional<Eigen::Vector2d> pixel_without_ray(const CameraModel& c) {
   constexpr int kGrid = 16;  // each ray is asked from the axis outwards, so a coarse grid meets every pole
   for (int row = 0; row <= kGrid; ++row)
     for (int column = 0; column <= kGrid; ++column) {
       const Eigen::Vector2d pixel(column * (c.width - 1.0) / kGrid, row * (c.height - 1.0) / kGrid);
-      const std::optional<Eigen::Vector2d> ideal = rational_ideal(c, pixel);
+      const std::optional<Eigen::Vector2d> ideal = ideal_pixel_of(c, pixel);
       if (!ideal || !unfolded(c, c.unproject(*ideal, 1).head<2>().squaredNorm())) return pixel;
     }
   return std::nullopt;
@@ -148,7 +154,7 @@ void CameraModel::check() const {
   require_option(std::isfinite(k4), "k4", k4, "finite");
   require_option(std::isfinite(k5), "k5", k5, "finite");
   require_option(std::isfinite(k6), "k6", k6, "finite");
-  require_option(!rational() || !pixel_without_ray(*this), "k4", k4,
+  require_option(!distorted() || !pixel_without_ray(*this), rational() ? "k4" : "k1", rational() ? k4 : k1,
                  "such that with the other coefficients every pixel has a ray, as through a lens");
   require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
                  "greater than 0 units per metre");
@@ -175,7 +181,7 @@ void CameraModel::set_distortion(const std::string& model, const std::vector<dou
       throw InputError(std::to_string(coefficients.size()) + " coefficients of distortion, 4 to " +
                        std::to_string(most) + " expected");
     for (size_t i = 0; i < std::min(most, coefficients.size()); ++i) *fields[i] = coefficients[i];
-    if (const auto pixel = made.rational() ? pixel_without_ray(made) : std::nullopt)
+    if (const auto pixel = made.distorted() ? pixel_without_ray(made) : std::nullopt)
       throw InputError("its coefficients of distortion give no ray at pixel (" +
                        std::to_string(std::lround(pixel->x())) + ", " + std::to_string(std::lround(pixel->y())) +
                        "), as no lens does");

@@ -6,6 +6,7 @@
 #include "dkb/geometry/rigid3.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -100,9 +101,28 @@ TEST(CameraModel, UndistortInvertsDistortOverTheWholeImage) {
     for (int y = 0; y < c.height; y += 40)
       for (int x = 0; x < c.width; x += 40) {
         const Eigen::Vector2d pixel(x, y);
-        EXPECT_NEAR((c.distort(c.undistort(pixel)) - pixel).norm(), 0, 1e-3) << name << " " << x << " " << y;
+        EXPECT_NEAR((c.distort(c.undistort(pixel)) - pixel).norm(), 0, 1e-6) << name << " " << x << " " << y;
       }
   }
+}
+
+TEST(CameraModel, UndistortInvertsDistortOfAWideLens) {
+  CameraModel c;
+  c.fx = c.fy = 300, c.k1 = -0.32, c.k2 = 0.09;  // the slope 1 - 0.96 u + 0.45 u^2 has no root: it does not fold
+  c.check();
+  for (int y = 0; y < c.height; y += 9)
+    for (int x = 0; x < c.width; x += 9) {
+      const Eigen::Vector2d pixel(x, y);
+      EXPECT_NEAR((c.distort(c.undistort(pixel)) - pixel).norm(), 0, 1e-6) << x << " " << y;
+    }
+}
+
+TEST(CameraModel, ThatFoldsWithinTheImageIsRefused) {
+  CameraModel c;
+  c.fx = c.fy = 300, c.k1 = -0.32;  // 1 - 0.96 u = 0 at tan = 1.02, which is 0.68 in the image; the corner is at 1.33
+  EXPECT_EQ(test::input_error_of([&] { c.check(); }).rfind("k1: ", 0), 0U);
+  EXPECT_THROW(c.set_distortion("plumb_bob", {-0.32, 0, 0, 0, 0}), InputError);
+  for (const char* name : {"fr1", "fr2", "fr3", "bonn"}) EXPECT_NO_THROW(builtin_camera(name)->check()) << name;
 }
 
 TEST(CameraModel, DistortsByHandComputedNumbers) {
@@ -228,8 +248,8 @@ TEST(RationalDistortion, WhatIsOfNoLensIsRefusedAndTheCameraIsAsItWas) {
             "its distortion model equidistant is none of ours (plumb_bob, rational_polynomial)");
   EXPECT_EQ(refused("plumb_bob", {0.1, 0, 0, 0, 0, 0.1}), "6 coefficients of distortion, 4 to 5 expected");
   EXPECT_EQ(refused("rational_polynomial", {0.1}), "1 coefficients of distortion, 4 to 8 expected");
-  EXPECT_EQ(refused("", {0.1, 0.2, 0.3, 0.4}), "taken");
-  EXPECT_EQ(c.p2, 0.4);
+  EXPECT_EQ(refused("", {0.1, 0.2, 0.03, 0.04}), "taken");
+  EXPECT_EQ(c.p2, 0.04);
   EXPECT_FALSE(c.rational());
   c.set_distortion("equidistant", {0, 0, 0, 0});
   EXPECT_FALSE(c.distorted());

@@ -53,8 +53,14 @@ bool AdaptiveKeyframePolicy::level_changed(const KeyframePoint& p, const Eigen::
                           options_.visibility_levels) != p.level;
 }
 
-// Normals and levels of the keyframe's points and the reference frame's counts: once per keyframe, when first asked
-// for.
+bool AdaptiveKeyframePolicy::stale(const Map& map) const {
+  return std::any_of(keyframe_points_.begin(), keyframe_points_.end(), [&map](const KeyframePoint& p) {
+    return map.point(p.id) == nullptr && map.resolve(p.id) != kNoPoint;
+  });
+}
+
+// Normals and levels of the keyframe's points and the reference frame's counts: when first asked for, and when points
+// were fused since.
 void AdaptiveKeyframePolicy::study_keyframe(KeyframeId id, const Map& map) {
   std::vector<KeyframeId> around = {id};
   for (const Covisible& c : map.keyframe(id)->covisible)
@@ -121,7 +127,7 @@ KeyframeDecision AdaptiveKeyframePolicy::decide(const KeyframeContext& q, const 
   SpreadVote spread;
   tests.votes_asked = tests.parallax && tests.waited && map.keyframe(q.last_keyframe) != nullptr;
   if (tests.votes_asked) {
-    if (studied_ != q.last_keyframe) study_keyframe(q.last_keyframe, map);
+    if (studied_ != q.last_keyframe || stale(map)) study_keyframe(q.last_keyframe, map);
     const Matches matches = match(q, cam_from_keyframe);
     counts = {matches.matches,    matches.changed,    q.tracked_points,
               reference_matches_, reference_changed_, reference_.tracked_points};

@@ -61,6 +61,8 @@ class AdaptiveKeyframePolicy final : public KeyframeDecider {
   };
 
   void study_keyframe(KeyframeId id, const Map& map);
+  // Whether a point of the keyframe was fused into another one since it was studied.
+  bool stale(const Map& map) const;
   const KeyframePoint* find(PointId id) const;
   bool level_changed(const KeyframePoint& point, const Eigen::Vector3d& camera_in_keyframe) const;
   Matches match(const KeyframeContext& query, const Rigid3& cam_from_keyframe) const;

@@ -16,6 +16,7 @@ constexpr int kSide = 20;  // points along each side of the wall
 class Wall {
  public:
   Wall() {
+    for (int i = 0; i < kSide * kSide; ++i) names_.push_back(make_point_id(0, i));
     Keyframe k;
     k.id = 0;
     k.features = look({});
@@ -51,6 +52,16 @@ class Wall {
   }
 
   const Map& map() const { return map_; }
+  // Every point becomes one that was born beside it, as when a loop closes.
+  void fuse_all() {
+    for (int i = 0; i < kSide * kSide; ++i) {
+      MapPoint p;
+      p.id = names_[static_cast<size_t>(i)] = make_point_id(0, kSide * kSide + i);
+      p.position = position(i);
+      map_.add_point(std::move(p));
+      map_.fuse(make_point_id(0, i), names_[static_cast<size_t>(i)]);
+    }
+  }
 
  private:
   static Eigen::Vector3d position(int i) { return {0.1 * (i % kSide) - 0.95, 0.1 * (i / kSide) - 0.95, 2}; }
@@ -62,14 +73,14 @@ class Wall {
       Keypoint k;
       k.pixel = k.image_pixel = CameraModel().project(cam_from_world * position(i)).cast<float>();
       features->keypoints.push_back(k);
-      points_.push_back(make_point_id(0, i));
+      points_.push_back(names_[static_cast<size_t>(i)]);
     }
     features->descriptors.resize(features->keypoints.size());
     return features;
   }
 
   std::shared_ptr<const RgbdFeatures> features_;
-  std::vector<PointId> points_;
+  std::vector<PointId> points_, names_;  // names_: by position on the wall
   Map map_;
 };
 
@@ -123,6 +134,18 @@ TEST(AdaptiveKeyframes, CountTheLevelsThatChanged) {
   const KeyframeDecision d = policy.decide(wall.query(2, moved_by(0.6)), wall.map());
   EXPECT_NE(d.explanation.find("changed 64 of 400 matches (reference 0 of 400, points 400 / 400)"), std::string::npos)
       << d.explanation;
+}
+
+TEST(AdaptiveKeyframes, KnowPointsThatWereFusedMeanwhile) {
+  Wall wall;
+  AdaptiveKeyframeOptions options = all_levels();
+  options.visibility_levels = 2;
+  AdaptiveKeyframePolicy policy(options, 640, 480);
+  policy.decide(wall.query(1, {}), wall.map());
+  policy.decide(wall.query(2, moved_by(0.6)), wall.map());
+  wall.fuse_all();
+  const KeyframeDecision d = policy.decide(wall.query(3, moved_by(1.2)), wall.map());
+  EXPECT_NE(d.explanation.find(" of 400 matches (reference 0 of 400,"), std::string::npos) << d.explanation;
 }
 
 TEST(AdaptiveKeyframes, WaitForTwoFrames) {

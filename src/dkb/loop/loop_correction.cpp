@@ -104,19 +104,25 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vect
         correction.same.emplace_back(own, point);
   }
   const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
+  const auto added = loop_edges(map, finding);
+  edges->insert(edges->end(), added.begin(), added.end());
   if (!finding.merge) {
-    const auto added = loop_edges(map, finding);
-    edges->insert(edges->end(), added.begin(), added.end());
     move_by_pose_graph(map, *edges, map.root(near), correction);
     return correction;
   }
-  Rigid3 moved_from_world = finding.support.front().fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;
+  const PlaceFit& fit = finding.support.front().fit;
+  Rigid3 moved_from_world = fit.cam_from_world.inverse() * map.keyframe(near)->cam_from_world;
+  Rigid3 near_cam_from_world = fit.cam_from_world;  // in the older map's world
   correction.near_joint = near;
   correction.far_joint = far;
   if (map.root(near) < map.root(far)) {  // the older map stays
     std::swap(correction.near_joint, correction.far_joint);
     moved_from_world = moved_from_world.inverse();
+    near_cam_from_world = map.keyframe(near)->cam_from_world;
   }
+  const Keyframe& stays = *map.keyframe(correction.far_joint);
+  correction.joint_covariance = carried(stays.cam_from_world.inverse(), stays.covariance) +
+                                carried(near_cam_from_world.inverse(), fit.covariance);
   const KeyframeId moving = map.root(correction.near_joint);
   for (KeyframeId id : map.live_keyframes()) {
     if (map.root(id) != moving) continue;

@@ -20,7 +20,7 @@ std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding);
 
 // How the map ought to move so that the loop closes: a pose graph over the essential graph (spanning tree, strong
 // covisibility, loops so far and now). Where two maps meet, the younger one moves as one piece onto the older one.
-// `edges`: those of earlier loops, to which a loop's own are added. Deterministic.
+// `edges`: those of earlier loops and merges, to which its own are added. Deterministic.
 MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vector<LoopEdge>* edges);
 
 }  // namespace dkb

@@ -104,6 +104,25 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   EXPECT_GT(of_the_border, 0);
 }
 
+// A motion ties the newest keyframe to one that takes no part.
+TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound - 4);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  std::vector<Keyframe> keyframes;
+  std::vector<MapPoint> points;
+  for (KeyframeId k = 0; k <= last; ++k) keyframes.push_back(*world.map.keyframe(k));
+  for (PointId p : world.map.live_points()) points.push_back(*world.map.point(p));
+  const Rigid3 back = world.map.keyframe(0)->cam_from_world * world.map.keyframe(last)->cam_from_world.inverse();
+  keyframes.back().motion =
+      std::make_shared<const KeyframeMotion>(KeyframeMotion{0, {back, false, Matrix6d::Identity()}});
+  const Map map = Map::restore(std::move(keyframes), std::move(points), {});
+  for (const MapCorrection::Pose& p : adjust_globally(map, world.optics(), {}, 60).poses)
+    if (p.keyframe == last) {
+      EXPECT_EQ(p.before.translation, p.after.translation);
+    }
+}
+
 // The edge of a loop holds what the culled keyframe rides on.
 TEST(LoopCorrection, EdgesOutliveTheirKeyframes) {
   RoundTrip world;
@@ -261,6 +280,7 @@ TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
     world.add(truth, truth * other_from_world.inverse(), k == 12);
   }
   ASSERT_EQ(world.map.roots().size(), 2U);
+  for (KeyframeId k = 0; k < 12; ++k) world.map.set_covariance(k, 1e-4 * Matrix6d::Identity());
   LoopCloser closer(world.optics(), {}, 1);
   const auto correction = closer.process(world.map, 23);
   ASSERT_TRUE(correction);
@@ -268,12 +288,28 @@ TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
   LocalMapper mapper = mapper_of(world, world.map);
   const MapView view = mapper.apply(*correction);
   EXPECT_EQ(view->roots(), std::vector<KeyframeId>{0});
+  for (KeyframeId k = 12; k < 24; ++k) {  // turns are as uncertain everywhere as at the joint
+    const double variance = view->keyframe(k)->covariance.bottomRightCorner<3, 3>().trace();
+    EXPECT_GT(variance, 3e-4) << "keyframe " << k;
+    EXPECT_LT(variance, 4e-4) << "keyframe " << k;
+  }
   for (KeyframeId k = 0; k < 12; ++k)
     EXPECT_EQ(view->cam_from_world(k).translation, world.map.cam_from_world(k).translation) << "the older one stays";
   for (KeyframeId k = 12; k < 24; ++k) EXPECT_LT(world.error(*view, k), 0.05) << "keyframe " << k;
   const Rigid3 before = world.map.cam_from_world(23) * world.map.cam_from_world(13).inverse();
   const Rigid3 after = view->cam_from_world(23) * view->cam_from_world(13).inverse();
   EXPECT_LT((before * after.inverse()).translation.norm(), 1e-9);
+}
+
+TEST(MapMerge, ItsEdgesAreRememberedAsThoseOfALoop) {
+  RoundTrip world;
+  world.go(12);
+  for (int k = 12; k < 24; ++k) world.add(RoundTrip::truth_at(k - 20), RoundTrip::truth_at(k - 20), k == 12);
+  const auto finding = find_loop(world.map, 23, world.optics(), {}, 1);
+  ASSERT_TRUE(finding && finding->merge);
+  std::vector<LoopEdge> edges;
+  correct_loop(world.map, *finding, &edges);
+  EXPECT_EQ(edges.size(), finding->support.size());
 }
 
 TEST(MapMerge, MapsThatShareNothingStayApart) {

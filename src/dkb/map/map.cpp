@@ -89,6 +89,15 @@ std::vector<KeyframeId> Map::roots() const {
   return ids;
 }
 
+std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
+  std::vector<KeyframeId> newest;
+  if (keyframe(id) == nullptr) return newest;
+  for (KeyframeId k = keyframe_count(); k-- > 0 && static_cast<int>(newest.size()) < most;)
+    if (live_keyframe(k) != nullptr && root(k) == root(id)) newest.push_back(k);
+  std::reverse(newest.begin(), newest.end());
+  return newest;
+}
+
 std::vector<KeyframeId> Map::live_keyframes() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)
@@ -272,8 +281,13 @@ void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   if (self == nullptr) return;
   std::vector<Covisible> found = observers_of(self->points);
   drop_covisible(found, id);
-  // The best one stays, however little they share.
-  while (found.size() > 1 && found.back().shared_points < min_shared_points) found.pop_back();
+  // The best one stays, however little they share, and whoever has nobody else.
+  const auto has_others = [&](const Covisible& c) {
+    const std::vector<Covisible>& its = keyframe(c.keyframe)->covisible;
+    return its.size() != 1 || its[0].keyframe != id;
+  };
+  for (size_t i = found.size(); i-- > 1 && found[i].shared_points < min_shared_points;)
+    if (has_others(found[i])) found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
   const std::vector<Covisible> before = std::exchange(edit(id).covisible, found);
   for (const Covisible& c : before)
     if (points_shared_with(c.keyframe, found) == 0) drop_covisible(edit(c.keyframe).covisible, id);

@@ -117,6 +117,8 @@ class Map {
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;   // must exist
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
+  // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.
+  std::vector<KeyframeId> newest_beside(KeyframeId id, int most) const;
   // The keyframes that see these points, by decreasing number of them, then increasing id. Points that are unknown are
   // seen by none.
   std::vector<Covisible> observers_of(const std::vector<PointId>& points) const;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Format 2; format 1, which is read too, ends after section POIN. All numbers are little-endian; a varint has 7 bits
-// per byte, low ones first; zigzag is a signed varint; floats are IEEE 754, bit for bit; "packed" is the entropy coding
-// of entropy_coder.h.
+// Format 3. Formats 1 and 2 are read too: they have neither lent depths nor place sigmas, which are 0 then, and format
+// 1 ends after section POIN. All numbers are little-endian; a varint has 7 bits per byte, low ones first; zigzag is a
+// signed varint; floats are IEEE 754, bit for bit; "packed" is the entropy coding of entropy_coder.h.
 //
 //   file     "DKBMAP\r\n", format u32, sections u32, CRC-32C u32 of these 16 bytes, then the sections in this order:
 //   section  tag (4 letters), length u64 of the content, CRC-32C u32 of tag, length and content, content
@@ -16,7 +16,8 @@
 //   DESC  the descriptors of all features of the live keyframes in turn: 4 x u64 each
 //   FEAT  the other fields of the same features, field by field: image pixel x, y packed floats;
 //         pixel x, y as distance, in floats, from where the camera's UndistortionTable puts the image pixel:
-//         words (sign in the low bit), packed; depth, angle, response packed floats;
+//         words (sign in the low bit), packed; depth, or minus the lent depth where it has none, angle, response,
+//         place sigma packed floats;
 //         octave packed, as difference to the feature before; colour g, r - g, b - g packed;
 //         point seen: age (keyframe - birth keyframe) as zigzag + 1, 0 = none, length u64 and packed;
 //         birth features u16 of those that see one (minus the own index where the age is 0), low and high bytes packed
@@ -51,7 +52,7 @@ namespace {
 
 // The line end shows a transfer that "converted" the file.
 constexpr std::string_view kMagic("DKBMAP\r\n", 8);
-constexpr uint32_t kFormat = 2;
+constexpr uint32_t kFormat = 3;
 constexpr size_t kPreamble = 20;
 constexpr const char* kRemedy = "; take it from a backup or make the map anew";
 
@@ -62,7 +63,12 @@ std::string section_header(std::string_view tag, size_t length) {
   return header.bytes();
 }
 
-std::array<std::string_view, MapSections::kCount> split(std::string_view bytes) {
+struct Split {
+  std::array<std::string_view, MapSections::kCount> sections;
+  uint32_t format;
+};
+
+Split split(std::string_view bytes) {
   if (bytes.substr(0, kMagic.size()) != kMagic) {
     if (bytes.substr(0, 6) == kMagic.substr(0, 6))
       throw InputError("its line ends were converted on the way; copy it in binary mode");
@@ -74,7 +80,7 @@ std::array<std::string_view, MapSections::kCount> split(std::string_view bytes) 
   if (preamble.u32() != crc32c(bytes.substr(0, 16)))
     throw InputError("the head of the file is damaged" + std::string(kRemedy));
   if (format < 1 || format > kFormat)
-    throw InputError("is of map format " + std::to_string(format) + ", this program reads formats 1 and " +
+    throw InputError("is of map format " + std::to_string(format) + ", this program reads formats 1 to " +
                      std::to_string(kFormat) + "; use the version of dkb-slam that wrote it");
   const size_t expected = format == 1 ? MapSections::kOfFormat1 : MapSections::kCount;
   if (count != expected) throw InputError(fmt::format("has {} sections instead of {}{}", count, expected, kRemedy));
@@ -94,7 +100,7 @@ std::array<std::string_view, MapSections::kCount> split(std::string_view bytes) 
       throw InputError("the checksum of section " + tag + " is wrong: the file is damaged" + kRemedy);
   }
   if (in.left() > 0) throw InputError("has " + std::to_string(in.left()) + " bytes too many at its end" + kRemedy);
-  return sections;
+  return {sections, format};
 }
 
 }  // namespace
@@ -130,14 +136,14 @@ std::string encode_map(const Map& map, const MapFileContext& context) {
 }
 
 MapFile decode_map(std::string_view bytes, const std::string& name) {
-  std::array<std::string_view, MapSections::kCount> sections;
+  Split file;
   try {
-    sections = split(bytes);
+    file = split(bytes);
   } catch (const InputError& e) {
     throw InputError(name + ": " + e.what());
   }
   try {
-    return read_sections(sections);
+    return read_sections(file.sections, file.format);
   } catch (const InputError& e) {
     throw InputError(name + ": the checksums are right but the content is not: " + e.what() + kRemedy);
   }

@@ -44,7 +44,7 @@ int mutations(int usual) {
 using Contents = std::array<std::string, MapSections::kCount>;
 
 // The file of these sections, with right checksums.
-std::string sealed(const Contents& contents, uint32_t format = 2, size_t count = MapSections::kCount) {
+std::string sealed(const Contents& contents, uint32_t format = 3, size_t count = MapSections::kCount) {
   ByteWriter preamble;
   preamble.raw(encode_map(Map(), MapFileContext()).substr(0, 8));
   preamble.u32(format);
@@ -308,14 +308,48 @@ TEST(MapFile, ForeignFilesAreNamedAsSuch) {
 }
 
 TEST(MapFile, NewerFormatsAreRefusedByNumber) {
-  EXPECT_EQ(complaint(sealed(write_sections(Map(), fr1_context()).bytes, 3)),
-            "a.dkb: is of map format 3, this program reads formats 1 and 2; use the version of dkb-slam that wrote it");
+  EXPECT_EQ(complaint(sealed(write_sections(Map(), fr1_context()).bytes, 4)),
+            "a.dkb: is of map format 4, this program reads formats 1 to 3; use the version of dkb-slam that wrote it");
 }
 
-// Files of format 1 have neither motions nor planes, which the map does without.
-TEST(MapFile, TheOlderFormatIsRead) {
+// The sections of `map` as format 2 has them: without lent depths and place sigmas.
+Contents of_format_2(const Map& map) {
+  std::vector<float> depth, depth_or_lent, place_sigma;
+  for (KeyframeId id : map.live_keyframes())
+    for (const Keypoint& k : map.keyframe(id)->features->keypoints) {
+      depth.push_back(k.depth);
+      depth_or_lent.push_back(k.depth > 0 ? k.depth : -k.lent_depth);
+      place_sigma.push_back(k.place_sigma);
+    }
+  const auto packed = [](const std::vector<float>& column) {
+    ByteWriter out;
+    write_packed_floats(out, column);
+    return out.bytes();
+  };
+  Contents contents = write_sections(map, fr1_context()).bytes;
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    contents[3].replace(contents[3].find(from), from.size(), to);
+  };
+  replace(packed(depth_or_lent), packed(depth));
+  replace(packed(place_sigma), "");
+  return contents;
+}
+
+// Files of format 2 do not have all of a feature, those of format 1 neither motions nor planes, which the map does
+// without.
+TEST(MapFile, TheOlderFormatsAreRead) {
   const Map map = test::random_map(5, 12, 40, 15);
-  const Contents contents = write_sections(map, fr1_context()).bytes;
+  const Contents contents = of_format_2(map);
+  const MapFile before = decode_map(sealed(contents, 2), "a.dkb");
+  for (KeyframeId id : map.live_keyframes())
+    for (size_t f = 0; f < map.keyframe(id)->features->size(); ++f) {
+      const Keypoint &saved = map.keyframe(id)->features->keypoints[f],
+                     &read = before.map.keyframe(id)->features->keypoints[f];
+      ASSERT_EQ(read.depth, saved.depth);
+      ASSERT_EQ(read.colour, saved.colour);
+      ASSERT_EQ(read.lent_depth, 0);
+      ASSERT_EQ(read.place_sigma, 0);
+    }
   const MapFile older = decode_map(sealed(contents, 1, MapSections::kOfFormat1), "a.dkb");
   EXPECT_EQ(older.map.live_points(), map.live_points());
   for (KeyframeId id = 0; id < older.map.keyframe_count(); ++id) {

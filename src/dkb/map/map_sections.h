@@ -22,9 +22,9 @@ struct MapSections {
 // Throws std::logic_error for a map that no file can hold.
 MapSections write_sections(const Map& map, const MapFileContext& context);
 
-// Throws InputError, without a file name, when the sections are not those of a map. Format 1 has none of the last two:
-// they are empty then.
-MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections);
+// Throws InputError, without a file name, when the sections are not those of a map of this format. Format 1 has none of
+// the last two: they are empty then.
+MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections, uint32_t format);
 
 bool sound(const Rigid3& pose);  // finite, its quaternion of unit norm
 void write_pose(ByteWriter& out, const Rigid3& pose);

@@ -130,12 +130,14 @@ Keyframes read_keyframes(std::string_view bytes, size_t descriptor_bytes) {
 
 // Features of the live keyframes, in turn.
 std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::string_view descriptors,
-                                                         const Keyframes& keyframes, const CameraModel& camera) {
+                                                         const Keyframes& keyframes, const CameraModel& camera,
+                                                         uint32_t format) {
   const UndistortionTable undistort(camera);
   const size_t n = keyframes.features;
   const auto image_x = read_packed_floats(in, n), image_y = read_packed_floats(in, n);
   const auto step_x = read_packed_words(in, n), step_y = read_packed_words(in, n);
   const auto depth = read_packed_floats(in, n), angle = read_packed_floats(in, n), response = read_packed_floats(in, n);
+  const auto place_sigma = format >= 3 ? read_packed_floats(in, n) : std::vector<float>(n);
   const std::string octave = read_packed(in, n);
   const ColourColumns colour(in, n);
   ByteReader descriptor_reader(descriptors, "section DESC");
@@ -154,9 +156,13 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
         in.fail("has a feature far outside its image");
       const Eigen::Vector2f prediction = undistort(image_x[i], image_y[i]);
       p.pixel = {stepped(prediction.x(), step_x[i]), stepped(prediction.y(), step_y[i])};
-      p.depth = depth[i];
+      if (format >= 3 && depth[i] < 0)
+        p.lent_depth = -depth[i];
+      else
+        p.depth = depth[i];
       p.angle = angle[i];
       p.response = response[i];
+      p.place_sigma = place_sigma[i];
       p.octave = octave_before = static_cast<uint8_t>(octave_before + static_cast<uint8_t>(octave[i]));
       p.colour = colour[i];
       features->descriptors[f] = read_descriptor(descriptor_reader);
@@ -201,9 +207,9 @@ void read_points_seen(ByteReader& in, Keyframes& keyframes) {
 }
 
 void read_feature_section(std::string_view bytes, std::string_view descriptors, const MapFileContext& context,
-                          Keyframes& keyframes) {
+                          uint32_t format, Keyframes& keyframes) {
   ByteReader in(bytes, "section FEAT");
-  auto features = read_features(in, descriptors, keyframes, context.camera);
+  auto features = read_features(in, descriptors, keyframes, context.camera, format);
   size_t live = 0;
   for (Keyframe& k : keyframes.all) {
     if (!k.culled) {
@@ -284,12 +290,12 @@ Rigid3 read_pose(ByteReader& in) {
   return pose;
 }
 
-MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections) {
+MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections, uint32_t format) {
   const auto [head, keyframe_bytes, descriptors, feature_bytes, point_bytes, motions, planes] = sections;
   MapFile file;
   file.context = read_head(head);
   Keyframes keyframes = read_keyframes(keyframe_bytes, descriptors.size());
-  read_feature_section(feature_bytes, descriptors, file.context, keyframes);
+  read_feature_section(feature_bytes, descriptors, file.context, format, keyframes);
   if (!motions.empty()) read_motion_section(motions, keyframes.all);
   if (!planes.empty()) read_plane_section(planes, file.context.camera, keyframes.all);
   Points points = read_points(point_bytes);

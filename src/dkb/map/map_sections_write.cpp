@@ -121,7 +121,7 @@ void write_points_seen(ByteWriter& out, const Map& map) {
 
 std::string feature_section(const Map& map, const MapFileContext& context) {
   const UndistortionTable undistort(context.camera);
-  std::vector<float> image_x, image_y, depth, angle, response;
+  std::vector<float> image_x, image_y, depth, angle, response, place_sigma;
   std::vector<uint32_t> step_x, step_y;
   std::string octave;
   ColourColumns colour;
@@ -133,9 +133,10 @@ std::string feature_section(const Map& map, const MapFileContext& context) {
       image_y.push_back(k.image_pixel.y());
       step_x.push_back(step_from(prediction.x(), k.pixel.x()));
       step_y.push_back(step_from(prediction.y(), k.pixel.y()));
-      depth.push_back(k.depth);
+      depth.push_back(k.depth > 0 ? k.depth : -k.lent_depth);
       angle.push_back(k.angle);
       response.push_back(k.response);
+      place_sigma.push_back(k.place_sigma);
       octave.push_back(static_cast<char>(k.octave - octave_before));
       octave_before = k.octave;
       colour.add(k.colour);
@@ -145,7 +146,7 @@ std::string feature_section(const Map& map, const MapFileContext& context) {
   write_packed_floats(out, image_y);
   write_packed_words(out, step_x);
   write_packed_words(out, step_y);
-  for (const auto* column : {&depth, &angle, &response}) write_packed_floats(out, *column);
+  for (const auto* column : {&depth, &angle, &response, &place_sigma}) write_packed_floats(out, *column);
   write_packed(out, octave);
   colour.write(out);
   write_points_seen(out, map);
@@ -225,7 +226,9 @@ std::string flaw_of(const Keyframe& keyframe, int levels) {
   if (!keyframe.features) return "";
   for (const Keypoint& k : keyframe.features->keypoints) {
     if (!sound(k.pixel) || !sound(k.image_pixel)) return name + " has a feature far outside its image";
-    if (!std::isfinite(k.depth) || k.depth < 0) return name + " has a feature with an impossible depth";
+    for (float depth : {k.depth, k.lent_depth})
+      if (!std::isfinite(depth) || depth < 0) return name + " has a feature with an impossible depth";
+    if (!std::isfinite(k.place_sigma) || k.place_sigma < 0) return name + " has a feature of impossible accuracy";
     if (!std::isfinite(k.angle) || !std::isfinite(k.response)) return name + " has a feature that is not finite";
     if (k.octave >= levels) return name + " has a feature above the pyramid's levels";
   }

@@ -214,13 +214,20 @@ TEST(Map, CovisibilityCountsSharedPointsAndIsMirrored) {
   EXPECT_EQ(broken_invariant(world.map), "");
 }
 
-TEST(Map, TooWeakCovisibilityLeavesOnlyTheBestEdge) {
+TEST(Map, TooWeakCovisibilityLeavesTheBestEdgeAndThoseOfKeyframesThatHaveNoOther) {
   ThreeKeyframes world;
   world.map.update_covisibility(1, 1);
   world.map.update_covisibility(1, 4);
+  ASSERT_EQ(world.map.keyframe(1)->covisible.size(), 2u);
+  EXPECT_EQ(world.map.keyframe(1)->covisible[0].keyframe, 0);
+  ASSERT_EQ(world.map.keyframe(2)->covisible.size(), 1u) << "it has nobody else";
+  EXPECT_EQ(broken_invariant(world.map), "");
+  world.map.update_covisibility(2, 1);  // it shares a with 0, too
+  world.map.update_covisibility(1, 4);
   ASSERT_EQ(world.map.keyframe(1)->covisible.size(), 1u);
   EXPECT_EQ(world.map.keyframe(1)->covisible[0].keyframe, 0);
-  EXPECT_TRUE(world.map.keyframe(2)->covisible.empty());
+  ASSERT_EQ(world.map.keyframe(2)->covisible.size(), 1u);
+  EXPECT_EQ(world.map.keyframe(2)->covisible[0].keyframe, 0);
   EXPECT_EQ(broken_invariant(world.map), "");
 }
 
@@ -479,6 +486,17 @@ TEST(Map, TheRootIsTheEndOfTheWayUp) {
     EXPECT_EQ(root.id, parent == kNoKeyframe ? k : map.root(parent));
   }
   EXPECT_THROW(map.root(10), std::logic_error);
+}
+
+TEST(Map, TheNewestBesideAKeyframeAreOfItsOwnMap) {
+  ThreeKeyframes m;
+  Keyframe apart = keyframe_at(3, 0);
+  apart.parent = kNoKeyframe;
+  m.map.add_keyframe(apart);
+  EXPECT_EQ(m.map.newest_beside(0, 2), (std::vector<KeyframeId>{1, 2}));
+  EXPECT_EQ(m.map.newest_beside(3, 2), std::vector<KeyframeId>{3});
+  EXPECT_TRUE(m.map.newest_beside(kNoKeyframe, 2).empty());
+  EXPECT_TRUE(m.map.newest_beside(4, 2).empty());
 }
 
 TEST(Map, KeyframesWithoutAParentAreTheRoots) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -50,7 +51,8 @@ void write(ByteWriter& out, const Descriptor& d) {
 void write(ByteWriter& out, const RgbdFeatures& features) {
   for (size_t i = 0; i < features.size(); ++i) {
     const Keypoint& k = features.keypoints[i];
-    for (float v : {k.pixel.x(), k.pixel.y(), k.image_pixel.x(), k.image_pixel.y(), k.depth, k.angle, k.response})
+    for (float v : {k.pixel.x(), k.pixel.y(), k.image_pixel.x(), k.image_pixel.y(), k.depth, k.angle, k.response,
+                    k.lent_depth, k.place_sigma})
       write(out, v);
     out.u8(k.octave);
     write(out, k.colour);
@@ -182,8 +184,10 @@ std::shared_ptr<const RgbdFeatures> random_features(Random& random, int count, c
     if (!follow) k.pixel += Eigen::Vector2f{static_cast<float>(random.normal()), static_cast<float>(random.normal())};
     k.depth = random.below(5) == 0 ? 0.0f : static_cast<float>(random.below(20000)) / 5000.0f;
     k.angle = static_cast<float>(random.uniform(0, 6.28));
-    k.response = static_cast<float>(random.uniform(20, 200));
+    k.response = std::floor(static_cast<float>(random.uniform(20, 80)));
     k.octave = static_cast<uint8_t>(i * 8 / count);  // extraction goes level by level
+    k.place_sigma = 0.1f * k.angle;
+    if (k.depth == 0) k.lent_depth = k.response / 50.0f;
     const auto grey = static_cast<uint8_t>(random.below(240));
     k.colour = {static_cast<uint8_t>(grey + random.below(16)), grey, static_cast<uint8_t>(grey + random.below(16))};
     features->keypoints.push_back(k);

@@ -53,9 +53,13 @@ void move_map(Map& map, const MapCorrection& correction) {
     }
     moved.normal = (moves.rotation * moved.normal.cast<double>()).cast<float>();
   }
-  for (KeyframeId id : map.live_keyframes())
-    if (motion[static_cast<size_t>(id)])
-      map.set_pose(id, map.keyframe(id)->cam_from_world * motion[static_cast<size_t>(id)]->inverse());
+  for (KeyframeId id : map.live_keyframes()) {
+    if (!motion[static_cast<size_t>(id)]) continue;
+    map.set_pose(id, map.keyframe(id)->cam_from_world * motion[static_cast<size_t>(id)]->inverse());
+    if (correction.near_joint != kNoKeyframe)
+      map.set_covariance(
+          id, map.keyframe(id)->covariance + carried(map.keyframe(id)->cam_from_world, correction.joint_covariance));
+  }
   for (const MapCorrection::Outlier& s : correction.outliers)
     if (map.point(s.point) != nullptr) map.forget(s.point, s.keyframe);  // what it was fused into may be right there
   if (correction.near_joint != kNoKeyframe) {

@@ -26,7 +26,7 @@ struct MapCorrection {
   enum class Kind { loop, merge, adjustment };
 
   Kind kind = Kind::adjustment;
-  std::vector<Pose> poses;                        // by increasing keyframe
+  std::vector<Pose> poses;                        // each keyframe once, in any order
   std::vector<Position> positions;                // by increasing point; other points follow a keyframe that sees them
   std::vector<Outlier> outliers;                  // to be forgotten
   std::vector<std::pair<PointId, PointId>> same;  // pairs of points that are one
@@ -34,6 +34,8 @@ struct MapCorrection {
   std::vector<KeyframeId> near_side, far_side;
   // Of a merge: the map of `near_joint` becomes part of the other one, `near_joint` a child of `far_joint`.
   KeyframeId near_joint = kNoKeyframe, far_joint = kNoKeyframe;
+  // Of a merge: of how the map that moves lies in the other one, in that one's axes, [translation m, rotation rad].
+  Matrix6d joint_covariance = Matrix6d::Zero();
 };
 
 // Moves keyframes and points of `map`, and hangs one tree on another where two maps merge. What mapping did since the

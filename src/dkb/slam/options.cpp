@@ -98,8 +98,8 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
         "[m] distances to a surface are kept up to here, 2 to 20 voxels", above(0));
   visit("dense.max_depth", p.dense.max_depth, o.dense.max_depth, "[m] depths beyond tell of free space only",
         Range{0.5, 16});
-  visit("dense.grid_cell", p.dense.grid_cell, o.dense.grid_cell, "[m] side of a cell of the occupancy grid",
-        Range{0.01, 1});
+  visit("dense.grid_cell", p.dense.grid_cell, o.dense.grid_cell,
+        "[m] side of a cell of the occupancy grid, at least 2 voxels", Range{0.01, 1});
   visit("dense.obstacle_low", p.dense.obstacle_low, o.dense.obstacle_low,
         "[m] above the floor: what is lower can be driven over", above(0));
   visit("dense.obstacle_high", p.dense.obstacle_high, o.dense.obstacle_high,
@@ -344,6 +344,9 @@ void Options::check() const {
                  features.fast_threshold, "at least features.fast_threshold_min");
   require_option(dense.truncation >= 2 * dense.voxel && dense.truncation <= 20 * dense.voxel, "dense.truncation",
                  dense.truncation, "2 ... 20 times dense.voxel");
+  // A wall of coarser voxels has not the vertices in every cell that make it an obstacle.
+  require_option(dense.grid_cell >= 2 * dense.voxel, "dense.grid_cell", dense.grid_cell,
+                 "at least 2 times dense.voxel");
   require_option(dense.obstacle_high > dense.obstacle_low, "dense.obstacle_high", dense.obstacle_high,
                  "above dense.obstacle_low");
 }

@@ -140,6 +140,7 @@ TEST(Options, ErrorsNameTheWholeKey) {
   rejects("noise.pixel_sigma", [](auto& o) { o.noise.pixel_sigma = std::nan(""); });
   rejects("tracking.min_inliers", [](auto& o) { o.tracking.min_inliers = 0; });
   rejects("dense.truncation", [](auto& o) { o.dense.truncation = 3; });
+  rejects("dense.grid_cell", [](auto& o) { o.dense.voxel = 0.03, o.dense.truncation = 0.12; });
   rejects("dense.obstacle_high", [](auto& o) { o.dense.obstacle_high = 0.05; });
   rejects("pipeline.mapper_latency", [](auto& o) { o.pipeline.mapper_latency = 0; });
   rejects("pipeline.mapper_latency", [](auto& o) { o.pipeline.mapper_latency = 10.1; });

@@ -131,6 +131,7 @@ class Pipeline {
     FrameIndex frame = 0;
     int64_t stamp_ns = 0;
   };
+  static LastKeyframe last_keyframe_of(const Map& map, KeyframeId id);
   KeyframeId next_keyframe_ = 0;
   LastKeyframe last_keyframe_;
   // Looked up where the view or the reference changes.

@@ -51,7 +51,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       loop_(optics_of(context), options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
   tracker_.set_start(options_.base_from_cam.inverse());
   loop_.start_at(next_keyframe_);
-  last_keyframe_.id = next_keyframe_ - 1;
+  last_keyframe_ = last_keyframe_of(map, next_keyframe_ - 1);
   if (next_keyframe_ > 0) {
     tracker_.take_view(map.snapshot());
     tracker_.reset_motion();
@@ -160,10 +160,8 @@ Expectation Pipeline::expect(const Frame& frame) const {
   expected.cam_from_world = expected.current_from_previous() * last->cam_from_world;
   if (scenes_.keyframes_looked_at() == 0) return expected;
   const Map& map = tracker_.map().view();
-  const auto keyframes = map.live_keyframes();
-  const size_t count = std::min(keyframes.size(), static_cast<size_t>(scenes_.keyframes_looked_at()));
-  for (size_t n = keyframes.size() - count; n < keyframes.size(); ++n) {
-    const Keyframe& k = *map.keyframe(keyframes[n]);
+  for (KeyframeId id : map.newest_beside(last->reference, scenes_.keyframes_looked_at())) {
+    const Keyframe& k = *map.keyframe(id);
     const Rigid3 cam_from_keyframe = expected.cam_from_world * k.cam_from_world.inverse();
     for (const Keypoint& p : k.features->keypoints)
       if (p.depth > 0)
@@ -258,11 +256,17 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   tracker_.retract(evidence_.weigh(tracked.timestamp, matched, on_mover));
 }
 
+Pipeline::LastKeyframe Pipeline::last_keyframe_of(const Map& map, KeyframeId id) {
+  const Keyframe* k = map.keyframe(id);
+  if (k == nullptr) return {id, 0, 0};
+  return {id, k->frame, ns_from_seconds(k->timestamp)};
+}
+
 KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracked) {
   if (!tracked.tracked()) return {};
   if (tracked.state == TrackingState::relocalised) {
     last_relocalisation_ = tracked.index;
-    last_keyframe_.id = tracked.reference;
+    last_keyframe_ = last_keyframe_of(tracker_.map().view(), tracked.reference);
   }
   const Stopwatch watch;
   KeyframeDecision decision;
