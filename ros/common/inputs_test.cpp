@@ -36,8 +36,8 @@ TEST(CameraInfo, OtherModelsAndMissingCalibrationsAreRefused) {
   EXPECT_EQ(camera_of(other, false).k3, 0.3);
   other.d = {0.5, -2.6, 0.0007, -0.0002, 1.5, 0.38, -2.45, 1.43};  // Azure Kinect's
   EXPECT_EQ(camera_of(other, false).k6, 1.43);
-  other.distortion_model = "", other.d = {0.1, 0, 0, 0.2};
-  EXPECT_EQ(camera_of(other, false).p2, 0.2);
+  other.distortion_model = "", other.d = {0.1, 0, 0, 0.02};
+  EXPECT_EQ(camera_of(other, false).p2, 0.02);
   other.distortion_model = "equidistant";
   EXPECT_THROW(camera_of(other, false), dkb::InputError);
   other.d = {0, 0, 0, 0};  // of no consequence without coefficients

@@ -26,12 +26,12 @@ std::string parse_message(const std::string& text) {
 }
 
 TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
-  const CameraModel c = parse_camera(kCamera + "k1: -0.5\r\nfps: 15 # slow\ndepth_max: 4\n", "camera.yaml");
+  const CameraModel c = parse_camera(kCamera + "k1: -0.05\r\nfps: 15 # slow\ndepth_max: 4\n", "camera.yaml");
   EXPECT_EQ(c.fx, 517.3);
   EXPECT_EQ(c.cy, 255.3);
   EXPECT_EQ(c.width, 640);
   EXPECT_EQ(c.depth_factor, 5000);
-  EXPECT_EQ(c.k1, -0.5);
+  EXPECT_EQ(c.k1, -0.05);
   EXPECT_EQ(c.k2, 0);
   EXPECT_EQ(c.fps, 15);
   EXPECT_EQ(c.depth_max, 4);
