@@ -443,7 +443,7 @@ export class View {
       behind.sub(at).setLength(2 * Math.max(0.5, this.whole.radius)).add(this.whole.at);
       at.copy(this.whole.at);
     }
-    const share = this.still.matches ? 1 : 0.12;
+    const share = this.still.matches ? 1 : this.whole ? 0.03 : 0.12; // the whole map comes within two seconds
     if (behind.distanceTo(this.camera.position) + at.distanceTo(this.controls.target) < 1e-3) return;
     this.camera.position.lerp(behind, share);
     this.controls.target.lerp(at, share);
