@@ -5,7 +5,6 @@
 
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "dkb/simulator/sequence_writer.h"
@@ -35,17 +34,18 @@ void run_simulate(const SimulateArguments& arguments) {
       if (open) std::fputs("\n", stderr);
     }
   };
-  std::optional<Line> line(std::in_place);
   const Interrupt interrupt([] {});
   NewFolder folder(arguments.out);
-  write_sequence(simulator, arguments.out, [&](int written) {
-    Interrupt::check();
-    if (!line->live) return;
-    std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
-    line->open = true;
-  });
+  {
+    Line line;
+    write_sequence(simulator, arguments.out, [&](int written) {
+      Interrupt::check();
+      if (!line.live) return;
+      std::fprintf(stderr, "\rframe %d of %d", written, simulator.frames());
+      line.open = true;
+    });
+  }
   folder.keep();
-  line.reset();
   std::printf(
       "%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
       arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),

@@ -375,7 +375,6 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
   return found;
 }
 
-// After a service: the images that follow may have any stamps.
 // Throws what the library throws, and changes nothing then.
 void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
   slam.load_map(map);
@@ -383,6 +382,7 @@ void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
   loaded_maps_ = slam.statistics().maps;
 }
 
+// After a service: the images that follow may have any stamps.
 void SlamCore::begin_anew() {
   forget_motion();
   const std::lock_guard lock(input_mutex_);

@@ -66,7 +66,6 @@ void check_no_network(const DetectorChoice& choice) {
 }
 
 void check_kinds(const DetectorChoice& choice, bool has_model) {
-  inference_named(choice.inference);
   const std::vector<std::string> kinds = detector_kinds(choice.kinds, has_model);
   const auto has = [&](const char* kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
   if (!has("yolo")) check_no_network(choice);

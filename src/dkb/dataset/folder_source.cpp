@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "dkb/dataset/camera_file.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/quantile.h"
 
 namespace dkb {
 namespace {
@@ -30,11 +29,10 @@ std::string doubt_of_stamps(const TumDataset& dataset) {
   for (size_t i = 1; i < dataset.pairs.size(); ++i)
     intervals.push_back(dataset.pairs[i].timestamp - dataset.pairs[i - 1].timestamp);
   if (intervals.empty()) return "";
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  if (*middle <= kSlow) return "";
+  const double median = upper_median(intervals);
+  if (median <= kSlow) return "";
   return fmt::format("{}: the stamps of {} are {:g} s apart in the median; they must be in seconds",
-                     dataset.folder.string(), dataset.list, *middle);
+                     dataset.folder.string(), dataset.list, median);
 }
 
 }  // namespace

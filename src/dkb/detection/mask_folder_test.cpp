@@ -55,6 +55,11 @@ class MaskFolderTest : public testing::Test {
       for (int x = 20; x < 30; ++x) mask(x, y) = 200;
     return mask;
   }
+  static Detections at(MaskFolder& detector, int64_t stamp_ns) {
+    DetectorInput image;
+    image.stamp_ns = stamp_ns;
+    return detector.detect(image);
+  }
   fs::path folder_;
 };
 
@@ -62,14 +67,11 @@ TEST_F(MaskFolderTest, GivesTheMaskOfTheStampAndItsBoxes) {
   touch("12.500000.png");
   touch("notes.txt");
   MaskFolder detector(folder_, square, {12.4, 12.5, 12.6}, 40, 30);
-  DetectorInput image;
-  image.stamp_ns = 12'500'000'000;
-  const Detections found = detector.detect(image);
+  const Detections found = at(detector, 12'500'000'000);
   EXPECT_EQ(found.boxes, (std::vector<Detection>{{"mover", {20, 5, 10, 10}, 1.0f}}));
   EXPECT_EQ(found.mask(20, 5), 255);
   EXPECT_EQ(found.mask(19, 5), 0);
-  image.stamp_ns = 12'600'000'000;
-  EXPECT_TRUE(detector.detect(image).mask.empty());
+  EXPECT_TRUE(at(detector, 12'600'000'000).mask.empty());
 }
 
 TEST_F(MaskFolderTest, FoldersThatCannotServeAreRefusedAtOnce) {
@@ -93,9 +95,7 @@ TEST_F(MaskFolderTest, EveryValueAboveZeroIsAMover) {
     return mask;
   };
   MaskFolder detector(folder_, ones, {1.0}, 40, 30);
-  DetectorInput image;
-  image.stamp_ns = 1'000'000'000;
-  const Detections found = detector.detect(image);
+  const Detections found = at(detector, 1'000'000'000);
   EXPECT_EQ(found.boxes, (std::vector<Detection>{{"mover", {0, 0, 20, 30}, 1.0f}}));
   EXPECT_EQ(found.mask(0, 0), 255);
   EXPECT_EQ(found.mask(20, 0), 0);

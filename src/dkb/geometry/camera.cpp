@@ -83,8 +83,7 @@ std::optional<Eigen::Vector2d> settled_brown(const CameraModel& c, const Eigen::
 
 Eigen::Vector2d CameraModel::undistort(const Eigen::Vector2d& image_pixel) const {
   if (!distorted()) return image_pixel;
-  if (rational()) return ideal_pixel_of(*this, image_pixel).value_or(image_pixel);
-  if (const auto ideal = settled_brown(*this, image_pixel)) return *ideal;
+  if (const auto ideal = rational() ? std::nullopt : settled_brown(*this, image_pixel)) return *ideal;
   return ideal_pixel_of(*this, image_pixel).value_or(image_pixel);
 }
 

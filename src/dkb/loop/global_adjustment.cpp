@@ -36,15 +36,15 @@ std::vector<KeyframeId> nearest_keyframes(const Map& map, size_t most_neighbours
 
 // The roots of maps, and what has neighbours, by points or by motion, that take no part.
 std::vector<uint8_t> those_that_stay(const Map& map, const std::vector<KeyframeId>& keyframes) {
-  const auto takes_part = [&](KeyframeId k) { return std::binary_search(keyframes.begin(), keyframes.end(), k); };
+  const auto left_out = [&](KeyframeId k) {
+    return k != kNoKeyframe && !std::binary_search(keyframes.begin(), keyframes.end(), k);
+  };
   std::vector<uint8_t> fixed;
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
-    const KeyframeId before = k.motion ? k.motion->previous : kNoKeyframe, after = map.moved_on_from(id);
-    fixed.push_back(k.parent == kNoKeyframe || (before != kNoKeyframe && !takes_part(before)) ||
-                    (after != kNoKeyframe && !takes_part(after)) ||
-                    !std::all_of(k.covisible.begin(), k.covisible.end(),
-                                 [&](const Covisible& c) { return takes_part(c.keyframe); }));
+    fixed.push_back(
+        k.parent == kNoKeyframe || (k.motion && left_out(k.motion->previous)) || left_out(map.moved_on_from(id)) ||
+        std::any_of(k.covisible.begin(), k.covisible.end(), [&](const Covisible& c) { return left_out(c.keyframe); }));
   }
   if (std::find(fixed.begin(), fixed.end(), 1) == fixed.end()) fixed.front() = 1;
   return fixed;

@@ -133,7 +133,7 @@ std::string feature_section(const Map& map, const MapFileContext& context) {
       image_y.push_back(k.image_pixel.y());
       step_x.push_back(step_from(prediction.x(), k.pixel.x()));
       step_y.push_back(step_from(prediction.y(), k.pixel.y()));
-      depth.push_back(k.depth > 0 ? k.depth : -k.lent_depth);
+      depth.push_back(k.lent_depth > 0 && k.depth == 0 ? -k.lent_depth : k.depth);  // no -0
       angle.push_back(k.angle);
       response.push_back(k.response);
       place_sigma.push_back(k.place_sigma);

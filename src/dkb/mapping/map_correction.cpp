@@ -28,11 +28,18 @@ void move_map(Map& map, const MapCorrection& correction) {
     motion[static_cast<size_t>(p.keyframe)] = after.inverse() * k->cam_from_world;
   }
   // The others move as the nearest ancestor does that has a correction; trees without one stay.
-  const std::vector<std::optional<Rigid3>> told = motion;
+  std::vector<uint8_t> done(count, 0);  // each is asked once, however long the way to a root
   for (size_t k = 0; k < count; ++k) {
-    auto at = static_cast<KeyframeId>(k);
-    while (at != kNoKeyframe && !told[static_cast<size_t>(at)]) at = map.keyframe(at)->parent;
-    if (at != kNoKeyframe) motion[k] = told[static_cast<size_t>(at)];
+    std::vector<size_t> path;
+    KeyframeId at = static_cast<KeyframeId>(k);
+    while (at != kNoKeyframe && !motion[static_cast<size_t>(at)] && !done[static_cast<size_t>(at)]) {
+      path.push_back(static_cast<size_t>(at));
+      at = map.keyframe(at)->parent;
+    }
+    for (size_t w : path) {
+      done[w] = 1;
+      if (at != kNoKeyframe) motion[w] = motion[static_cast<size_t>(at)];
+    }
   }
 
   size_t next = 0;

@@ -405,9 +405,8 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
     // The frame in its map, and the map in its world.
-    const Matrix6d to_camera = adjoint(tracked.cam_from_world);
     result.covariance =
-        tracked.covariance + to_camera * tracker_.map().covariance(tracked.reference) * to_camera.transpose();
+        tracked.covariance + carried(tracked.cam_from_world, tracker_.map().covariance(tracked.reference));
     result.reference_keyframe = tracked.reference;
     result.map = map_number(tracked.reference);
   }
