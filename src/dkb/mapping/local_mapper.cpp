@@ -71,7 +71,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
     const Stopwatch ba;
     const LocalBaReport adjusted = local_bundle_adjustment(map_, packet.id, optics_, options_.ba);
     times_.add("local_ba", ba.ms());
-    refresh(adjusted.moved_points);
+    refresh(adjusted.moved_points);  // those that were fused are among them
     cull_keyframes(packet.id);
   }
   times_.add("mapping", whole.ms());
@@ -228,7 +228,6 @@ void LocalMapper::fuse_neighbours(KeyframeId id) {
     if (static_cast<int>(neighbours.size()) < kFusionKeyframes) neighbours.push_back(c.keyframe);
   for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, map_.points_of({id}));
   report_.points_fused += fuse_into(id, map_.points_of(neighbours));
-  refresh(map_.points_of({id}));
 }
 
 void LocalMapper::cull_keyframes(KeyframeId newest) {
