@@ -8,7 +8,8 @@
 namespace dkb {
 
 // One frame, as in DKB section 3: features, what moves, pose, keyframe decision. Mapping happens beside it.
-FrameResult Pipeline::process(const Frame& frame) {
+FrameResult Pipeline::process(const Frame& given) {
+  const Frame frame = priors_.calibrated(given);
   last_stamp_ns_ = frame.stamp_ns();
   rate_.add(last_stamp_ns_);
   if (load_) shed_load();

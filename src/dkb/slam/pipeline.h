@@ -20,6 +20,7 @@
 #include "dkb/slam/mover_stage.h"
 #include "dkb/slam/odometry_frame.h"
 #include "dkb/slam/options.h"
+#include "dkb/slam/prior_calibration.h"
 #include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
@@ -81,6 +82,7 @@ class Pipeline {
   Expectation expect(const Frame& frame) const;
   void look_for_movers(const Scene& scene, const Expectation& expected);
   TrackedFrame track(const Scene& scene, const UsableFeatures& usable);
+  void compare_prior(const MotionPrior& prior, const PosePrediction& before, const TrackedFrame& tracked);
   void retract_late(const std::vector<LateMask>& masks);
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
   KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
@@ -105,6 +107,7 @@ class Pipeline {
   SceneStage scenes_;
   PointEvidence evidence_;
   ReadoutCalibration readout_;
+  PriorCalibration priors_;
   MoverStage movers_;
   OdometryFrame odometry_;
   std::optional<DenseMapper> dense_;
@@ -116,6 +119,7 @@ class Pipeline {
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
+  bool prior_warned_ = false;
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.

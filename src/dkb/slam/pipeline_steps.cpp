@@ -210,6 +210,9 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   if (start_)
     start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,
                   options_.depth);
+  std::optional<PosePrediction> before;  // where the images showed the camera in the frame before
+  if (const auto& last = tracker_.last_frame(); last && last->tracked() && last->index + 1 == next_frame_)
+    before = PosePrediction{last->cam_from_world, last->covariance};
   TrackedFrame tracked = tracker_.track({.index = next_frame_,
                                          .timestamp = image.timestamp,
                                          .features = features,
@@ -221,8 +224,21 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .may_start_map = may_make_keyframes()});
   if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;
+  if (before && frame.prior()) compare_prior(*frame.prior(), *before, tracked);
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
   return tracked;
+}
+
+// A map that starts anew stands where the prior says.
+void Pipeline::compare_prior(const MotionPrior& prior, const PosePrediction& before, const TrackedFrame& tracked) {
+  if (tracked.starts_map) return;
+  priors_.add(
+      prior, {before.cam_from_world * tracked.cam_from_world.inverse(), false, before.covariance + tracked.covariance});
+  if (prior_warned_ || !priors_.contradicts_images()) return;
+  prior_warned_ = true;
+  note(Event::Kind::warning,
+       "the motion priors contradict the images far beyond their covariance, and count for less: are they motions of "
+       "the camera (x right, y down, z forward), and as exact as they say?");
 }
 
 void Pipeline::follow_motion(const Scene& scene) {
