@@ -141,6 +141,12 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     spare_ = std::move(previous_);
   }
   find_pose(step_covariance);
+  if (!is_placed(step_covariance)) {
+    chosen_.clear();
+    clear(current_->score, rays_.all_cells());
+    clear(still_, rays_.all_cells());
+    return;
+  }
   choose_views();
   // Some cells through all steps before the next: what they read and write stays in the nearest cache.
   for (size_t first = 0; first < score().size(); first += kBlockCells) {
@@ -172,6 +178,14 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
   if (const auto share = colour_share())
     depth_from_colour_ = to_depth * rigid3_from_tangent(*share * tangent_from_rigid3(to_depth)).inverse();
   aligned_step_->previous_from_current = to_depth.inverse() * depth_from_colour_;
+}
+
+// Whether the camera is known to be where it sees what views of before saw, to a cell of them: by its surfaces, or by
+// what was expected of a step that was no leap. Points 1 m away are nearer than most.
+bool MotionSegmenter::is_placed(const Matrix6d& step_covariance) const {
+  if (aligned_step_) return true;
+  const Vector6d sd = step_covariance.diagonal().cwiseSqrt();
+  return camera_.fx * (sd.head<3>().maxCoeff() + sd.tail<3>().maxCoeff()) < options_.cell;
 }
 
 // Not all views speak in each frame: they take turns.

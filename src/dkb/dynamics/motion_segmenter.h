@@ -77,6 +77,7 @@ class MotionSegmenter {
   std::optional<double> colour_share() const;
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_pose(const Matrix6d& step_covariance);
+  bool is_placed(const Matrix6d& step_covariance) const;
   void choose_views();
   void find_tolerances(CellRange block);
   void carry_scores(CellRange block);

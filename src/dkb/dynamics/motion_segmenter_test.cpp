@@ -188,6 +188,36 @@ TEST(MotionSegmenter, DoesNotTakeTheRoomForWhoLeftDuringAGap) {
   EXPECT_LT(see(90, {}).wrong, 0.05) << "two seconds later he is gone";
 }
 
+// The turn over a gap is not what the velocity before it says: a room held against views of before from there moves.
+TEST(MotionSegmenter, SaysNothingWhereALeapLeavesThePoseUnknown) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {}, {});
+  const auto see = [&](int frame, const Rigid3& expected, const Matrix6d& covariance) {
+    const Picture p = world.render(frame, {});
+    segmenter.observe(p.image, expected, covariance);
+    const double wrong = judge(segmenter.mask(), p.truth).wrong;
+    segmenter.commit(world.cam_from_world(frame));
+    return wrong;
+  };
+  for (int f = 0; f < 30; ++f) see(f, world.cam_from_world(f), kStepCovariance);
+  constexpr double kGap = 0.8;  // [s]
+  const Rigid3 off(rotation_from_vector({0, 0.09, 0}), {0.05, 0, 0.1});
+  const Matrix6d unknown = axis_covariance(kAccelerationSd * kGap * kGap, kAngularAccelerationSd * kGap * kGap);
+  EXPECT_EQ(see(54, off * world.cam_from_world(54), unknown), 0);
+  const StillCells still = segmenter.still();
+  EXPECT_EQ(std::count(still.kinds.data(), still.kinds.data() + still.kinds.size(), StillCells::unknown),
+            static_cast<std::ptrdiff_t>(still.kinds.size()));
+  EXPECT_LT(see(55, world.cam_from_world(55), kStepCovariance), 0.01);
+}
+
+TEST(MotionSegmenter, KnowsNothingOfTheFirstFrame) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {}, {});
+  segmenter.observe(world.render(0, {}).image, world.cam_from_world(0), Matrix6d::Identity());
+  const StillCells still = segmenter.still();
+  for (size_t i = 0; i < still.kinds.size(); ++i) ASSERT_EQ(still.kinds.data()[i], StillCells::unknown) << i;
+}
+
 TEST(MotionSegmenter, KeepsABoxMarkedThatStops) {
   run(
       World(), 120, [](int f) { return std::vector{box_at(std::min(0.1, -1.4 + 0.05 * f))}; },
