@@ -59,8 +59,8 @@ const std::vector<std::string>& simulator_scenes() {
 void SimulatorOptions::check() const {
   require_option(frames >= 0 && frames <= 1000000, "--frames", frames, "0 (as many as the scene needs) ... 1000000");
   require_option(people >= -1 && people <= 30, "--people", people, "0 ... 30");
-  require_option(width >= 64 && width <= 4096, "width", width, "64 ... 4096 px");
-  require_option(height >= 64 && height <= 4096, "height", height, "64 ... 4096 px");
+  require_option(width >= 64 && width <= 4096, "--size WIDTH", width, "64 ... 4096 px");
+  require_option(height >= 64 && height <= 4096, "--size HEIGHT", height, "64 ... 4096 px");
   require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure,
                  "0.001 ... 0.03 s, or 0 for the scene's own");
   require_option(rate >= 1 && rate <= 60, "--rate", rate, "1 ... 60 Hz");
