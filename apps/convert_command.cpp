@@ -12,6 +12,7 @@
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/log.h"
 #include "interrupt.h"
 
 namespace dkb {
@@ -58,7 +59,8 @@ void check_arguments(const ConvertArguments& arguments) {
 void run_convert(const ConvertArguments& arguments) {
   check_arguments(arguments);
   ConvertOptions options = arguments.options;
-  options.warn = [](const std::string& line) { std::fprintf(stderr, "warning: %s\n", line.c_str()); };
+  WarningLog warnings([](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); });
+  options.warn = [&](const std::string& line) { warnings.warn(line, line); };
   try {
     options.compression =
         arguments.compression.empty() ? default_compression(arguments.out) : compression_named(arguments.compression);
@@ -67,7 +69,14 @@ void run_convert(const ConvertArguments& arguments) {
   }
   const Interrupt interrupt([] {});
   options.go_on = Interrupt::check;
-  const Converted converted = convert(arguments.in, arguments.out, options);
+  Converted converted;
+  try {
+    converted = convert(arguments.in, arguments.out, options);
+  } catch (...) {
+    warnings.finish();
+    throw;
+  }
+  warnings.finish();
   std::printf("%s: %zu %s\n", arguments.out.c_str(), converted.count, converted.unit.c_str());
 }
 

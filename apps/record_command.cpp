@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <utility>
 
 #include "dkb/image/rgbd_image.h"
 #include "dkb/recordings/pair_writer.h"
@@ -40,7 +41,14 @@ PairWriterOptions quick_options(const std::string& out) {
 }
 
 int record(const RecordArguments& args) {
-  WarningLog warnings([](const std::string& line) { tell(stderr, "{}\n", line); });
+  bool counting = false;  // the line that counts frames is open
+  const auto end_line = [&] {
+    if (std::exchange(counting, false)) tell(stderr, "\n");
+  };
+  WarningLog warnings([&](const std::string& line) {
+    end_line();
+    tell(stderr, "{}\n", line);
+  });
   SourceOptions reading = args.reading;
   reading.depth_limits = false;  // those are for whoever reads the recording
   const std::unique_ptr<Source> source = open_source(args.source, reading);
@@ -64,7 +72,9 @@ int record(const RecordArguments& args) {
       const RgbdImage& image = *next.frame.image();
       const Picture picture{image.grey, image.colour};
       writer->add({next.frame.stamp_ns(), next.frame.depth_stamp_ns(), {}, &picture, &image.depth});
-      if (++kept % 30 == 0 && terminal) tell(stderr, "\r\033[K{} frames", kept);
+      if (++kept % 30 != 0 || !terminal) continue;
+      tell(stderr, "\r\033[K{} frames", kept);
+      counting = true;
     }
   };
   bool full = false;
@@ -76,7 +86,7 @@ int record(const RecordArguments& args) {
   } catch (...) {
     failure = std::current_exception();
   }
-  if (terminal) tell(stderr, "\n");
+  end_line();
   for (const std::string& line : source->take_warnings()) warnings.warn(line, line);
   source->stop();
   warnings.finish();

@@ -50,6 +50,22 @@ TEST(ExecRun, ACommandThatFailsIsOneWarningAndTheRunGoesOn) {
   }
 }
 
+TEST(ExecRun, ACommandThatIsNotThereIsRefusedBeforeAnyFrame) {
+  const TempFolder temp;
+  for (const char* threads : {"0", "1"}) {
+    const SlamRun run(sequence(), temp / "out",
+                      {"--detector", "exec:no-such-command-anywhere --fast", "--quiet", "--threads", threads});
+    EXPECT_EQ(run.finished.exit_code, 2) << run.finished.err;
+    EXPECT_NE(
+        run.finished.err.find("error: --detector exec: \"no-such-command-anywhere --fast\" cannot be started (exit "
+                              "status 127: the shell finds no such command); give a command"),
+        std::string::npos)
+        << run.finished.err;
+    EXPECT_EQ(run.finished.err.find("warning"), std::string::npos) << run.finished.err;
+    EXPECT_TRUE(std::filesystem::is_empty(run.out)) << "nothing was tracked";
+  }
+}
+
 // Orange of 10 x 5 px, from (3, 2) on.
 TEST(ExecRun, TheExampleFindsWhatIsOrange) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) GTEST_SKIP() << "skipped: no numpy";

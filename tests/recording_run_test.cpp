@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // `dkb-slam run` on recordings of ROS messages.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
 
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/image_codecs.h"
@@ -15,8 +20,9 @@ namespace fs = std::filesystem;
 
 constexpr int kFrames = 20;
 
-// The first frames of the sequence, with its camera where `with_camera`.
-void write_recording_of(const fs::path& path, bool with_camera, Compression compression = Compression::none) {
+// The first frames of the sequence, with its camera where `with_camera`, each depth image so many times.
+void write_recording_of(const fs::path& path, bool with_camera, Compression compression = Compression::none,
+                        int times = 1) {
   const auto writer = write_recording(path, compression);
   const size_t camera = writer->add_topic("/dkb_slam/camera", "std_msgs/String", true);
   const size_t rgb = writer->add_topic("/camera/rgb/image_color", "sensor_msgs/Image"),
@@ -38,7 +44,7 @@ void write_recording_of(const fs::path& path, bool with_camera, Compression comp
     if (first && with_camera) writer->write(camera, stamp, encode_string(read_text(sequence() / "camera.yaml")));
     first = false;
     write(rgb, stamp, "rgb8", next.frame.colour());
-    write(depth, next.frame.depth_stamp_ns(), "32FC1", next.frame.depth());
+    for (int i = 0; i < times; ++i) write(depth, next.frame.depth_stamp_ns(), "32FC1", next.frame.depth());
   }
   writer->close();
 }
@@ -100,6 +106,33 @@ TEST(RecordingRun, BoxesMasksAndTheUnitOfTimesNeedNoListOfStamps) {
   EXPECT_EQ(run.stats.at("detector").at("kind"), "file+masks");
   EXPECT_LT(run.stats.at("tracked"), kFrames) << "nothing is seen of the first frame";
   EXPECT_TRUE(fs::exists(run.out / "cv_orb.json"));
+}
+
+TEST(ConvertCommand, RepeatedWarningsAreMerged) {
+  const TempFolder temp;
+  write_recording_of(temp / "a.bag", true, Compression::none, 2);
+  const Finished run = run_program({"convert", (temp / "a.bag").string(), "--out", (temp / "out").string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const std::string warning = "warning: /camera/depth/image: a stamp is not after the one before it; it is left out";
+  EXPECT_EQ(run.err, warning + "\n" + warning + ": " + std::to_string(kFrames) + " times in all\n");
+}
+
+TEST(RecordCommand, OnATerminalWarningsBeginALineOfTheirOwn) {
+  const TempFolder temp;
+  copy_sequence(temp / "in", kSequenceFrames, true);
+  write_text(temp / "in" / rows_of(temp / "in/rgb.txt").at(34).at(1), "broken");  // frames are counted at the 30th
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_GE(terminal, 0);
+  ASSERT_TRUE(grantpt(terminal) == 0 && unlockpt(terminal) == 0);
+  const std::string line = std::string(DKB_SLAM_EXECUTABLE " record ") + (temp / "in").string() + " --out " +
+                           (temp / "out.bag").string() + " >" + (temp / "said").string() + " 2>" + ptsname(terminal);
+  EXPECT_EQ(std::system(line.c_str()), 0);
+  std::string shown(4096, '\0');
+  const ssize_t size = read(terminal, shown.data(), shown.size());
+  close(terminal);
+  shown.resize(static_cast<size_t>(std::max<ssize_t>(size, 0)));
+  EXPECT_NE(shown.find("30 frames\r\nwarning: "), std::string::npos) << shown;
+  EXPECT_EQ(shown.find("\n\r\n"), std::string::npos) << "no empty line: " << shown;
 }
 
 TEST(RecordingRun, OptionsThatFitNothingAreRefused) {

@@ -239,6 +239,32 @@ FolderLayout open_seven_scenes(const fs::path& folder) {
   return layout;
 }
 
+constexpr const char* kColourFolders[] = {"color", "image", "rgb"};
+
+// Whether a folder holds an image that is named by its stamp; what may be its number is none.
+bool holds_stamped(const fs::path& folder) {
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
+    const fs::path name = it->path().filename();
+    const bool picture = std::find(kPictures.begin(), kPictures.end(), name.extension()) != kPictures.end();
+    if (picture && is_stamp(name.stem().string()) && !read_name(name.string(), "", kPictures)) return true;
+  }
+  return false;
+}
+
+bool holds_pictures(const fs::path& folder) {
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec))
+    if (std::find(kPictures.begin(), kPictures.end(), it->path().extension()) != kPictures.end()) return true;
+  return false;
+}
+
+FolderLayout open_stamped(const fs::path& folder, const std::string& colour) {
+  FolderLayout layout;
+  layout.dataset = pair_image_folders(folder, colour, "depth");
+  return layout;
+}
+
 // Names that many folders have tell a layout only with its images in them.
 using Opener = std::function<FolderLayout(const fs::path&)>;
 Opener opener_of(const fs::path& folder) {
@@ -247,10 +273,14 @@ Opener opener_of(const fs::path& folder) {
   if (holds_numbered(folder, "frame-", kSevenScenesColour)) return open_seven_scenes;
   if (holds_numbered(folder / "results", "frame", kReplicaColour)) return open_replica;
   if (there(folder / "intrinsic" / "intrinsic_color.txt")) return open_scannet;
-  if (there(folder / "depth"))
-    for (const char* colour : {"color", "image", "rgb"})
-      if (holds_numbered(folder / colour, "", kPictures))  // TUM's have stamps
-        return [colour](const fs::path& of) { return open_redwood(of, colour); };
+  if (!there(folder / "depth")) return nullptr;
+  // Stamps go first: a program that writes 0.966667.png, 1.png, 1.033333.png numbers nothing.
+  for (const char* colour : kColourFolders)
+    if (holds_stamped(folder / colour) && !there(folder / "depth.txt"))  // a list alone has lost the other
+      return [colour](const fs::path& of) { return open_stamped(of, colour); };
+  for (const char* colour : kColourFolders)
+    if (holds_numbered(folder / colour, "", kPictures))
+      return [colour](const fs::path& of) { return open_redwood(of, colour); };
   return nullptr;
 }
 
@@ -261,8 +291,11 @@ bool has_folder_layout(const fs::path& folder) {
 }
 
 FolderLayout open_folder_layout(const fs::path& folder) {
-  const Opener open = opener_of(folder);
-  return open ? open(folder) : open_tum(folder);
+  if (const Opener open = opener_of(folder)) return open(folder);
+  for (const char* colour : kColourFolders)  // images by the right folders, whose names tell nothing: the error says so
+    if (!there(folder / "depth.txt") && there(folder / "depth") && holds_pictures(folder / colour))
+      return open_stamped(folder, colour);
+  return open_tum(folder);
 }
 
 }  // namespace dkb

@@ -22,6 +22,7 @@ struct FolderLayout {
 //   7-Scenes              frame-000000.color.png, frame-000000.depth.png
 //   Replica               results/frame000000.jpg, results/depth000000.png; cam_params.json here or above
 //   ScanNet, exported     color/0.jpg, depth/0.png, intrinsic/intrinsic_color.txt
+//   TUM without lists     rgb, color or image/1305031102.175304.png, depth/1305031102.160407.png
 //   Redwood, Open3D       color, image or rgb/000000.jpg, depth/000000.png; camera_intrinsic.json or intrinsic.json
 // Images that are numbered instead of stamped are 1/30 s apart. Throws InputError with file and line, and where nothing
 // fits what TUM's layout lacks.

@@ -207,9 +207,54 @@ TEST_F(Layouts, AnUnknownFolderIsToldWhatTumsLayoutLacks) {
             std::string::npos);
 }
 
-TEST_F(Layouts, TumsImagesWithoutTheirListsAreNotTakenForRedwood) {
-  colour("rgb/1700000000.000000.jpg"), depth("depth/1700000000.000000.png");
-  EXPECT_NE(error().find("rgb.txt: no such file"), std::string::npos) << error();
+TEST_F(Layouts, ImagesNamedByTheirStampsNeedNoLists) {
+  colour("rgb/1305031102.175304.png"), colour("rgb/1305031102.275326.jpg"), colour("rgb/999999999.5.png");
+  depth("depth/1305031102.160407.png", 64, 48, 13107), depth("depth/1305031102.262886.png");
+  write("rgb/notes.txt", ""), write("rgb/._1305031102.175304.png", "");
+  EXPECT_TRUE(has_folder_layout(folder));
+  const FolderLayout layout = open_folder_layout(folder);
+  EXPECT_EQ(layout.dataset.list, "the names in rgb and depth");
+  EXPECT_EQ(layout.dataset.unpaired, 1u);
+  ASSERT_EQ(layout.dataset.pairs.size(), 2u);
+  const DatasetPair& first = layout.dataset.pairs[0];
+  EXPECT_EQ(first.stamp_ns, 1'305'031'102'175'304'000);
+  EXPECT_EQ(first.depth_stamp, "1305031102.160407");
+  EXPECT_EQ(first.colour_path, folder / "rgb/1305031102.175304.png");
+  write("camera.yaml", "fx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\nwidth: 64\nheight: 48\ndepth_factor: 13107\n");
+  EXPECT_EQ(first_depth(64, 48), 1.0F);
+}
+
+TEST_F(Layouts, StampsOfWholeSecondsAmongOthersAreNoNumbers) {
+  for (const char* stamp : {"0.966667", "1", "1.033333", "10.5"})
+    colour(std::string("color/") + stamp + ".png"), depth(std::string("depth/") + stamp + ".png");
+  const std::vector<DatasetPair> pairs = open_folder_layout(folder).dataset.pairs;
+  ASSERT_EQ(pairs.size(), 4u);
+  EXPECT_EQ(pairs[1].stamp, "1");
+  EXPECT_EQ(pairs[3].stamp, "10.5") << "by time, not by name";
+}
+
+TEST_F(Layouts, AnImageWhoseNameIsNoStampIsNamed) {
+  const std::string remedy =
+      ": its name is no stamp in seconds, such as 1305031102.175304; rename the images, or list "
+      "them with their stamps in rgb.txt and depth.txt (docs/sources.md, \"Your own images\")";
+  colour("rgb/1305031102175304000.png"), depth("depth/1.5.png");
+  EXPECT_FALSE(has_folder_layout(folder));
+  EXPECT_EQ(error(), (folder / "rgb/1305031102175304000.png").string() + remedy) << "nanoseconds";
+  fs::remove_all(folder / "rgb");
+  colour("rgb/1.5.png"), depth("depth/frame_1.png");
+  EXPECT_EQ(error(), (folder / "depth/frame_1.png").string() + remedy);
+  fs::remove(folder / "depth/frame_1.png");
+  colour("rgb/1.50.jpg");
+  EXPECT_EQ(error(),
+            (folder / "rgb/1.50.jpg").string() + ": its stamp is that of rgb/1.5.png as well; remove one of them");
+  fs::remove(folder / "rgb/1.50.jpg");
+  depth("depth/1.6.png"), fs::remove(folder / "depth/1.5.png");
+  EXPECT_NE(error().find("rgb: no image has one of depth whose name is a stamp within 0.020 s"), std::string::npos)
+      << error();
+  fs::remove(folder / "depth/1.6.png");
+  EXPECT_EQ(error(), (folder / "depth").string() + ": holds no image STAMP.png");
+  write("depth.txt", "1.5 depth/1.5.png\n");
+  EXPECT_NE(error().find("rgb.txt: no such file"), std::string::npos) << "a list alone: " << error();
 }
 
 TEST(LayoutCameras, MutatedTextsThrowNothingButInputErrors) {

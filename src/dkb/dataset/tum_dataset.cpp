@@ -61,6 +61,55 @@ void set_exact_stamps(std::vector<DatasetPair>& pairs, const std::string& name) 
   for (DatasetPair& pair : pairs) pair.stamp_ns = exact(pair.stamp), pair.depth_stamp_ns = exact(pair.depth_stamp);
 }
 
+const std::vector<std::string> kColourEndings = {".png", ".jpg", ".jpeg"},
+                               kDepthEndings = {".png", ".tiff", ".tif", ".pfm", ".npy"};
+
+// As of a list: an image by its stamp, the name of the file, for each image of a folder; by rising stamps.
+std::vector<ListRow> rows_by_name(const fs::path& folder, const std::string& images,
+                                  const std::vector<std::string>& endings) {
+  std::vector<ListRow> rows;
+  std::error_code error;
+  for (fs::directory_iterator it(folder / images, error), end; !error && it != end; it.increment(error)) {
+    const fs::path name = it->path().filename();
+    const std::string stamp = name.stem().string();
+    if (stamp.starts_with(".") || std::find(endings.begin(), endings.end(), name.extension()) == endings.end())
+      continue;
+    if (!is_stamp(stamp))
+      throw InputError(it->path().string() +
+                       ": its name is no stamp in seconds, such as 1305031102.175304; rename the images, or list them "
+                       "with their stamps in rgb.txt and depth.txt (docs/sources.md, \"Your own images\")");
+    double seconds = 0;
+    parse_number(stamp, &seconds);
+    rows.push_back({seconds, stamp, (fs::path(images) / name).string()});
+  }
+  if (error) throw InputError((folder / images).string() + ": cannot be read (" + error.message() + ")");
+  if (rows.empty()) throw InputError((folder / images).string() + ": holds no image STAMP" + endings.front());
+  std::sort(rows.begin(), rows.end(), [](const ListRow& a, const ListRow& b) {
+    return std::tie(a.timestamp, a.path) < std::tie(b.timestamp, b.path);
+  });
+  for (size_t i = 1; i < rows.size(); ++i)
+    if (rows[i].timestamp == rows[i - 1].timestamp)
+      throw InputError((folder / rows[i].path).string() + ": its stamp is that of " + rows[i - 1].path +
+                       " as well; remove one of them");
+  return rows;
+}
+
+// One to one, nearest stamps first; stamps in nanoseconds are not set.
+TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour, const std::vector<ListRow>& depth,
+                     const AssociationOptions& options) {
+  TumDataset dataset;
+  dataset.folder = folder;
+  std::vector<double> colour_stamps, depth_stamps;
+  for (const ListRow& row : colour) colour_stamps.push_back(row.timestamp);
+  for (const ListRow& row : depth) depth_stamps.push_back(row.timestamp);
+  for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
+    const ListRow &c = colour[i], &d = depth[j];
+    dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
+  }
+  dataset.unpaired = colour.size() + depth.size() - 2 * dataset.pairs.size();
+  return dataset;
+}
+
 }  // namespace
 
 void AssociationOptions::check() const {
@@ -184,31 +233,43 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
     if (!fs::exists(list, ec))
       throw InputError(list.string() +
                        ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt, with a line " +
-                       "`seconds image` for each image (docs/sources.md, \"Your own images\")");
+                       "`seconds image` for each image, or images named rgb/STAMP.png and depth/STAMP.png "
+                       "(docs/sources.md, \"Your own images\")");
   return pair_image_lists(folder, "rgb.txt", "depth.txt", options);
 }
 
 TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list,
                             const AssociationOptions& options) {
-  TumDataset dataset;
-  dataset.folder = folder;
-  dataset.list = colour_list + " and " + depth_list;
   const fs::path rgb = folder / colour_list, depth = folder / depth_list;
   const std::vector<ListRow> colour_rows = parse_image_list(read_file(rgb), rgb.string());
   const std::vector<ListRow> depth_rows = parse_image_list(read_file(depth), depth.string());
-  std::vector<double> colour_stamps, depth_stamps;
-  for (const ListRow& row : colour_rows) colour_stamps.push_back(row.timestamp);
-  for (const ListRow& row : depth_rows) depth_stamps.push_back(row.timestamp);
-  for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
-    const ListRow &c = colour_rows[i], &d = depth_rows[j];
-    dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
-  }
+  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows, options);
+  dataset.list = colour_list + " and " + depth_list;
   if (dataset.pairs.empty())
     throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
                      std::to_string(options.max_difference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
-  dataset.unpaired = colour_rows.size() + depth_rows.size() - 2 * dataset.pairs.size();
   set_exact_stamps(dataset.pairs, rgb.string());
+  return dataset;
+}
+
+bool is_stamp(std::string_view name) {
+  return !name.empty() && name.find_first_not_of("0123456789.") == std::string_view::npos && parse_stamp_ns(name);
+}
+
+TumDataset pair_image_folders(const fs::path& folder, const std::string& colour_folder, const std::string& depth_folder,
+                              const AssociationOptions& options) {
+  options.check();
+  const fs::path colour = folder / colour_folder;
+  const std::vector<ListRow> colour_rows = rows_by_name(folder, colour_folder, kColourEndings);
+  const std::vector<ListRow> depth_rows = rows_by_name(folder, depth_folder, kDepthEndings);
+  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows, options);
+  dataset.list = "the names in " + colour_folder + " and " + depth_folder;
+  if (dataset.pairs.empty())
+    throw InputError(colour.string() + ": no image has one of " + depth_folder + " whose name is a stamp within " +
+                     std::to_string(options.max_difference).substr(0, 5) +
+                     " s of its own; the names must be of one recording and one clock, in seconds");
+  set_exact_stamps(dataset.pairs, colour.string());
   return dataset;
 }
 

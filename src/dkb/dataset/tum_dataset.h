@@ -6,6 +6,8 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace dkb {
@@ -28,7 +30,7 @@ struct AssociationOptions {
 
 struct TumDataset {
   std::filesystem::path folder;
-  std::string list;                // "associations.txt" or "rgb.txt and depth.txt"
+  std::string list;                // what pairs them: "associations.txt", "rgb.txt and depth.txt", "the names in ..."
   std::vector<DatasetPair> pairs;  // colour stamps strictly rising, at least one
   size_t unpaired = 0;             // images without a partner, of the whole folder
 };
@@ -46,6 +48,15 @@ TumDataset open_tum_dataset(const std::filesystem::path& folder, const Associati
 // Likewise by two lists of these names alone.
 TumDataset pair_image_lists(const std::filesystem::path& folder, const std::string& colour_list,
                             const std::string& depth_list, const AssociationOptions& options = {});
+
+// The same without lists, where images are named by their stamps [s]: COLOUR/1305031102.175304.png. Files that are no
+// images by their endings are left alone. Throws InputError naming the image whose name is no stamp, or one that
+// another image has as well.
+TumDataset pair_image_folders(const std::filesystem::path& folder, const std::string& colour_folder,
+                              const std::string& depth_folder, const AssociationOptions& options = {});
+
+// Whether the name of an image, without its ending, is a stamp: plain decimals, below 9e9 s.
+bool is_stamp(std::string_view name);
 
 // The rows of one list, parsed from text; `name` opens the messages.
 struct ListRow {

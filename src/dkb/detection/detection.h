@@ -3,9 +3,16 @@
 
 #include <span>
 
+#include "dkb/util/errors.h"
 #include "dkb_slam/detector.h"
 
 namespace dkb {
+
+// What a detector throws that never was one: there is no such command. A run without it is not what was asked for.
+class NeverStarted : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 // The part of `box` within an image of this size [px]; of zero width or height when there is none.
 Box clip(const Box& box, int width, int height);

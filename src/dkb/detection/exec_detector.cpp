@@ -51,6 +51,7 @@ Detections ExecDetector::ask(const DetectorInput& image) {
   const size_t max_bytes = (1 << 20) + 2 * static_cast<size_t>(width) * static_cast<size_t>(height);
   const std::string answer =
       process_->ask(request_, exec_answer_size, max_bytes, number == 0 ? patience_.first : patience_.later);
+  answered_ = true;
   return parse_exec_answer(answer, number, width, height);
 }
 
@@ -58,6 +59,12 @@ Detections ExecDetector::detect(const DetectorInput& image) {
   if (process_ == nullptr) throw InputError("\"" + excerpt(command_) + "\" has ended");
   try {
     return ask(image);
+  } catch (const NeverStarted& e) {
+    process_.reset();
+    const std::string what = "\"" + excerpt(command_) + "\" cannot be started (" + e.what() + ")";
+    if (answered_) throw InputError(what);
+    throw NeverStarted("--detector exec: " + what +
+                       "; give a command that a shell can execute, with its path, or leave the detector out");
   } catch (const InputError& e) {
     process_.reset();
     throw InputError("\"" + excerpt(command_) + "\": " + e.what());

@@ -24,7 +24,8 @@ class ExecDetector final : public Detector {
   // Starts the command. Throws InputError when it is empty or no process can be started.
   explicit ExecDetector(std::string command, ExecPatience patience = {});
 
-  // Throws InputError when the command ends, stalls, or answers in another format; it is ended then.
+  // Throws InputError when the command ends, stalls, or answers in another format; it is ended then. NeverStarted when
+  // there is no such command and never was one.
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "exec"; }
   // Starts a command that was ended once more.
@@ -38,6 +39,7 @@ class ExecDetector final : public Detector {
   const ExecPatience patience_;
   std::unique_ptr<PipedCommand> process_;  // none after a failure
   int64_t images_ = 0;                     // that the process was given
+  bool answered_ = false;                  // this process or one before it
   std::string request_;
 };
 

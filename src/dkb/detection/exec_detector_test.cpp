@@ -9,6 +9,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/test_errors.h"
+#include "dkb/util/test_folder.h"
 
 namespace dkb {
 namespace {
@@ -29,6 +30,17 @@ class ExecDetectorTest : public testing::Test {
   }
   static std::string error_of(ExecDetector& detector, const DetectorInput& shown) {
     return test::input_error_of([&] { detector.detect(shown); });
+  }
+  // What it says that it never started; empty when it fails otherwise.
+  static std::string refusal_of(ExecDetector& detector, const DetectorInput& shown) {
+    try {
+      detector.detect(shown);
+      ADD_FAILURE() << "it answered";
+    } catch (const NeverStarted& e) {
+      return e.what();
+    } catch (const InputError&) {
+    }
+    return "";
   }
   static bool has_children() { return waitpid(-1, nullptr, WNOHANG) >= 0 || errno != ECHILD; }
 
@@ -73,11 +85,38 @@ TEST_F(ExecDetectorTest, ACommandThatEndsIsAnErrorUntilItIsStartedAnew) {
 
 TEST_F(ExecDetectorTest, NobodyWhoReadsIsAnErrorAndNoSignal) {
   const GreyImage large(1000, 1000);
-  for (const char* command : {"exit 0", "exec <&-; sleep 0.05", "no-such-command-anywhere 2>/dev/null"}) {
+  for (const char* command : {"exit 0", "exec <&-; sleep 0.05"}) {
     ExecDetector detector(command);
     EXPECT_NE(error_of(detector, input({}, large)).find("it ended"), std::string::npos) << command;
   }
   EXPECT_FALSE(has_children());
+}
+
+TEST_F(ExecDetectorTest, ACommandThatNoShellCanStartNeverWasADetector) {
+  const GreyImage large(1000, 1000);
+  const std::pair<std::string, std::string> commands[] = {
+      {"no-such-command-anywhere 2>/dev/null", "exit status 127: the shell finds no such command"},
+      {"/ 2>/dev/null", "exit status 126: the shell may not execute it"}};
+  for (const auto& [command, why] : commands) {
+    ExecDetector detector(command);
+    EXPECT_EQ(refusal_of(detector, input({}, large)),
+              "--detector exec: \"" + command + "\" cannot be started (" + why +
+                  "); give a command that a shell can execute, with its path, or leave the detector out");
+  }
+  EXPECT_FALSE(has_children());
+}
+
+TEST_F(ExecDetectorTest, WhatSpokeOnceIsNoCommandThatNeverStarted) {
+  ExecDetector loads("echo loading the model; exit 127");
+  EXPECT_EQ(refusal_of(loads, image_), "");
+  const test::TempFolder temp;
+  const std::string mark = (temp / "mark").string();
+  ExecDetector detector("test -e " + mark + " && exit 127; touch " + mark +
+                        "; read -r line; head -c 24 >/dev/null; printf 'answer 0 0\\nend\\n'; exit 127");
+  EXPECT_EQ(detector.detect(image_), Detections());
+  EXPECT_EQ(refusal_of(detector, image_), "");
+  detector.reset();
+  EXPECT_EQ(refusal_of(detector, image_), "") << "it is gone, but it was there";
 }
 
 TEST_F(ExecDetectorTest, AnAnswerThatDoesNotComeIsWaitedForSoLongAlone) {

@@ -15,6 +15,7 @@
 #include <cstring>
 #include <utility>
 
+#include "dkb/detection/detection.h"
 #include "dkb/util/errors.h"
 
 extern char** environ;
@@ -53,6 +54,20 @@ int spawn_shell(const std::string& command, int input, int output, pid_t* pid) {
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&files);
   return error;
+}
+
+// How it ended by its status of waitpid(); empty when it was SIGKILL, ours.
+std::string end_of(int status) {
+  if (WIFEXITED(status)) return "exit status " + std::to_string(WEXITSTATUS(status));
+  return WTERMSIG(status) == SIGKILL ? "" : "signal " + std::to_string(WTERMSIG(status));
+}
+
+// Why a shell could start nothing, by its exit status (POSIX, Shell Command Language, 2.8.2); empty for all else.
+std::string why_not_started(int status) {
+  if (!WIFEXITED(status)) return "";
+  if (WEXITSTATUS(status) == 127) return "exit status 127: the shell finds no such command";
+  if (WEXITSTATUS(status) == 126) return "exit status 126: the shell may not execute it";
+  return "";
 }
 
 }  // namespace
@@ -104,21 +119,19 @@ size_t PipedCommand::send(std::string_view bytes) {
 bool PipedCommand::receive() {
   char bytes[1 << 16];
   const ssize_t n = read(output_, bytes, sizeof bytes);
-  if (n > 0) received_.append(bytes, static_cast<size_t>(n));
+  if (n > 0) received_.append(bytes, static_cast<size_t>(n)), spoke_ = true;
   return n > 0 || (n < 0 && errno == EINTR);
 }
 
-std::string PipedCommand::kill() {
-  if (pid_ < 0) return "";
+int PipedCommand::kill() {
+  if (pid_ < 0) return SIGKILL;
   ::kill(-pid_, SIGKILL);
   int status = 0;
   pid_t waited = 0;
   do waited = waitpid(pid_, &status, 0);
   while (waited < 0 && errno == EINTR);
   pid_ = -1;
-  if (waited < 0) return "";  // the program lets the system reap its children
-  if (WIFEXITED(status)) return "exit status " + std::to_string(WEXITSTATUS(status));
-  return WTERMSIG(status) == SIGKILL ? "" : "signal " + std::to_string(WTERMSIG(status));
+  return waited < 0 ? SIGKILL : status;  // the program may let the system reap its children
 }
 
 std::string PipedCommand::ask(std::string_view request, const std::function<size_t(std::string_view)>& size_of,
@@ -144,7 +157,9 @@ std::string PipedCommand::ask(std::string_view request, const std::function<size
     }
     if (takes_) request.remove_prefix(send(request));
     if (gives_ && !receive()) {
-      const std::string how = kill();
+      const int status = kill();
+      if (const std::string why = why_not_started(status); !why.empty() && !spoke_) throw NeverStarted(why);
+      const std::string how = end_of(status);
       throw InputError("it ended" + (how.empty() ? "" : " (" + how + ")"));
     }
   }

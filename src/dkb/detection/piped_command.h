@@ -23,7 +23,8 @@ class PipedCommand {
   PipedCommand& operator=(const PipedCommand&) = delete;
 
   // Tells it `request` and returns its answer, which is there once `size_of(received)` is not 0. Throws InputError when
-  // it ends before, takes longer than `patience`, or says more than `max_bytes`; of no use from then on.
+  // it ends before, takes longer than `patience`, or says more than `max_bytes`; of no use from then on. Throws
+  // NeverStarted when it ended without a word in the way in which a shell says that there is no such command.
   std::string ask(std::string_view request, const std::function<size_t(std::string_view)>& size_of, size_t max_bytes,
                   std::chrono::milliseconds patience);
 
@@ -33,12 +34,13 @@ class PipedCommand {
   // Waits until it takes bytes, gives some or ended its output. False when that is not before `due`.
   bool wait(bool to_send, Clock::time_point due);
   size_t send(std::string_view bytes);
-  bool receive();      // false when its output has ended
-  std::string kill();  // how it ended; empty when it was this that ended it
+  bool receive();  // false when its output has ended
+  int kill();      // its status as of waitpid(); that of SIGKILL where it is not known
 
   pid_t pid_ = -1;
   int input_ = -1, output_ = -1;        // the command's
   bool takes_ = false, gives_ = false;  // since wait()
+  bool spoke_ = false;                  // it gave a byte
   std::string received_;
 };
 

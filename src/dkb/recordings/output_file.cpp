@@ -13,12 +13,16 @@
 
 namespace dkb {
 
-OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
+OutputFile::OutputFile(const std::filesystem::path& path) : path_(path), target_(behind_links(path)) {
   std::error_code unknown;
-  if (std::filesystem::is_directory(path, unknown))
+  const std::filesystem::file_status there = std::filesystem::status(path, unknown);
+  if (std::filesystem::is_directory(there))
     throw InputError(path.string() + ": is a folder; a recording needs the name of a file");
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  temporary_ = folder / ("." + path.filename().string() + ".tmp" + std::to_string(::getpid()));
+  // Its index goes back to what was written; and what is no file must not be replaced by one.
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there))
+    throw InputError(path.string() + ": is a device or a pipe; a recording needs the name of a file");
+  const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
+  temporary_ = folder / ("." + target_.filename().string() + ".tmp" + std::to_string(::getpid()));
   fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd_ < 0) fail_to_write(path_, "open", errno);
 }
@@ -63,7 +67,7 @@ void OutputFile::sync() {
 
 void OutputFile::commit() {
   sync();
-  if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail("rename");
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("rename");
   ::close(fd_);
   fd_ = -1;
 }

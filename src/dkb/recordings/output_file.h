@@ -11,10 +11,11 @@
 
 namespace dkb {
 
-// A file that grows under a name of its own and takes its place when it is whole. Throws OutputError.
+// A file that grows under a name of its own and takes its place when it is whole; of a link, the place that it leads
+// to. Throws OutputError.
 class OutputFile {
  public:
-  // Throws InputError when a folder has this name.
+  // Throws InputError when a folder, a device or a pipe has this name.
   explicit OutputFile(const std::filesystem::path& path);
   ~OutputFile();  // without commit() nothing is left behind
   OutputFile(const OutputFile&) = delete;
@@ -31,7 +32,7 @@ class OutputFile {
   void write_at(uint64_t at, std::string_view bytes);
   [[noreturn]] void fail(const char* what) const;
 
-  const std::filesystem::path path_;
+  const std::filesystem::path path_, target_;
   std::string temporary_;
   int fd_ = -1;
   uint64_t size_ = 0;

@@ -54,8 +54,9 @@ class FolderPairWriter final : public PairWriter {
  public:
   FolderPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text, int png_level)
       : path_(path.has_filename() ? path : path.parent_path()),
-        temporary_((path_.has_parent_path() ? path_.parent_path() : ".") /
-                   ("." + path_.filename().string() + ".tmp" + std::to_string(::getpid()))),
+        target_(behind_links(path_)),
+        temporary_((target_.has_parent_path() ? target_.parent_path() : ".") /
+                   ("." + target_.filename().string() + ".tmp" + std::to_string(::getpid()))),
         camera_(camera),
         png_level_(png_level) {
     std::error_code error;
@@ -143,13 +144,13 @@ class FolderPairWriter final : public PairWriter {
 
   void put_in_place() {
     std::error_code error;
-    fs::rename(temporary_.path(), path_, error);  // also over an empty folder
+    fs::rename(temporary_.path(), target_, error);  // also over an empty folder
     if (error) throw OutputError(path_.string() + ": cannot be written (" + error.message() + ")");
     temporary_.keep();
   }
 
-  const fs::path path_;
-  NewFolder temporary_;  // until it is in its place
+  const fs::path path_, target_;  // as it was given; behind its links
+  NewFolder temporary_;           // until it is in its place
   const Camera camera_;
   const int png_level_;
   std::vector<Row> rows_;

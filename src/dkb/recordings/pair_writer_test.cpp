@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 
@@ -72,6 +73,11 @@ int frames_in(Source& source) {
     ++frames;
   }
   return frames;
+}
+
+std::unique_ptr<Source> open_any(const fs::path& path) {
+  if (path.has_extension()) return std::make_unique<RecordedSource>(path, SourceOptions{});
+  return std::make_unique<FolderSource>(path, SourceOptions{});
 }
 
 size_t entries_of(const fs::path& folder) {
@@ -202,6 +208,41 @@ TEST(PairWriter, AFolderInThePlaceOfARecordingIsFoundOutAtOnce) {
     EXPECT_NE(input_error_of([&] { write_pairs(temp / name, camera(), camera().to_yaml()); }).find("is a folder"),
               std::string::npos);
   }
+}
+
+TEST(PairWriter, LinksStayAndWhatTheyLeadToIsWritten) {
+  for (const char* name : {"a.bag", "a.mcap", "folder"}) {
+    SCOPED_TRACE(name);
+    const TempFolder temp;
+    const fs::path target = temp / "disk" / name, link = temp / name;
+    fs::create_directory(temp / "disk");
+    fs::create_symlink(fs::path("disk") / name, link);  // to nothing yet
+    for (int round = 0; round < 2; ++round) {
+      {
+        const auto writer = write_pairs(link, camera(), camera().to_yaml());
+        for (int n = 0; n < 3; ++n) add(*writer, n);
+        writer->close();
+      }
+      EXPECT_TRUE(fs::is_symlink(link));
+      EXPECT_FALSE(fs::is_symlink(target));
+      EXPECT_EQ(frames_in(*open_any(target)), 3);
+      EXPECT_EQ(entries_of(temp / "disk"), 1U) << "nothing else is left there";
+      if (target.has_extension()) continue;
+      fs::remove_all(target);
+      fs::create_directory(target);  // an empty folder is filled
+    }
+  }
+}
+
+TEST(PairWriter, NoRecordingTakesThePlaceOfAPipe) {
+  const TempFolder temp;
+  ASSERT_EQ(::mkfifo((temp / "pipe").c_str(), 0600), 0);
+  for (const char* name : {"a.bag", "a.mcap"}) {
+    fs::create_symlink("pipe", temp / name);
+    EXPECT_EQ(input_error_of([&] { write_pairs(temp / name, camera(), camera().to_yaml()); }),
+              (temp / name).string() + ": is a device or a pipe; a recording needs the name of a file");
+  }
+  EXPECT_TRUE(fs::is_fifo(temp / "pipe"));
 }
 
 TEST(PairWriter, OfAFolderThatFillsTheDiskTheWholePairsAreKept) {

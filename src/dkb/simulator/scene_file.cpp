@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include "dkb/simulator/scene.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 
 namespace dkb::sim {
@@ -25,28 +27,29 @@ std::string listed(const std::vector<std::string>& names) {
   return out;
 }
 
-// A map of the file whose keys are known; every complaint names the file and the line.
+// A map of the file whose keys are known; every complaint names the file, the line and the whole key.
 class Section {
  public:
+  // `name`: the key that leads here; empty for the file as a whole. `line`: where that stands.
   Section(const std::string& file, const YAML::Node& node, const std::string& name,
-          const std::vector<std::string>& keys)
-      : file_(file), node_(node), name_(name) {
-    if (!node.IsMap()) fail(node, name + " must be a map of " + listed(keys));
+          const std::vector<std::string>& keys, int line = 1)
+      : file_(file), node_(node), name_(name), line_(line_of(node, line)) {
+    if (!node.IsMap()) fail(node, (name.empty() ? "a scene file" : name) + " must be a map of " + listed(keys));
     std::vector<std::string> seen;
     for (const auto& entry : node) {
-      const auto key = entry.first.as<std::string>();
+      const std::string key = entry.first.IsScalar() ? excerpt(entry.first.Scalar()) : "";
       if (std::find(keys.begin(), keys.end(), key) == keys.end())
         fail(entry.first,
-             "unknown key \"" + key + "\" in " + name + did_you_mean(key, keys) + "; the keys are " + listed(keys));
+             "unknown key \"" + whole_key(key) + "\"" + did_you_mean(key, keys) + "; the keys are " + listed(keys));
       if (std::find(seen.begin(), seen.end(), key) != seen.end())
-        fail(entry.first, "key \"" + key + "\" stands twice in " + name);
+        fail(entry.first, "key \"" + whole_key(key) + "\" stands twice");
       seen.push_back(key);
     }
   }
 
   bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
   YAML::Node child(const std::string& key) const {
-    if (!has(key)) fail(node_, name_ + " lacks the key \"" + key + "\"");
+    if (!has(key)) fail(node_, "key \"" + whole_key(key) + "\" is missing");
     return node_[key];
   }
   double number(const std::string& key, double low, double high) const { return checked(child(key), key, low, high); }
@@ -55,13 +58,13 @@ class Section {
   }
   int whole(const std::string& key, int low, int high, int otherwise) const {
     const double v = number(key, low, high, otherwise);
-    if (v != std::floor(v)) fail(node_[key], key + " must be a whole number");
+    if (v != std::floor(v)) fail(node_[key], whole_key(key) + " must be a whole number");
     return static_cast<int>(v);
   }
   bool flag(const std::string& key, bool otherwise) const {
     if (!has(key)) return otherwise;
     bool v = false;
-    if (!YAML::convert<bool>::decode(node_[key], v)) fail(node_[key], key + " must be true or false");
+    if (!YAML::convert<bool>::decode(node_[key], v)) fail(node_[key], whole_key(key) + " must be true or false");
     return v;
   }
   std::string choice(const std::string& key, const std::vector<std::string>& names,
@@ -70,53 +73,74 @@ class Section {
     const YAML::Node n = child(key);
     const std::string v = n.IsScalar() ? n.Scalar() : "";
     if (std::find(names.begin(), names.end(), v) == names.end())
-      fail(n, key + ": unknown \"" + v + "\"" + did_you_mean(v, names) + "; there are " + listed(names));
+      fail(n, whole_key(key) + ": unknown \"" + excerpt(v) + "\"" + did_you_mean(v, names) + "; there are " +
+                  listed(names));
     return v;
   }
-  std::vector<double> numbers(const std::string& key, size_t count) const {
+  std::vector<double> numbers(const std::string& key, size_t count, double low = -1000, double high = 1000) const {
     const YAML::Node n = child(key);
     if (!n.IsSequence() || n.size() != count)
-      fail(n, key + " must be a list of " + std::to_string(count) + " numbers [m]");
+      fail(n, whole_key(key) + " must be a list of " + std::to_string(count) + " numbers [m]");
     std::vector<double> out;
-    for (const auto& v : n) out.push_back(checked(v, key, -1000, 1000));
+    for (const auto& v : n) out.push_back(checked(v, key, low, high));
     return out;
   }
   YAML::Node list(const std::string& key) const {
     const YAML::Node n = child(key);
-    if (!n.IsSequence() || n.size() == 0) fail(n, key + " must be a list with at least one entry");
+    if (!n.IsSequence() || n.size() == 0) fail(n, whole_key(key) + " must be a list with at least one entry");
     return n;
   }
   [[noreturn]] void fail(const YAML::Node& at, const std::string& what) const {
-    throw InputError(file_ + ":" + std::to_string(at.Mark().line + 1) + ": " + what);
+    throw InputError(file_ + ":" + std::to_string(line_of(at, line_)) + ": " + what);
   }
-  const YAML::Node& node() const { return node_; }
+  // Of what is wrong with the value of a key.
+  [[noreturn]] void refuse(const std::string& key, const std::string& what) const {
+    fail(child(key), whole_key(key) + ": " + what);
+  }
+  Section section(const std::string& key, const std::vector<std::string>& keys) const {
+    return Section(file_, child(key), whole_key(key), keys, line_);
+  }
+  // Of each entry of a list.
+  std::vector<Section> sections(const std::string& key, const std::vector<std::string>& keys) const {
+    std::vector<Section> out;
+    const YAML::Node entries = list(key);
+    for (const auto& node : entries) out.emplace_back(file_, node, whole_key(key), keys, line_of(entries, line_));
+    return out;
+  }
+  int line() const { return line_; }
 
  private:
+  // An entry that is empty stands nowhere.
+  static int line_of(const YAML::Node& node, int otherwise) {
+    return node.Mark().is_null() ? otherwise : node.Mark().line + 1;
+  }
+  std::string whole_key(const std::string& key) const { return name_.empty() ? key : name_ + "." + key; }
   double checked(const YAML::Node& n, const std::string& key, double low, double high) const {
     double v = 0;
-    if (!n.IsScalar() || !parse_number(n.Scalar(), &v) || !std::isfinite(v)) fail(n, key + " must be a number");
+    if (!n.IsScalar() || !parse_number(n.Scalar(), &v) || !std::isfinite(v))
+      fail(n, whole_key(key) + " must be a number");
     if (v < low || v > high)
-      fail(n, key + ": " + n.Scalar() + " is out of range; it must be " + std::to_string(low) + " ... " +
-                  std::to_string(high));
+      fail(n, fmt::format("{}: {} is out of range; it must be {:.7g} ... {:.7g}", whole_key(key), excerpt(n.Scalar()),
+                          low, high));
     return v;
   }
   std::string file_;
   YAML::Node node_;
   std::string name_;
+  int line_;
 };
 
-void read_room(const std::string& file, const Section& top, uint64_t seed, Scene* scene) {
+// Returns its height [m].
+double read_room(const Section& top, uint64_t seed, Scene* scene) {
   double width = 6, depth = 5, height = 2.6;
   std::string floor = "planks";
   bool furnished = true;
   if (top.has("room")) {
-    const Section room(file, top.child("room"), "room", {"size", "height", "floor", "furnished"});
+    const Section room = top.section("room", {"size", "height", "floor", "furnished"});
     if (room.has("size")) {
-      const std::vector<double> size = room.numbers("size", 2);
+      const std::vector<double> size = room.numbers("size", 2, 2, 50);
       width = size[0];
       depth = size[1];
-      if (width < 2 || depth < 2 || width > 50 || depth > 50)
-        room.fail(room.child("size"), "size must be 2 ... 50 m each way");
     }
     height = room.number("height", 2, 10, height);
     floor = room.choice("floor", {"planks", "carpet", "plaster", "wood"}, floor);
@@ -128,23 +152,23 @@ void read_room(const std::string& file, const Section& top, uint64_t seed, Scene
   const Footprint& r = scene->inside;
   Furnisher f(&scene->materials, &scene->furnishing, hash64(seed, 0xF00D));
   f.shell(r.x0, r.y0, r.x1, r.y1, height, material);
-  if (!furnished) return;
+  if (!furnished) return height;
   f.line_wall({r.x0 + 0.62, r.y0}, {1, 0}, width - 1.24, 0.45);
   f.line_wall({r.x1, r.y0 + 0.62}, {0, 1}, depth - 1.24, 0.45);
   f.line_wall({r.x1 - 0.62, r.y1}, {-1, 0}, width - 1.24, 0.45);
   f.line_wall({r.x0, r.y1 - 0.62}, {0, -1}, depth - 1.24, 0.45);
+  return height;
 }
 
-void read_objects(const std::string& file, const Section& top, uint64_t seed, Scene* scene) {
+void read_objects(const Section& top, uint64_t seed, Scene* scene) {
   if (!top.has("objects")) return;
   Furnisher f(&scene->materials, &scene->furnishing, hash64(seed, 0x0B7E));
-  for (const auto& node : top.list("objects")) {
-    const Section o(file, node, "objects", {"kind", "position", "yaw", "size", "material"});
+  for (const Section& o : top.sections("objects", {"kind", "position", "yaw", "size", "material"})) {
     const std::string kind =
         o.choice("kind", {"box", "ellipsoid", "desk", "shelf", "cabinet", "chair", "plant", "cartons"}, "");
     const bool free = kind == "box" || kind == "ellipsoid";
-    if (!free && (o.has("size") || o.has("material")))
-      o.fail(node, "size and material belong to kind box and ellipsoid only");
+    for (const char* key : {"size", "material"})
+      if (!free && o.has(key)) o.refuse(key, "belongs to kind box and ellipsoid only; leave it out of kind " + kind);
     const std::vector<double> p = o.numbers("position", free ? 3 : 2);
     const double yaw = o.number("yaw", -360, 360, 0) * kDegree;
     if (!free) {
@@ -157,13 +181,11 @@ void read_objects(const std::string& file, const Section& top, uint64_t seed, Sc
       if (kind == "cartons") f.cartons(at, 0.55, 0.45);
       continue;
     }
-    const std::vector<double> size = o.numbers("size", 3);
-    for (const double v : size)
-      if (v < 0.005) o.fail(o.child("size"), "size must be at least 0.005 m each way");
+    const std::vector<double> size = o.numbers("size", 3, 0.005, 1000);
     const std::string material = o.choice("material", material_names(), "carton");
     const auto kind_of = static_cast<Material>(std::find(material_names().begin(), material_names().end(), material) -
                                                material_names().begin());
-    const int t = scene->materials.get(kind_of, hash64(seed, static_cast<uint64_t>(node.Mark().line)),
+    const int t = scene->materials.get(kind_of, hash64(seed, static_cast<uint64_t>(o.line() - 1)),
                                        std::max(size[0], size[1]), size[2]);
     Surfaces s;
     if (kind == "box") {
@@ -180,20 +202,21 @@ void read_objects(const std::string& file, const Section& top, uint64_t seed, Sc
   }
 }
 
-void read_path(const std::string& file, const Section& top, uint64_t seed, Scene* scene) {
+void read_path(const Section& top, uint64_t seed, double height, Scene* scene) {
   std::vector<TimedPose> knots;
-  for (const auto& node : top.list("path")) {
-    const Section k(file, node, "path", {"time", "position", "look_at"});
+  for (const Section& k : top.sections("path", {"time", "position", "look_at"})) {
     const double time = k.number("time", 0, 36000);
-    if (!knots.empty() && time <= knots.back().time)
-      k.fail(k.child("time"), "time must be later than that of the entry before");
+    if (!knots.empty() && time <= knots.back().time) k.refuse("time", "must be later than that of the entry before");
     const std::vector<double> p = k.numbers("position", 3), q = k.numbers("look_at", 3);
     const Vector3d eye(p[0], p[1], p[2]), d = Vector3d(q[0], q[1], q[2]) - eye;
     const Footprint& in = scene->inside;
-    if (eye.x() <= in.x0 || eye.x() >= in.x1 || eye.y() <= in.y0 || eye.y() >= in.y1 || eye.z() <= 0)
-      k.fail(k.child("position"), "position is outside the room");
-    if (std::hypot(d.x(), d.y()) < 1e-3)
-      k.fail(k.child("look_at"), "look_at must not be straight above or below position");
+    if (eye.x() <= in.x0 || eye.x() >= in.x1 || eye.y() <= in.y0 || eye.y() >= in.y1 || eye.z() <= 0 ||
+        eye.z() >= height)
+      k.refuse("position",
+               fmt::format("({:g}, {:g}, {:g}) is outside the room; x must be between {:g} and {:g}, y between "
+                           "{:g} and {:g}, z between 0 and {:g}, its height",
+                           eye.x(), eye.y(), eye.z(), in.x0, in.x1, in.y0, in.y1, height));
+    if (std::hypot(d.x(), d.y()) < 1e-3) k.refuse("look_at", "must not be straight above or below position");
     knots.push_back({time, camera_pose(eye, std::atan2(d.y(), d.x()), std::atan2(d.z(), std::hypot(d.x(), d.y())))});
   }
   const double tremor = top.number("tremor", 0, 10, 1);
@@ -208,18 +231,15 @@ void read_path(const std::string& file, const Section& top, uint64_t seed, Scene
   };
 }
 
-void read_movers(const std::string& file, const Section& top, double duration, const SceneRequest& request,
-                 Scene* scene) {
+void read_movers(const Section& top, double duration, const SceneRequest& request, Scene* scene) {
   if (!top.has("movers")) return;
-  for (const auto& node : top.list("movers")) {
-    const Section m(file, node, "movers", {"class", "waypoints"});
+  for (const Section& m : top.sections("movers", {"class", "waypoints"})) {
     std::vector<Waypoint> points;
-    for (const auto& entry : m.list("waypoints")) {
-      const Section w(file, entry, "waypoints", {"time", "position"});
+    for (const Section& w : m.sections("waypoints", {"time", "position"})) {
       const std::vector<double> p = w.numbers("position", 2);
       points.push_back({{p[0], p[1]}, w.number("time", 0, 36000)});
       if (points.size() > 1 && points.back().time <= points[points.size() - 2].time)
-        w.fail(w.child("time"), "time must be later than that of the entry before");
+        w.refuse("time", "must be later than that of the entry before");
     }
     const std::string kind = m.choice("class", {"person", "chair"}, "person");
     const double later = kind == "person" ? request.stand_still : 0;
@@ -239,17 +259,16 @@ Scene read_scene_file(const std::string& file, const SceneRequest& request) {
     throw InputError(file + ":" + std::to_string(std::max(0, e.mark.line) + 1) + ": not YAML: " + e.msg);
   }
   const std::vector<std::string> keys{"frames", "people", "exposure_ms", "tremor", "room", "path", "objects", "movers"};
-  if (!root.IsMap()) throw InputError(file + ":1: a scene file is a map of " + listed(keys));
   try {
-    const Section top(file, root, "the scene", keys);
+    const Section top(file, root, "", keys);
     Scene scene;
     scene.frames = request.frames > 0 ? request.frames : top.whole("frames", 1, 1000000, 300);
     scene.exposure = top.number("exposure_ms", 1, 30, 14) * 1e-3;
     const double duration = scene.frames / request.fps;
-    read_room(file, top, request.seed, &scene);
-    read_objects(file, top, request.seed, &scene);
-    read_path(file, top, hash64(request.seed, 12), &scene);
-    read_movers(file, top, duration, request, &scene);
+    const double height = read_room(top, request.seed, &scene);
+    read_objects(top, request.seed, &scene);
+    read_path(top, hash64(request.seed, 12), height, &scene);
+    read_movers(top, duration, request, &scene);
     const int people = request.people >= 0 ? request.people : top.whole("people", 0, 30, 0);
     if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request);
     return scene;

@@ -59,8 +59,8 @@ const std::vector<std::string>& simulator_scenes() {
 void SimulatorOptions::check() const {
   require_option(frames >= 0 && frames <= 1000000, "--frames", frames, "0 (as many as the scene needs) ... 1000000");
   require_option(people >= -1 && people <= 30, "--people", people, "0 ... 30");
-  require_option(width >= 64 && width <= 4096, "width", width, "64 ... 4096 px");
-  require_option(height >= 64 && height <= 4096, "height", height, "64 ... 4096 px");
+  require_option(width >= 64 && width <= 4096, "--size WIDTH", width, "64 ... 4096 px");
+  require_option(height >= 64 && height <= 4096, "--size HEIGHT", height, "64 ... 4096 px");
   require_option(exposure == 0 || (exposure >= 0.001 && exposure <= 0.03), "exposure", exposure,
                  "0.001 ... 0.03 s, or 0 for the scene's own");
   require_option(rate >= 1 && rate <= 60, "--rate", rate, "1 ... 60 Hz");
@@ -127,8 +127,9 @@ struct Simulator::Impl {
       out.insert(out.end(), movers.parts[m].quadrics.size(), static_cast<int>(m));
     return out;
   }
-  void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner, const Rigid3& scene_from_cam,
-                      double t, SimulatedFrame* frame) const;
+  // `bands`: the rows that were drawn at one moment each.
+  void observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner,
+                      const std::vector<sim::Rasteriser::Rows>& bands, double t, SimulatedFrame* frame) const;
   // How the sensor sees the light at a time, row by row.
   sim::Exposure exposure_at(double t) const {
     sim::Exposure out;
@@ -144,15 +145,15 @@ struct Simulator::Impl {
 };
 
 void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const std::vector<int>& owner,
-                                     const Rigid3& scene_from_cam, double t, SimulatedFrame* frame) const {
+                                     const std::vector<sim::Rasteriser::Rows>& bands, double t,
+                                     SimulatedFrame* frame) const {
   struct Seen {
     int x0 = 1 << 20, y0 = 1 << 20, x1 = -1, y1 = -1;
     std::vector<float> x, y, z;
   };
   std::vector<Seen> seen(scene.movers.size());
   frame->mask = GreyImage(camera.width, camera.height);
-  const Rigid3 world_from_cam = scene.world_from_scene * scene_from_cam;
-  for (int y = 0; y < camera.height; ++y)
+  const auto observe_row = [&](int y, const Rigid3& world_from_cam) {
     for (int x = 0; x < camera.width; ++x) {
       const int32_t id = geometry.id(x, y);
       if (id < 0 || owner[static_cast<size_t>(id)] < 0) continue;
@@ -168,6 +169,11 @@ void Simulator::Impl::observe_movers(const sim::GeometryImage& geometry, const s
       s.y.push_back(static_cast<float>(p.y()));
       s.z.push_back(static_cast<float>(p.z()));
     }
+  };
+  for (const auto& rows : bands) {
+    const Rigid3 world_from_cam = scene.world_from_scene * scene.path(t + row_delay(rows));
+    for (int y = rows.first; y < rows.end; ++y) observe_row(y, world_from_cam);
+  }
   for (size_t m = 0; m < seen.size(); ++m) {
     Seen& s = seen[m];
     if (s.x.empty()) continue;
@@ -343,7 +349,7 @@ SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
     const sim::DrawList list = Impl::with(still, movers);
     for (const auto& rows : bands)
       rasteriser.draw(list, m.scene.path(t + m.row_delay(rows)).inverse(), Eigen::Vector2d::Zero(), rows, &geometry);
-    m.observe_movers(geometry, Impl::owners(still, movers), middle, t, &frame);
+    m.observe_movers(geometry, Impl::owners(still, movers), bands, t, &frame);
     if (with_true_depth) {
       if (m.readout > 0)  // the depth image has no rolling shutter
         rasteriser.draw(list, middle.inverse(), Eigen::Vector2d::Zero(), {0, m.camera.height}, &geometry);

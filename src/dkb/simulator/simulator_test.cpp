@@ -319,7 +319,9 @@ TEST(Simulator, UnknownSceneNamesTheNearest) {
   EXPECT_NE(error_of(small("crowds")).find("did you mean \"crowd\"?"), std::string::npos);
   SimulatorOptions o = small("room");
   o.people = 31;
-  EXPECT_NE(error_of(o).find("people"), std::string::npos);
+  EXPECT_NE(error_of(o).find("--people: 31 is out of range"), std::string::npos);
+  o = small("room"), o.height = 5000;
+  EXPECT_EQ(error_of(o), "--size HEIGHT: 5000 is out of range; it must be 64 ... 4096 px");
 }
 
 TEST_F(SimulatorFiles, SceneFileBuildsAScene) {
@@ -337,19 +339,84 @@ TEST_F(SimulatorFiles, SceneFileBuildsAScene) {
   EXPECT_NEAR(f.true_depth(160, 120), std::hypot(2.25, 2.25 * 0.6 / 2.5), 0.01);
 }
 
+TEST_F(SimulatorFiles, ARollingShutterDoesNotMoveWhatStands) {
+  // The camera turns 127 degrees in half a second past a chair that stands in the lower rows, which are read last.
+  SimulatorOptions o = small(file("scene.yaml",
+                                  "frames: 15\ntremor: 0\nroom: {size: [5, 4], furnished: false}\n"
+                                  "path:\n  - {time: 0, position: [0, -1, 1.4], look_at: [-2, 0, 1.4]}\n"
+                                  "  - {time: 0.5, position: [0, -1, 1.4], look_at: [2, 0, 1.4]}\n"
+                                  "movers:\n  - {class: chair, waypoints: [{time: 0, position: [0, 1]}]}\n"));
+  o.readout = 0;
+  const SimulatedFrame at_once = Simulator(o).render_without_true_depth(7);
+  o.readout = 0.033;
+  const SimulatedFrame rolling = Simulator(o).render_without_true_depth(7);
+  ASSERT_EQ(at_once.movers.size(), 1U);
+  ASSERT_EQ(rolling.movers.size(), 1U);
+  EXPECT_NE(at_once.movers[0].box_x, rolling.movers[0].box_x) << "its picture leans";
+  // Across the view: two pixels of 7 mm. Taken for seen from the middle of the frame it would be 0.008 s * 4 rad/s * 2
+  // m away. Along the view its median follows what of it is seen.
+  EXPECT_NEAR(at_once.movers[0].position_in_world.x(), rolling.movers[0].position_in_world.x(), 0.015);
+}
+
 TEST_F(SimulatorFiles, SceneFileErrorsNameLineAndNearestKey) {
   const auto error = [&](const std::string& text) { return error_of(small(file("scene.yaml", text))); };
   const std::string path = "path:\n  - {time: 0, position: [0, 0, 1.4], look_at: [0, 1, 0.8]}\n";
-  EXPECT_NE(
-      error(path + "frame: 3\n").find("scene.yaml:3: unknown key \"frame\" in the scene (did you mean \"frames\"?)"),
-      std::string::npos);
-  EXPECT_NE(error(path + "objects:\n  - {kind: desc, position: [0, 1]}\n")
-                .find("scene.yaml:4: kind: unknown \"desc\" (did you mean \"desk\"?)"),
-            std::string::npos);
-  EXPECT_NE(error("frames: 3\n").find("lacks the key \"path\""), std::string::npos);
-  EXPECT_NE(error(path + "people: many\n").find("scene.yaml:3: people must be a number"), std::string::npos);
-  EXPECT_NE(error("path: [\n").find("scene.yaml:"), std::string::npos);
-  EXPECT_NE(error("").find("scene.yaml:1"), std::string::npos);
+  const std::pair<std::string, const char*> faults[] = {
+      {path + "frame: 3\n", "3: unknown key \"frame\" (did you mean \"frames\"?); the keys are frames, "},
+      {path + "room:\n  hight: 3\n", "4: unknown key \"room.hight\" (did you mean \"height\"?); the keys are size, "},
+      {path + "? [1, 2]\n: 3\n", "3: unknown key \"\"; the keys are frames, "},
+      {path + "tremor: 1\ntremor: 2\n", "4: key \"tremor\" stands twice"},
+      {"frames: 3\n", "1: key \"path\" is missing"},
+      {"\npath:\n  -\n    time: 0\n    position: [0, 0, 1]\n", "4: key \"path.look_at\" is missing"},
+      {path + "people: many\n", "3: people must be a number"},
+      {path + "frames: 1.5\n", "3: frames must be a whole number"},
+      {path + "frames: 0\n", "3: frames: 0 is out of range; it must be 1 ... 1000000"},
+      {path + "room: 3\n", "3: room must be a map of size, height, floor, furnished"},
+      {path + "room: {height: 12}\n", "3: room.height: 12 is out of range; it must be 2 ... 10"},
+      {path + "room:\n  size: [6,\n   60]\n", "5: room.size: 60 is out of range; it must be 2 ... 50"},
+      {path + "room: {furnished: 3}\n", "3: room.furnished must be true or false"},
+      {path + "room: {floor: grass}\n", "3: room.floor: unknown \"grass\"; there are planks, carpet, "},
+      {path + "objects: 3\n", "3: objects must be a list with at least one entry"},
+      {path + "objects:\n  -\n", ": objects must be a map of kind, position, yaw, size, material"},
+      {path + "objects:\n  - {kind: desc, position: [0, 1]}\n",
+       "4: objects.kind: unknown \"desc\" (did you mean \"desk\"?); there are box, "},
+      {path + "objects:\n  - {kind: desk, position: [0, 1],\n     size: [1, 1, 1]}\n",
+       "5: objects.size: belongs to kind box and ellipsoid only; leave it out of kind desk"},
+      {path + "objects:\n  - {kind: box, position: [0, 1]}\n", "4: objects.position must be a list of 3 numbers [m]"},
+      {path + "objects:\n  - {kind: box, position: [0, 1, 2], size: [1, 1, 0]}\n",
+       "4: objects.size: 0 is out of range; it must be 0.005 ... 1000"},
+      {path + "  - {time: 0, position: [0, 0, 1], look_at: [0, 1, 1]}\n",
+       "3: path.time: must be later than that of the entry before"},
+      {"path:\n  - {time: 0, position: [0, 0, 1.4], look_at: [0, 0, 0]}\n",
+       "2: path.look_at: must not be straight above or below position"},
+      {path + "movers:\n  - {class: cat, waypoints: [{time: 0, position: [0, 0]}]}\n",
+       "4: movers.class: unknown \"cat\"; there are person, chair"},
+      {path + "movers:\n  - waypoints:\n     - {time: 1, position: [0, 0]}\n     - {time: 1, position: [0, 0]}\n",
+       "6: movers.waypoints.time: must be later than that of the entry before"},
+      {"path: [\n", ": not YAML: "},
+      {"", "1: a scene file must be a map of frames, "},
+      {"- 3\n", "1: a scene file must be a map of frames, "}};
+  for (const auto& [text, what] : faults) {
+    const std::string said = error(text);
+    EXPECT_NE(said.find("scene.yaml:" + std::string(*what == ':' ? "" : what)), std::string::npos) << said;
+    EXPECT_NE(said.find(what), std::string::npos) << said;
+    EXPECT_EQ(said.find(":0:"), std::string::npos) << said;
+  }
+}
+
+TEST_F(SimulatorFiles, ACameraOutsideTheRoomIsRefused) {
+  const auto error = [&](const std::string& position) {
+    return error_of(small(file("scene.yaml", "room: {size: [5, 4], height: 2.5}\npath:\n  - time: 0\n    position: [" +
+                                                 position + "]\n    look_at: [0, 1, 0.8]\n")));
+  };
+  EXPECT_EQ(error("0, 0, 2.4"), "no error");
+  EXPECT_NE(error("0, 0, 2.5")
+                .find("scene.yaml:4: path.position: (0, 0, 2.5) is outside the room; x must be between -2.5 "
+                      "and 2.5, y between -2 and 2, z between 0 and 2.5, its height"),
+            std::string::npos)
+      << error("0, 0, 2.5");
+  for (const char* outside : {"0, 0, 30", "0, 0, 0", "2.6, 0, 1", "0, -2.1, 1"})
+    EXPECT_NE(error(outside).find("is outside the room"), std::string::npos) << outside;
 }
 
 }  // namespace

@@ -50,15 +50,21 @@ DetectionStage::DetectionStage(Detector& detector, const Camera& camera, const D
 
 DetectionStage::Answer DetectionStage::detect(const Task& task) {
   const Stopwatch watch;
-  Answer answer{{task.index, task.frame.stamp_ns(), {}}, threw_, "", 0};
+  Answer answer{{task.index, task.frame.stamp_ns(), {}}, threw_, nullptr, "", 0};
   if (threw_) return answer;
+  const auto give_up = [&] {
+    answer.failed = threw_ = true;
+    answer.warning = "the detector failed: " + what_was_thrown() + "; it is not asked again";
+  };
   try {
     answer.due.detections = detector_.detect(detector_input(task.frame));
     const std::string wrong = make_fit(answer.due.detections, width_, height_);
     if (!wrong.empty()) answer.warning = "the detector: " + wrong;
+  } catch (const NeverStarted&) {
+    answer.never_started = std::current_exception();
+    give_up();
   } catch (...) {
-    answer.failed = threw_ = true;
-    answer.warning = "the detector failed: " + what_was_thrown() + "; it is not asked again";
+    give_up();
   }
   answer.ms = watch.ms();
   return answer;
@@ -86,9 +92,10 @@ std::optional<DetectionStage::Answer> DetectionStage::take(FrameIndex index) {
 std::vector<DueDetections> DetectionStage::take_due(FrameIndex index) {
   std::vector<DueDetections> due;
   const Stopwatch watch;
-  const bool waits = stage_.must_wait(index);
+  const bool waits = stage_.must_wait(index), first = !answered_;
   while (auto answer = take(index)) {
     answered_ = true;
+    if (first && answer->never_started) std::rethrow_exception(answer->never_started);
     if (!answer->warning.empty()) warnings_.push_back(std::move(answer->warning));
     failed_ = answer->failed;
     if (!answer->failed) {

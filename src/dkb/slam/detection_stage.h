@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,7 +25,7 @@ struct DueDetections {
 // Detection beside tracking. Every n-th image goes to the detector, and its answer counts a fixed number of frames
 // later. The first answer is waited for and counts at its own frame, so that nobody gets into the map before.
 // A detector that throws is a warning, and is not asked again: from then on its answers are empty, so that what it saw
-// last is not carried for ever.
+// last is not carried for ever. Only one that never started is refused, while the first answer is waited for.
 class DetectionStage {
  public:
   // The detector must outlive the stage. In a real-time run answers are not waited for, but for the first, and that one
@@ -36,7 +37,7 @@ class DetectionStage {
   void offer(FrameIndex index, const Frame& frame);
   // Whether the next answer counts at its own frame, which must be offered first.
   bool answers_at_once() const { return next_ == 0 || schedule_.latency == 0; }
-  // What counts from this frame on, oldest first.
+  // What counts from this frame on, oldest first. Throws NeverStarted.
   std::vector<DueDetections> take_due(FrameIndex index);
   // For real-time runs: while on, the detector rests as long as its last answer took, in frames.
   void rest(bool on) { rests_ = on; }
@@ -56,6 +57,7 @@ class DetectionStage {
   struct Answer {
     DueDetections due;
     bool failed = false;
+    std::exception_ptr never_started;
     std::string warning;
     double ms = 0;
   };

@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dkb/detection/detection.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -22,6 +23,7 @@ class ScriptedDetector final : public Detector {
       entered.set_value();
       gate.get_future().wait();
     }
+    if (frame == never_started) throw NeverStarted("no such command");
     if (frame == bad) throw std::runtime_error("network fell over");
     Detections found;
     found.boxes.push_back({"person", {static_cast<float>(frame), static_cast<float>(calls), 1, 1}, 1});
@@ -29,7 +31,7 @@ class ScriptedDetector final : public Detector {
   }
   std::string kind() const override { return "scripted"; }
 
-  int64_t bad = -1, slow = -1;
+  int64_t bad = -1, never_started = -1, slow = -1;
   std::promise<void> gate, entered;
   int calls = 0;  // the stage's thread's, until the stage ends
 };
@@ -119,6 +121,21 @@ TEST(DetectionStage, ADetectorThatThrewIsNotAskedAgain) {
     }
     EXPECT_EQ(detector.calls, 3);
   }
+}
+
+TEST(DetectionStage, OneThatNeverStartedIsThrownWhereTheFirstAnswerIsWaitedFor) {
+  for (const bool threaded : {true, false})
+    for (const bool realtime : {true, false}) {
+      ScriptedDetector first, second;
+      first.never_started = 0, second.never_started = 1;
+      const auto refused = stage_of(first, {.every = 1, .latency = 0}, {threaded, realtime});
+      EXPECT_THROW(exchange(*refused, 0, frame_at(0)), NeverStarted);
+      if (realtime) continue;  // later answers come when they come
+      const auto survived = stage_of(second, {.every = 1, .latency = 0}, {threaded, realtime});
+      for (const FrameIndex frame : {0, 1}) exchange(*survived, frame, frame_at(frame));
+      EXPECT_TRUE(survived->failed());
+      EXPECT_EQ(survived->take_warnings().size(), 1U);
+    }
 }
 
 TEST(DetectionStage, FramesThatWereSkippedDoNotStopTheRhythm) {

@@ -48,13 +48,21 @@ void fail_to_write(const fs::path& path, const std::string& what, int error, con
   throw OutputError(message + kept);
 }
 
+fs::path behind_links(const fs::path& path) {
+  constexpr int kMostLinks = 40;  // as many as Linux follows
+  std::error_code error, unknown;
+  fs::path target = fs::weakly_canonical(path, error);
+  for (int i = 0; i < kMostLinks && !error && fs::is_symlink(fs::symlink_status(target, unknown)); ++i)
+    target = fs::weakly_canonical(target.parent_path() / fs::read_symlink(target, unknown), error);
+  return error ? path : target;
+}
+
 void write_file_atomically(const fs::path& path, std::string_view content) {
   std::error_code unknown;
   const fs::file_status there = fs::status(path, unknown);
   // A device or a pipe is no file to be replaced.
   const bool straight = fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
-  fs::path target = fs::weakly_canonical(path, unknown);  // a link stays: what it leads to is replaced
-  if (unknown) target = path;
+  const fs::path target = behind_links(path);  // a link stays: what it leads to is replaced
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   const std::string temporary =
       (folder / ("." + target.filename().string() + ".tmp" + std::to_string(::getpid()))).string();

@@ -10,6 +10,9 @@ namespace dkb {
 // Whole file as bytes. Throws InputError naming the file.
 std::string read_file(const std::filesystem::path& path);
 
+// What is replaced where `path` is written: what a link leads to, also where that is not there yet.
+std::filesystem::path behind_links(const std::filesystem::path& path);
+
 // Replaces `path` by `content` atomically: temporary file in the same folder, fsync, rename, fsync of the folder.
 // A reader sees the old file or the new one, never a part. Links are followed; a device or a pipe is written straight.
 // Throws as fail_to_write() does.

@@ -127,6 +127,11 @@ TEST(Files, AtomicWriteLeavesLinksAndPipesWhatTheyAre) {
   write_file_atomically(folder / "link", "after");
   EXPECT_TRUE(fs::is_symlink(folder / "link"));
   EXPECT_EQ(read_file(folder / "file"), "after");
+  fs::create_symlink("new", folder / "second");
+  fs::create_symlink("second", folder / "first");
+  write_file_atomically(folder / "first", "made");
+  EXPECT_TRUE(fs::is_symlink(folder / "first") && fs::is_symlink(folder / "second"));
+  EXPECT_EQ(read_file(folder / "new"), "made") << "it was not there before";
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   std::string got;
   std::thread reader([&] { got = read_file(folder / "pipe"); });
