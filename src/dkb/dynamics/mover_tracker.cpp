@@ -32,6 +32,7 @@ constexpr double kHasMoved = 0.5;      // [m] from where it was found: it is a m
 constexpr double kBefore = 0.3;        // [m] what is so much nearer than a mover is not part of it
 constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
 constexpr double kMemory = 1.2;        // [s] a mover unseen for longer, and hidden by nothing, is forgotten
+constexpr double kHiddenMemory = 5;    // [s] and one that is hidden: as long as one walks behind a group 7 m wide
 constexpr double kDoubtMemory = 0.2;   // [s] the same before it is confirmed
 constexpr int kMinObservations = 3;    // that confirm a mover and give it its id
 constexpr double kApart = 0.35;        // [m] nothing is found so near to a mover already seen in the frame
@@ -53,7 +54,7 @@ void MoverTracker::predict(double seconds) {
   noise.topRightCorner<3, 3>().diagonal().setConstant(0.5 * seconds * seconds);
   noise.bottomLeftCorner<3, 3>() = noise.topRightCorner<3, 3>();
   for (Track& t : tracks_) {
-    if (!t.hidden) t.missed += seconds;
+    if (!t.hidden || t.id == 0) t.missed += seconds;
     t.state.head<3>() += seconds * t.state.tail<3>();
     t.covariance = transition * t.covariance * transition.transpose() + kAgility * noise;
   }
@@ -75,7 +76,9 @@ MoverSighting MoverTracker::look(double timestamp, const DepthImage& depth, cons
   time_ = timestamp;
   // What the frame before saw has not been missed yet, however long ago that was.
   const auto at_least = [&](double memory) { return std::max(memory, 1.5 * interval); };
-  std::erase_if(tracks_, [&](const Track& t) { return t.missed > (t.id > 0 ? kMemory : at_least(kDoubtMemory)); });
+  std::erase_if(tracks_, [&](const Track& t) {
+    return t.missed > (t.id > 0 ? kMemory : at_least(kDoubtMemory)) || time_ - t.seen > at_least(kHiddenMemory);
+  });
   MoverSighting sighting;
   // Tracks whose place is known well enough to tell whose surface is whose.
   std::vector<ExpectedMover> expected;

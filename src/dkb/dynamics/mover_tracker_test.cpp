@@ -141,6 +141,26 @@ TEST(MoverTracker, WhoIsHiddenForLongKeepsTheId) {
   EXPECT_EQ(movers[0].id, 1);
 }
 
+TEST(MoverTracker, WhoIsHiddenForGoodIsForgotten) {
+  const auto id_after = [](double seconds_hidden) {
+    MoverTracker tracker(MoverTestScene().camera, {});
+    std::vector<Mover> movers;
+    const int gone = 10, back = gone + static_cast<int>(seconds_hidden / kStep);
+    for (int i = 0; i < back + 5; ++i) {
+      MoverTestScene scene;
+      if (i < gone || i >= back)
+        add_person(0, 3.5, &scene, false);
+      else
+        for (int y = 0; y < 240; ++y)
+          for (int u = 0; u < 320; ++u) scene.depth(u, y) = 2;
+      movers = show(&tracker, i * kStep, scene);
+    }
+    return movers.size() == 1 ? movers[0].id : 0;
+  };
+  EXPECT_EQ(id_after(3), 1);
+  EXPECT_EQ(id_after(8), 2) << "he may have gone anywhere";
+}
+
 TEST(MoverTracker, WhoStopsIsFollowedThoughNothingMovesUntilHeIsSeenThrough) {
   const auto stop_after = [](double way, bool leaves) {
     MoverTracker tracker(MoverTestScene().camera, {});

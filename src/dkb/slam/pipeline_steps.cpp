@@ -420,9 +420,10 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     odometry_.update(world_from_cam, seen_again || (tracked.state == TrackingState::relocalised && tracked.index == 0));
     result.world_from_cam = world_from_cam;
     result.odom_from_cam = odometry_.odom_from_cam();
-    // The frame in its map, and the map in its world.
-    result.covariance =
-        tracked.covariance + carried(tracked.cam_from_world, tracker_.map().covariance(tracked.reference));
+    // The frame in its map, and the map in its world. A frame that goes on where the images say nothing of how begins
+    // a stretch of the map that is as uncertain as itself.
+    const Matrix6d of_map = carried(tracked.cam_from_world, tracker_.map().covariance(tracked.reference));
+    result.covariance = tracked.starts_map && tracked.predicted ? of_map : Matrix6d(tracked.covariance + of_map);
     result.reference_keyframe = tracked.reference;
     result.map = map_number(tracked.reference);
   }

@@ -26,6 +26,7 @@ constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: a
 
 std::optional<MotionPrior> Tracker::expected_step(double timestamp, const MotionPrior* prior) const {
   if (!last_ || timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
+  if (state_ == TrackingState::lost) prior = nullptr;  // it tells of the step from a frame whose pose nobody knows
   if (prior != nullptr && !prior->rotation_only) return *prior;
   MotionPrior step;
   const double seconds = timestamp - last_->timestamp;
@@ -121,7 +122,11 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   const Eigen::Vector3d centre = centre_in_world(expected.cam_from_world);
   const double reach = kMaxViewDistance + 3 * std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   std::vector<std::pair<double, KeyframeId>> nearby;
+  // Worlds of maps that are not joined have nothing to do with each other.
+  const bool one_map = !last_ || map_.view().roots().size() < 2;
+  const KeyframeId root = one_map ? kNoKeyframe : map_.root(last_->reference);
   for (KeyframeId id : map_.view().live_keyframes()) {
+    if (!one_map && map_.view().root(id) != root) continue;
     const Rigid3& k = map_.view().keyframe(id)->cam_from_world;
     const double distance = (centre_in_world(k) - centre).norm();
     const Eigen::Vector3d axis = (expected.cam_from_world.rotation * k.rotation.conjugate()) * Eigen::Vector3d::UnitZ();

@@ -81,7 +81,9 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
     packet.new_points.push_back(p);
   }
 
-  map_.add_pending(id, packet.reference, packet.cam_from_reference);
+  const bool bridges = frame.starts_map && frame.predicted && packet.reference != kNoKeyframe;
+  map_.add_pending(id, packet.reference, packet.cam_from_reference,
+                   bridges ? frame.covariance : Matrix6d(Matrix6d::Zero()));
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
   if (last_ && last_->index == frame.index) {
     for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;

@@ -13,8 +13,9 @@ void TrackingMap::take_view(MapView view) {
   std::erase_if(pending_, [&](const Pending& p) { return view_->keyframe(p.id) != nullptr; });
 }
 
-void TrackingMap::add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference) {
-  pending_.push_back({id, reference, cam_from_reference});
+void TrackingMap::add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference,
+                              const Matrix6d& covariance) {
+  pending_.push_back({id, reference, cam_from_reference, covariance});
 }
 
 const TrackingMap::Pending& TrackingMap::pending(KeyframeId id) const {
@@ -30,11 +31,12 @@ Rigid3 TrackingMap::cam_from_world(KeyframeId id) const {
 }
 
 Matrix6d TrackingMap::covariance(KeyframeId id) const {
-  while (view_->keyframe(id) == nullptr) {
-    id = pending(id).reference;
-    if (id == kNoKeyframe) return Matrix6d::Zero();
+  Matrix6d sum = Matrix6d::Zero();
+  for (; view_->keyframe(id) == nullptr; id = pending(id).reference) {
+    sum += carried(cam_from_world(id).inverse(), pending(id).covariance);
+    if (pending(id).reference == kNoKeyframe) return Matrix6d::Zero();
   }
-  return carried(view_->cam_from_world(id).inverse(), view_->keyframe(id)->covariance);
+  return sum + carried(view_->cam_from_world(id).inverse(), view_->keyframe(id)->covariance);
 }
 
 KeyframeId TrackingMap::root(KeyframeId id) const {

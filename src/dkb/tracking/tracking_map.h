@@ -19,12 +19,14 @@ class TrackingMap {
   // Keyframes that are in the newer view are not pending any more.
   void take_view(MapView view);
   // A keyframe that mapping was just told of; without a reference `cam_from_reference` is its cam_from_world.
-  void add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference);
+  // `covariance`: how a map that begins with it hangs on its reference, as TrackedFrame's; of others zero, since the
+  // frames that follow rest on the same points as they do.
+  void add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference, const Matrix6d& covariance);
 
   // Pose of a keyframe. Throws std::logic_error for one that was never made.
   Rigid3 cam_from_world(KeyframeId id) const;
   // Of the map where this keyframe is: left perturbation of world_from_cam, [translation m, rotation rad]. For one that
-  // is pending, that of the newest in the view which it hangs on.
+  // is pending, that of the newest in the view which it hangs on, and how.
   Matrix6d covariance(KeyframeId id) const;
   // The first keyframe of the map that a keyframe belongs to, likewise.
   KeyframeId root(KeyframeId id) const;
@@ -33,6 +35,7 @@ class TrackingMap {
   struct Pending {
     KeyframeId id = kNoKeyframe, reference = kNoKeyframe;
     Rigid3 cam_from_reference;
+    Matrix6d covariance;
   };
   const Pending& pending(KeyframeId id) const;
 

@@ -40,9 +40,9 @@ TEST(TrackingMap, AKeyframeThatWasNeverMadeHasNoPose) {
 TEST(TrackingMap, PendingKeyframesHangOnTheirReferences) {
   TrackingMap map;
   map.take_view(two_roots());
-  map.add_pending(2, 0, shifted(10));
-  map.add_pending(3, 2, shifted(100));
-  map.add_pending(4, kNoKeyframe, shifted(7));
+  map.add_pending(2, 0, shifted(10), Matrix6d::Zero());
+  map.add_pending(3, 2, shifted(100), Matrix6d::Zero());
+  map.add_pending(4, kNoKeyframe, shifted(7), Matrix6d::Zero());
   EXPECT_NEAR(map.cam_from_world(2).translation.x(), 11, 1e-12);
   EXPECT_NEAR(map.cam_from_world(3).translation.x(), 111, 1e-12);
   EXPECT_NEAR(map.cam_from_world(4).translation.x(), 7, 1e-12);
@@ -53,7 +53,7 @@ TEST(TrackingMap, PendingKeyframesHangOnTheirReferences) {
 
 TEST(TrackingMap, APublishedKeyframeIsPendingNoMore) {
   TrackingMap map;
-  map.add_pending(0, kNoKeyframe, shifted(5));
+  map.add_pending(0, kNoKeyframe, shifted(5), Matrix6d::Zero());
   EXPECT_NEAR(map.cam_from_world(0).translation.x(), 5, 1e-12);
   map.take_view(two_roots());
   EXPECT_NEAR(map.cam_from_world(0).translation.x(), 1, 1e-12) << "the map's word counts";
@@ -61,7 +61,7 @@ TEST(TrackingMap, APublishedKeyframeIsPendingNoMore) {
 
 TEST(TrackingMap, ACopyKeepsWhatItKnew) {
   TrackingMap map;
-  map.add_pending(0, kNoKeyframe, shifted(5));
+  map.add_pending(0, kNoKeyframe, shifted(5), Matrix6d::Zero());
   const TrackingMap copy = map;
   map.take_view(two_roots());
   EXPECT_NEAR(copy.cam_from_world(0).translation.x(), 5, 1e-12);
@@ -75,13 +75,27 @@ TEST(TrackingMap, CovariancesAreOfTheWorldAndPendingKeyframesHaveTheirReferences
   made.set_covariance(0, covariance);
   TrackingMap map;
   map.take_view(made.snapshot());
-  map.add_pending(2, 0, shifted(10));
+  map.add_pending(2, 0, shifted(10), Matrix6d::Zero());
   const Matrix6d world = map.covariance(0);
   EXPECT_NEAR(world(5, 5), 4e-6, 1e-12);
   EXPECT_NEAR(world(1, 1), 4e-6, 1e-12) << "the lever of one metre";
   EXPECT_NEAR(world(0, 0), 0, 1e-12);
   EXPECT_TRUE(map.covariance(2).isApprox(world));
   EXPECT_TRUE(map.covariance(1).isZero());
+}
+
+TEST(TrackingMap, AMapThatGoesOnUnseenIsAsUncertainAsTheWayThere) {
+  Map made = *two_roots();
+  made.set_covariance(0, 1e-6 * Matrix6d::Identity());
+  TrackingMap map;
+  map.take_view(made.snapshot());
+  Matrix6d way = Matrix6d::Zero();  // 10 cm along the optical axis
+  way(2, 2) = 0.01;
+  map.add_pending(2, 0, shifted(10), way);
+  map.add_pending(3, 2, shifted(1), Matrix6d::Zero());
+  const Matrix6d expected = map.covariance(0) + way;  // the cameras are not turned
+  EXPECT_TRUE(map.covariance(2).isApprox(expected));
+  EXPECT_TRUE(map.covariance(3).isApprox(expected)) << "what hangs on it shares its uncertainty";
 }
 
 }  // namespace
