@@ -109,13 +109,14 @@ void SlamCore::run_grids() {
 }
 
 void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
-  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, last_image_ns = 0;
+  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, outdated = 0, last_image_ns = 0;
   {
     const std::lock_guard lock(input_mutex_);
     unpaired = pairing_.unpaired();
     late = pairing_.late();
     late_motion = late_motion_;
     dropped = dropped_;
+    outdated = outdated_;
     last_image_ns = last_image_ns_;
   }
   const int maps = slam == nullptr ? 0 : slam->statistics().maps;
@@ -151,7 +152,7 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   count("predicted", counts_.predicted);
   count("lost", counts_.lost);
   count("ambiguous", counts_.ambiguous);
-  count("dropped", dropped);
+  count("dropped", dropped + outdated);
   count("unpaired", unpaired);
   count("late", late);
   count("late odometry", late_motion);

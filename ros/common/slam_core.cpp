@@ -386,6 +386,8 @@ void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
 void SlamCore::begin_anew() {
   forget_motion();
   const std::lock_guard lock(input_mutex_);
+  outdated_ += static_cast<int64_t>(pairs_.size());
+  pairs_.clear();  // of the old world: their stamps would keep out those that follow
   pairing_.restart();
   odometry_.clear();
   gyro_.clear();

@@ -113,6 +113,7 @@ class SlamCore final : public RosCore {
   OdometryHistory odometry_;
   GyroHistory gyro_;
   int64_t dropped_ = 0;        // pairs that found the queue full
+  int64_t outdated_ = 0;       // pairs that waited when a service began another world
   int64_t late_motion_ = 0;    // messages of odometry and imu
   int64_t last_image_ns_ = 0;  // by the steady clock
 

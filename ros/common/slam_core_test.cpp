@@ -300,6 +300,31 @@ TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
   std::filesystem::remove(file);
 }
 
+TEST_F(SlamCoreTest, PairsThatWaitedAreNoPartOfTheWorldThatAResetBegins) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_at(*core, 0, 100'000'000'000);
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 1; }));
+  std::promise<void> held, go_on;
+  core->pause(false, [&](const Answer&) {
+    held.set_value();
+    go_on.get_future().wait();
+  });
+  held.get_future().wait();
+  for (size_t i = 1; i <= 3; ++i) feed_at(*core, i, 100'000'000'000);
+  std::promise<Answer> begun;
+  core->reset([&](const Answer& answer) { begun.set_value(answer); });
+  go_on.set_value();
+  EXPECT_TRUE(begun.get_future().get().success);
+  for (size_t i = 0; i < 3; ++i) feed(*core, i);  // the recording again, from its beginning
+  ASSERT_TRUE(out.wait([&] { return out.odometry.back().pose.stamp_ns == frames()[2].stamp_ns(); }));
+  EXPECT_EQ(out.odometry.size(), 4U);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("dropped") == "3"; }));
+  const std::lock_guard lock(out.mutex);
+  EXPECT_EQ(out.last_value("rejected"), "0");
+  for (const DiagnosticsOutput& d : out.diagnostics) EXPECT_EQ(d.message.find("too slow"), std::string::npos);
+}
+
 TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {
   const std::string file = testing::TempDir() + "dkb_ros_beside_test.dkb";
   {
