@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "inputs.h"
 #include "outputs.h"
 #include "slam_core.h"
 
@@ -13,7 +14,7 @@ constexpr size_t kMaxUnplaced = 30;  // [frames] that wait for the robot's odome
 
 }  // namespace
 
-void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
+void SlamCore::publish(const ImagePair& pair, const dkb::FrameResult& result, const std::string& hindrance) {
   if (parameters_.publish_odom_tf) publish_odometry(result);  // else `odom` is the robot's
   const double out_ms =
       1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
@@ -21,13 +22,14 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     const std::lock_guard lock(report_mutex_);
     trouble_.clear();
     state_ = result.state;
-    hindrance_ = hindrance_of(result);
+    hindrance_ = hindrance;
     last_result_stamp_ns_ = result.stamp_ns;
     ++counts_.frames;
     counts_.tracked += result.tracked();
     counts_.predicted += result.state == dkb::TrackingState::predicted;
     counts_.lost += result.state == dkb::TrackingState::lost;
     counts_.ambiguous += result.ambiguous;
+    counts_.paused += result.state == dkb::TrackingState::paused;
     ++recent_.frames;
     recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
     recent_.tracking_ms.add(result.tracking_ms);
@@ -42,7 +44,7 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     middleware_.publish(movers);
   }
   if (middleware_.wanted(Topic::features_image)) {
-    ColourImageOutput image = draw_features(input.colour, result);
+    ColourImageOutput image = draw_features(view_of(pair.colour, false), result);
     image.stamp_ns = result.stamp_ns;
     image.frame_id = camera_frame_;
     middleware_.publish(image);

@@ -152,6 +152,7 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   count("predicted", counts_.predicted);
   count("lost", counts_.lost);
   count("ambiguous", counts_.ambiguous);
+  count("paused", counts_.paused);
   count("dropped", dropped + outdated);
   count("unpaired", unpaired);
   count("late", late);

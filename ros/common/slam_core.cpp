@@ -224,13 +224,19 @@ void SlamCore::process(const ImagePair& pair) {
     begin_after_jump();
   }
   if (!slam_ && !start(pair)) return;
-  // What comes while a visitor of the page has paused is dropped.
-  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) return;
+  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) {
+    // What comes while a visitor of the page has paused is dropped; those who rely on the robot are told.
+    dkb::FrameResult paused;
+    paused.stamp_ns = pair.colour.stamp_ns;
+    paused.state = dkb::TrackingState::paused;
+    publish(pair, paused, "paused on the page");
+    return;
+  }
   const dkb::FrameInput input = input_of(pair);
   const dkb::Frame frame(slam_->camera(), input);
   dkb::FrameResult result = slam_->process(frame);
   last_stamp_ns_ = pair.colour.stamp_ns;  // paused too: the motions of frames that were skipped are joined
-  publish(pair, input, result);
+  publish(pair, result, hindrance_of(result));
   std::vector<dkb::Event> events = tell_events();
   if (!viewer_) return;
   viewer_->show(std::move(result), frame, slam_->map(), std::move(events));

@@ -47,6 +47,7 @@ class SlamCore final : public RosCore {
  private:
   struct Counts {
     int64_t frames = 0, tracked = 0, predicted = 0, lost = 0, ambiguous = 0;
+    int64_t paused = 0;    // frames that came while a service or a visitor of the page had paused
     int64_t rejected = 0;  // pairs that the library refused
     int64_t waiting = 0;   // pairs that came before the camera and its mount were known
     int64_t priors = 0;    // pairs that had a motion prior
@@ -84,7 +85,7 @@ class SlamCore final : public RosCore {
   dkb::FrameInput input_of(const ImagePair& pair);
   std::optional<dkb::MotionPrior> prior(int64_t stamp_ns);
   std::optional<Rigid3> cam_from(const std::string& frame);
-  void publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result);
+  void publish(const ImagePair& pair, const dkb::FrameResult& result, const std::string& hindrance);
   void publish_odometry(const dkb::FrameResult& result);
   bool in_map_frame(const dkb::FrameResult& result) const;
   void publish_transforms(const dkb::FrameResult& result);
