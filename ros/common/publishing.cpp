@@ -56,6 +56,11 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
     last_pose_.reset();
     return;
   }
+  // How the camera came to where it is found is not known, nor how far off guesses were when images tell again:
+  // odometry may be held then, which is no standing still.
+  const bool guessed = result.state == dkb::TrackingState::predicted;
+  if (result.state == dkb::TrackingState::relocalised || (last_pose_ && last_pose_->guessed && !guessed))
+    last_pose_.reset();
   const Rigid3 odom_from_base = *result.odom_from_cam * base_from_cam_.inverse();
   const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
   OdometryOutput odometry;
@@ -72,7 +77,7 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
   } else {
     odometry.twist_covariance = 1e6 * Matrix6d::Identity();  // not known
   }
-  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
+  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base, guessed};
   middleware_.publish(odometry);
 }
 

@@ -66,7 +66,8 @@ class SlamCore final : public RosCore {
   struct LastPose {
     int64_t stamp_ns = 0;
     Rigid3 odom_from_base;
-    Matrix6d covariance;  // right perturbation, in the base's axes
+    Matrix6d covariance;   // right perturbation, in the base's axes
+    bool guessed = false;  // not by the images
   };
   using Task = std::function<Answer(dkb::Slam&)>;
 

@@ -378,6 +378,24 @@ TEST_F(SlamCoreTest, WhilePausedOnThePageItSaysSoAndTheMapStaysWhereItIs) {
   ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "tracking"; }));
 }
 
+TEST_F(SlamCoreTest, AcrossAPoseThatWasSetTheTwistIsNotKnown) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 10);
+  EXPECT_LT(out.odometry.back().twist_covariance(0, 0), 1);
+  PoseMessage here;
+  here.pose = out.odometry.back().pose.pose;  // nothing has moved the map yet
+  here.covariance.diagonal().setConstant(0.01);
+  core->initial_pose(here);
+  feed_all(*core, 10, 2);
+  ASSERT_EQ(out.odometry.size(), 12U);
+  EXPECT_EQ(out.odometry[10].pose.stamp_ns, frames()[10].stamp_ns()) << "found at once";
+  EXPECT_LT((out.odometry[9].pose.pose.translation - out.odometry[10].pose.pose.translation).norm(), 1e-9)
+      << "odometry is held, which tells of no motion";
+  EXPECT_EQ(out.odometry[10].twist_covariance(0, 0), 1e6);
+  EXPECT_LT(out.odometry[11].twist_covariance(0, 0), 1);
+}
+
 TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {
   const std::string file = testing::TempDir() + "dkb_ros_beside_test.dkb";
   {
