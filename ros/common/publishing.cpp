@@ -82,8 +82,15 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
 }
 
 // A map that was loaded is what others plan in: one begun beside it lies nobody knows where.
-bool SlamCore::in_map_frame(const dkb::FrameResult& result) const {
-  return result.tracked() && (loaded_maps_ == 0 || result.map < loaded_maps_);
+bool SlamCore::in_map_frame(const dkb::FrameResult& result) {
+  if (!result.tracked()) return false;
+  if (loaded_map_.empty()) return true;
+  // Maps that are joined take numbers away: that of a new map falls then. While the number stays, so does the answer.
+  if (result.map != last_map_) {
+    last_map_ = result.map;
+    loaded_maps_ = loaded_maps(slam_->keyframes());
+  }
+  return loaded_maps_ == 0 || result.map < loaded_maps_;
 }
 
 void SlamCore::publish_transforms(const dkb::FrameResult& result) {

@@ -149,7 +149,6 @@ void SlamCore::reset(Done done) {
       [this](dkb::Slam& slam) {
         slam.reset();
         loaded_map_.clear();
-        loaded_maps_ = 0;
         begin_anew();
         return Answer{true, "a new world begins"};
       },
@@ -385,7 +384,6 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
 void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
   slam.load_map(map);
   loaded_map_ = map;
-  loaded_maps_ = slam.statistics().maps;
 }
 
 // After a service: the images that follow may have any stamps.
@@ -411,10 +409,7 @@ void SlamCore::begin_after_jump() {
       complain(LogLevel::error, error.what());
     }
   }
-  if (slam_ && !loaded) {
-    slam_->reset();
-    loaded_maps_ = 0;
-  }
+  if (slam_ && !loaded) slam_->reset();
   complain(LogLevel::warning, jumped + (loaded ? "begins again in " + loaded_map_ : "a new world begins"));
   forget_motion();
 }
@@ -423,6 +418,7 @@ void SlamCore::forget_motion() {
   last_stamp_ns_.reset();
   last_pose_.reset();
   map_from_odom_.reset();
+  last_map_.reset();
   unplaced_.clear();
 }
 

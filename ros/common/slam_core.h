@@ -4,7 +4,6 @@
 #include <dkb_slam/viewer.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -88,7 +87,7 @@ class SlamCore final : public RosCore {
   std::optional<Rigid3> cam_from(const std::string& frame);
   void publish(const ImagePair& pair, const dkb::FrameResult& result, const std::string& hindrance);
   void publish_odometry(const dkb::FrameResult& result);
-  bool in_map_frame(const dkb::FrameResult& result) const;
+  bool in_map_frame(const dkb::FrameResult& result);
   void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_in(dkb::Slam& slam, const std::string& map);
@@ -129,7 +128,8 @@ class SlamCore final : public RosCore {
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
   std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
   std::string loaded_map_;                           // file to begin in again; empty = begin anew
-  std::atomic<int> loaded_maps_ = 0;                 // of the file that this world began in; 0 = it began anew
+  std::optional<int> last_map_;                      // FrameResult::map of the last pose
+  int loaded_maps_ = 0;                              // when that was the map first: see loaded_maps()
   std::string failed_start_;                         // why there is no system and will be none
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;
