@@ -278,6 +278,9 @@ TEST_F(LibraryDetectors, AResetThatFailsIsAnErrorAndTheNextOneMayWork) {
   EXPECT_NE(error_of([&] { slam.reset(); }).find("no such device"), std::string::npos);
   EXPECT_NE(error_of([&] { slam.process(people[2]); }).find("no such device"), std::string::npos);
   EXPECT_NE(error_of([&] { slam.finish(); }).find("no such device"), std::string::npos);
+  const fs::path file = fs::path(::testing::TempDir()) / ("dkb_no_world_" + std::to_string(::getpid()) + ".dkb");
+  EXPECT_NE(error_of([&] { slam.save_map(file); }).find("no such device"), std::string::npos);
+  EXPECT_FALSE(fs::exists(file)) << "an empty map may not take the place of the user's";
   slam.localize_only(false);
   slam.explain_keyframes(false);
   EXPECT_EQ(slam.map().point_count(), 0U);

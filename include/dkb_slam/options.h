@@ -161,7 +161,7 @@ struct KeyframeQuery {
   int frame = 0;                      ///< index of the frame
   int64_t stamp_ns = 0;               ///< of its colour image
   int frames_since_keyframe = 0;      ///< since the last keyframe
-  double seconds_since_keyframe = 0;  ///< [s] likewise
+  double seconds_since_keyframe = 0;  ///< [s] likewise; of a loaded map's since the camera was found there
   bool mapper_idle = true;            ///< the last keyframe is in the map
   int tracked_close_points = 0;       ///< points of the pose that are near enough for good depth
   int creatable_close_points = 0;     ///< features near enough that show no map point yet

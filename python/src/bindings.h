@@ -6,8 +6,10 @@
 
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dkb_slam/slam.h"
@@ -112,8 +114,21 @@ struct PyResult {
 // --- detector.cpp ---
 
 // What a Python detector threw that is no fault of the image: KeyboardInterrupt, SystemExit. process() throws it.
-struct Interruption {
-  std::exception_ptr what;
+// A slow detector's thread leaves it while another thread may be in process().
+class Interruption {
+ public:
+  void set(std::exception_ptr what) {
+    const std::lock_guard lock(mutex_);
+    std::swap(what_, what);
+  }
+  std::exception_ptr take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(what_, nullptr);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::exception_ptr what_;
 };
 // A detector that calls `function`, from any thread.
 std::shared_ptr<Detector> python_detector(py::object function, std::shared_ptr<Interruption> interruption);

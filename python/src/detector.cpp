@@ -99,8 +99,7 @@ class PythonDetector final : public Detector {
     try {
       return detections_of(function_(shown));
     } catch (py::error_already_set& error) {
-      if (!error.matches(PyExc_Exception)) interruption_->what = std::current_exception();
-      throw InputError(one_line_of(error));
+      fail(error);
     }
   }
   std::string kind() const override { return kind_; }
@@ -109,11 +108,16 @@ class PythonDetector final : public Detector {
     try {
       if (py::hasattr(function_, "reset")) function_.attr("reset")();
     } catch (py::error_already_set& error) {
-      throw InputError(one_line_of(error));
+      fail(error);
     }
   }
 
  private:
+  [[noreturn]] void fail(const py::error_already_set& error) {
+    if (!error.matches(PyExc_Exception)) interruption_->set(std::current_exception());
+    throw InputError(one_line_of(error));
+  }
+
   py::object function_;
   std::shared_ptr<Interruption> interruption_;
   std::string kind_;

@@ -129,10 +129,17 @@ class PySlam final : public Closable {
     run([&](Slam& slam) {
       const std::unique_lock lock(feeding_, std::try_to_lock);
       if (!lock.owns_lock()) throw InputError("slam: another thread is in a call of it; one thread at a time feeds it");
-      work(slam);
-      // Before another thread may feed.
-      interrupted = std::exchange(interruption_->what, nullptr);
-      if (!interrupted) warnings = std::exchange(warnings_, {});
+      std::exception_ptr failed;
+      try {
+        work(slam);
+      } catch (...) {
+        failed = std::current_exception();
+      }
+      // Before another thread may feed. An interruption comes first: whoever interrupts waits for nothing else.
+      interrupted = interruption_->take();
+      if (interrupted) return;
+      if (failed) std::rethrow_exception(failed);
+      warnings = std::exchange(warnings_, {});
     });
     if (interrupted) std::rethrow_exception(interrupted);
     for (const std::string& text : warnings) warn(text);

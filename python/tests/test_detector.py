@@ -126,3 +126,19 @@ def test_ctrl_c_in_a_detector_reaches_the_caller(camera, frames):
     with pytest.raises(KeyboardInterrupt), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         slam.process(frames[0])
+
+
+def test_ctrl_c_in_a_reset_reaches_the_caller_though_the_reset_fails(camera, frames):
+    detector = WithState()
+    slam = dkb_slam.Slam(camera, detector=detector)
+    slam.process(frames[0])
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    detector.reset = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        slam.reset()
+    del detector.reset
+    slam.reset()
+    assert slam.process(frames[0]).tracked

@@ -66,6 +66,13 @@ std::string hindrance_of(const dkb::FrameResult& result) {
   }
 }
 
+int loaded_maps(const std::vector<dkb::TrajectoryFrame>& keyframes) {
+  int maps = 0;
+  for (const dkb::TrajectoryFrame& k : keyframes)
+    if (k.frame < 0) maps = std::max(maps, k.map + 1);
+  return maps;
+}
+
 MoversOutput movers_of(const dkb::FrameResult& result) {
   MoversOutput out;
   out.stamp_ns = result.stamp_ns;

@@ -17,6 +17,10 @@ ColourImageOutput draw_features(const dkb::ImageView& image, const dkb::FrameRes
 // Why the images do not tell where a frame's camera is, for people; empty when they do.
 std::string hindrance_of(const dkb::FrameResult& result);
 
+// How many of the maps were loaded, or have been joined to one that was: those with a keyframe of a frame below 0. They
+// are the first by number, since maps are numbered by their first keyframes. 0 where the world began anew.
+int loaded_maps(const std::vector<dkb::TrajectoryFrame>& keyframes);
+
 MoversOutput movers_of(const dkb::FrameResult& result);
 CloudOutput cloud_of(const std::vector<dkb::PointInfo>& points);
 

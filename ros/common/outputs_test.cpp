@@ -51,6 +51,18 @@ TEST(Path, IsThinnedAndEndsWhereTheRobotIs) {
   EXPECT_EQ(path.back().stamp_ns, 100);
 }
 
+TEST(LoadedMaps, AreFewerWhenTwoOfThemAreJoined) {
+  // Two maps that were loaded, a keyframe each, and one that was begun beside them.
+  std::vector<dkb::TrajectoryFrame> keyframes{{-9, 0, {}, 0}, {-1, 1, {}, 1}, {5, 2, {}, 2}, {7, 3, {}, 2}};
+  EXPECT_EQ(loaded_maps(keyframes), 2);
+  keyframes[1].map = 0, keyframes[2].map = keyframes[3].map = 1;
+  EXPECT_EQ(loaded_maps(keyframes), 1) << "the new one has the number of one that was loaded";
+  keyframes[2].map = keyframes[3].map = 0;
+  EXPECT_EQ(loaded_maps(keyframes), 1);
+  keyframes.erase(keyframes.begin(), keyframes.begin() + 2);
+  EXPECT_EQ(loaded_maps(keyframes), 0) << "the world began anew";
+}
+
 TEST(Grid, IsTurnedIntoTheAxesOfTheMap) {
   // A floor 0.3 m below the map's origin, turned by 90 degrees against it: 4 x 2 cells of 0.1 m.
   dkb::OccupancyGrid grid;

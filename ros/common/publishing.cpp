@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "inputs.h"
 #include "outputs.h"
 #include "slam_core.h"
 
@@ -13,7 +14,7 @@ constexpr size_t kMaxUnplaced = 30;  // [frames] that wait for the robot's odome
 
 }  // namespace
 
-void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result) {
+void SlamCore::publish(const ImagePair& pair, const dkb::FrameResult& result, const std::string& hindrance) {
   if (parameters_.publish_odom_tf) publish_odometry(result);  // else `odom` is the robot's
   const double out_ms =
       1e-6 * static_cast<double>(steady_ns() - std::max(pair.colour.arrived_ns, pair.depth.arrived_ns));
@@ -21,13 +22,14 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     const std::lock_guard lock(report_mutex_);
     trouble_.clear();
     state_ = result.state;
-    hindrance_ = hindrance_of(result);
+    hindrance_ = hindrance;
     last_result_stamp_ns_ = result.stamp_ns;
     ++counts_.frames;
     counts_.tracked += result.tracked();
     counts_.predicted += result.state == dkb::TrackingState::predicted;
     counts_.lost += result.state == dkb::TrackingState::lost;
     counts_.ambiguous += result.ambiguous;
+    counts_.paused += result.state == dkb::TrackingState::paused;
     ++recent_.frames;
     recent_.skew_ms.add(1e-6 * static_cast<double>(std::abs(pair.colour.stamp_ns - pair.depth.stamp_ns)));
     recent_.tracking_ms.add(result.tracking_ms);
@@ -42,7 +44,7 @@ void SlamCore::publish(const ImagePair& pair, const dkb::FrameInput& input, cons
     middleware_.publish(movers);
   }
   if (middleware_.wanted(Topic::features_image)) {
-    ColourImageOutput image = draw_features(input.colour, result);
+    ColourImageOutput image = draw_features(view_of(pair.colour, false), result);
     image.stamp_ns = result.stamp_ns;
     image.frame_id = camera_frame_;
     middleware_.publish(image);
@@ -54,6 +56,11 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
     last_pose_.reset();
     return;
   }
+  // How the camera came to where it is found is not known, nor how far off guesses were when images tell again:
+  // odometry may be held then, which is no standing still.
+  const bool guessed = result.state == dkb::TrackingState::predicted;
+  if (result.state == dkb::TrackingState::relocalised || (last_pose_ && last_pose_->guessed && !guessed))
+    last_pose_.reset();
   const Rigid3 odom_from_base = *result.odom_from_cam * base_from_cam_.inverse();
   const Matrix6d covariance = result.covariance.value_or(Matrix6d::Identity());
   OdometryOutput odometry;
@@ -70,13 +77,20 @@ void SlamCore::publish_odometry(const dkb::FrameResult& result) {
   } else {
     odometry.twist_covariance = 1e6 * Matrix6d::Identity();  // not known
   }
-  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base};
+  last_pose_ = LastPose{result.stamp_ns, odom_from_base, in_base, guessed};
   middleware_.publish(odometry);
 }
 
 // A map that was loaded is what others plan in: one begun beside it lies nobody knows where.
-bool SlamCore::in_map_frame(const dkb::FrameResult& result) const {
-  return result.tracked() && (loaded_maps_ == 0 || result.map < loaded_maps_);
+bool SlamCore::in_map_frame(const dkb::FrameResult& result) {
+  if (!result.tracked()) return false;
+  if (loaded_map_.empty()) return true;
+  // Maps that are joined take numbers away: that of a new map falls then. While the number stays, so does the answer.
+  if (result.map != last_map_) {
+    last_map_ = result.map;
+    loaded_maps_ = loaded_maps(slam_->keyframes());
+  }
+  return loaded_maps_ == 0 || result.map < loaded_maps_;
 }
 
 void SlamCore::publish_transforms(const dkb::FrameResult& result) {

@@ -60,10 +60,13 @@ void SlamCore::publish_map(const dkb::Slam& slam, int64_t stamp_ns) {
     cloud.frame_id = parameters_.map_frame;
     middleware_.publish(cloud);
   }
-  if (middleware_.wanted(Topic::path))
-    middleware_.publish(PathOutput{
-        stamp_ns, parameters_.map_frame,
-        path_of(slam.trajectory(), slam.options().base_from_cam.inverse(), parameters_.path_step, loaded_maps_)});
+  if (middleware_.wanted(Topic::path)) {
+    // The trajectory first: where maps are joined meanwhile, a part is missing rather than one of another world in it.
+    const std::vector<dkb::TrajectoryFrame> trajectory = slam.trajectory();
+    middleware_.publish(PathOutput{stamp_ns, parameters_.map_frame,
+                                   path_of(trajectory, slam.options().base_from_cam.inverse(), parameters_.path_step,
+                                           loaded_maps(slam.keyframes()))});
+  }
 }
 
 // The grid takes seconds: made beside tracking, at a low priority, from what tracking hands over between two frames.
@@ -109,16 +112,18 @@ void SlamCore::run_grids() {
 }
 
 void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
-  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, last_image_ns = 0;
+  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, outdated = 0, last_image_ns = 0;
   {
     const std::lock_guard lock(input_mutex_);
     unpaired = pairing_.unpaired();
     late = pairing_.late();
     late_motion = late_motion_;
     dropped = dropped_;
+    outdated = outdated_;
     last_image_ns = last_image_ns_;
   }
   const int maps = slam == nullptr ? 0 : slam->statistics().maps;
+  const int loaded = maps > 1 ? loaded_maps(slam->keyframes()) : 0;
   std::unique_lock lock(report_mutex_);
   const int64_t newly_dropped = dropped - reported_dropped_;
   reported_dropped_ = dropped;
@@ -138,10 +143,10 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
   if (slam != nullptr && !hindrance_.empty()) say(Level::warning, hindrance_);
   if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
-  if (maps > std::max(1, loaded_maps_.load()))
+  if (maps > std::max(1, loaded))
     say(Level::warning, std::to_string(maps) + " maps that are not joined: " +
-                            (loaded_maps_ > 0 ? "there is no pose in the newest until it is joined to what was loaded"
-                                              : "poses are in the newest"));
+                            (loaded > 0 ? "there is no pose in the newest until it is joined to what was loaded"
+                                        : "poses are in the newest"));
   if (d.message.empty()) d.message = dkb::name_of(state_);
   const auto add = [&](const std::string& key, const std::string& value) { d.values.emplace_back(key, value); };
   const auto count = [&](const std::string& key, int64_t value) { add(key, std::to_string(value)); };
@@ -151,7 +156,8 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   count("predicted", counts_.predicted);
   count("lost", counts_.lost);
   count("ambiguous", counts_.ambiguous);
-  count("dropped", dropped);
+  count("paused", counts_.paused);
+  count("dropped", dropped + outdated);
   count("unpaired", unpaired);
   count("late", late);
   count("late odometry", late_motion);

@@ -149,7 +149,6 @@ void SlamCore::reset(Done done) {
       [this](dkb::Slam& slam) {
         slam.reset();
         loaded_map_.clear();
-        loaded_maps_ = 0;
         begin_anew();
         return Answer{true, "a new world begins"};
       },
@@ -224,13 +223,19 @@ void SlamCore::process(const ImagePair& pair) {
     begin_after_jump();
   }
   if (!slam_ && !start(pair)) return;
-  // What comes while a visitor of the page has paused is dropped.
-  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) return;
+  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) {
+    // What comes while a visitor of the page has paused is dropped; those who rely on the robot are told.
+    dkb::FrameResult paused;
+    paused.stamp_ns = pair.colour.stamp_ns;
+    paused.state = dkb::TrackingState::paused;
+    publish(pair, paused, "paused on the page");
+    return;
+  }
   const dkb::FrameInput input = input_of(pair);
   const dkb::Frame frame(slam_->camera(), input);
   dkb::FrameResult result = slam_->process(frame);
   last_stamp_ns_ = pair.colour.stamp_ns;  // paused too: the motions of frames that were skipped are joined
-  publish(pair, input, result);
+  publish(pair, result, hindrance_of(result));
   std::vector<dkb::Event> events = tell_events();
   if (!viewer_) return;
   viewer_->show(std::move(result), frame, slam_->map(), std::move(events));
@@ -379,13 +384,14 @@ std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
 void SlamCore::begin_in(dkb::Slam& slam, const std::string& map) {
   slam.load_map(map);
   loaded_map_ = map;
-  loaded_maps_ = slam.statistics().maps;
 }
 
 // After a service: the images that follow may have any stamps.
 void SlamCore::begin_anew() {
   forget_motion();
   const std::lock_guard lock(input_mutex_);
+  outdated_ += static_cast<int64_t>(pairs_.size());
+  pairs_.clear();  // of the old world: their stamps would keep out those that follow
   pairing_.restart();
   odometry_.clear();
   gyro_.clear();
@@ -403,10 +409,7 @@ void SlamCore::begin_after_jump() {
       complain(LogLevel::error, error.what());
     }
   }
-  if (slam_ && !loaded) {
-    slam_->reset();
-    loaded_maps_ = 0;
-  }
+  if (slam_ && !loaded) slam_->reset();
   complain(LogLevel::warning, jumped + (loaded ? "begins again in " + loaded_map_ : "a new world begins"));
   forget_motion();
 }
@@ -415,6 +418,7 @@ void SlamCore::forget_motion() {
   last_stamp_ns_.reset();
   last_pose_.reset();
   map_from_odom_.reset();
+  last_map_.reset();
   unplaced_.clear();
 }
 

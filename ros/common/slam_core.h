@@ -4,7 +4,6 @@
 #include <dkb_slam/viewer.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -47,6 +46,7 @@ class SlamCore final : public RosCore {
  private:
   struct Counts {
     int64_t frames = 0, tracked = 0, predicted = 0, lost = 0, ambiguous = 0;
+    int64_t paused = 0;    // frames that came while a service or a visitor of the page had paused
     int64_t rejected = 0;  // pairs that the library refused
     int64_t waiting = 0;   // pairs that came before the camera and its mount were known
     int64_t priors = 0;    // pairs that had a motion prior
@@ -65,7 +65,8 @@ class SlamCore final : public RosCore {
   struct LastPose {
     int64_t stamp_ns = 0;
     Rigid3 odom_from_base;
-    Matrix6d covariance;  // right perturbation, in the base's axes
+    Matrix6d covariance;   // right perturbation, in the base's axes
+    bool guessed = false;  // not by the images
   };
   using Task = std::function<Answer(dkb::Slam&)>;
 
@@ -84,9 +85,9 @@ class SlamCore final : public RosCore {
   dkb::FrameInput input_of(const ImagePair& pair);
   std::optional<dkb::MotionPrior> prior(int64_t stamp_ns);
   std::optional<Rigid3> cam_from(const std::string& frame);
-  void publish(const ImagePair& pair, const dkb::FrameInput& input, const dkb::FrameResult& result);
+  void publish(const ImagePair& pair, const dkb::FrameResult& result, const std::string& hindrance);
   void publish_odometry(const dkb::FrameResult& result);
-  bool in_map_frame(const dkb::FrameResult& result) const;
+  bool in_map_frame(const dkb::FrameResult& result);
   void publish_transforms(const dkb::FrameResult& result);
   void place_robots_odometry(int64_t stamp_ns, const Rigid3& map_from_base);
   void begin_in(dkb::Slam& slam, const std::string& map);
@@ -113,6 +114,7 @@ class SlamCore final : public RosCore {
   OdometryHistory odometry_;
   GyroHistory gyro_;
   int64_t dropped_ = 0;        // pairs that found the queue full
+  int64_t outdated_ = 0;       // pairs that waited when a service began another world
   int64_t late_motion_ = 0;    // messages of odometry and imu
   int64_t last_image_ns_ = 0;  // by the steady clock
 
@@ -126,7 +128,8 @@ class SlamCore final : public RosCore {
   std::map<std::string, Rigid3> cam_from_frame_;     // of sensors that are fixed to the camera
   std::unique_ptr<dkb::Viewer> viewer_;              // where one is asked for
   std::string loaded_map_;                           // file to begin in again; empty = begin anew
-  std::atomic<int> loaded_maps_ = 0;                 // of the file that this world began in; 0 = it began anew
+  std::optional<int> last_map_;                      // FrameResult::map of the last pose
+  int loaded_maps_ = 0;                              // when that was the map first: see loaded_maps()
   std::string failed_start_;                         // why there is no system and will be none
   std::string last_complaint_;
   int64_t last_complaint_ns_ = 0;

@@ -2,9 +2,12 @@
 // The node without a middleware, on a short simulated sequence.
 #include "ros_core.h"
 
+#include <arpa/inet.h>
 #include <dkb_slam/slam.h>
 #include <dkb_slam/source.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -117,6 +120,26 @@ CameraInfoMessage info_of(const dkb::Camera& c) {
   info.d = {c.k1, c.k2, c.p1, c.p2, c.k3};
   info.k = {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
   return info;
+}
+
+// What the buttons of the page send. Returns the answer's status line.
+std::string order_of_a_visitor(int port, const std::string& what) {
+  const std::string body = R"({"do":")" + what + R"("})";
+  const std::string request =
+      "POST /api/command HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" +
+      body;
+  const int connection = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in page{};
+  page.sin_family = AF_INET;
+  page.sin_port = htons(static_cast<uint16_t>(port));
+  page.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  char answer[64] = {};
+  if (::connect(connection, reinterpret_cast<const sockaddr*>(&page), sizeof page) == 0 &&
+      ::send(connection, request.data(), request.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(request.size()))
+    ::recv(connection, answer, sizeof answer - 1, MSG_WAITALL);
+  ::close(connection);
+  const std::string text = answer;
+  return text.substr(0, text.find('\r'));
 }
 
 class SlamCoreTest : public testing::Test {
@@ -298,6 +321,79 @@ TEST_F(SlamCoreTest, ServicesAreAnsweredBetweenFrames) {
   ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "paused"; }));
   EXPECT_EQ(out.odometry.size(), 16u);
   std::filesystem::remove(file);
+}
+
+TEST_F(SlamCoreTest, PairsThatWaitedAreNoPartOfTheWorldThatAResetBegins) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_at(*core, 0, 100'000'000'000);
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 1; }));
+  std::promise<void> held, go_on;
+  core->pause(false, [&](const Answer&) {
+    held.set_value();
+    go_on.get_future().wait();
+  });
+  held.get_future().wait();
+  for (size_t i = 1; i <= 3; ++i) feed_at(*core, i, 100'000'000'000);
+  std::promise<Answer> begun;
+  core->reset([&](const Answer& answer) { begun.set_value(answer); });
+  go_on.set_value();
+  EXPECT_TRUE(begun.get_future().get().success);
+  for (size_t i = 0; i < 3; ++i) feed(*core, i);  // the recording again, from its beginning
+  ASSERT_TRUE(out.wait([&] { return out.odometry.back().pose.stamp_ns == frames()[2].stamp_ns(); }));
+  EXPECT_EQ(out.odometry.size(), 4U);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("dropped") == "3"; }));
+  const std::lock_guard lock(out.mutex);
+  EXPECT_EQ(out.last_value("rejected"), "0");
+  for (const DiagnosticsOutput& d : out.diagnostics) EXPECT_EQ(d.message.find("too slow"), std::string::npos);
+}
+
+TEST_F(SlamCoreTest, WhilePausedOnThePageItSaysSoAndTheMapStaysWhereItIs) {
+  const auto core = start({{"viewer_port", int64_t{0}}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 3);
+  int port = 0;
+  {
+    const std::lock_guard lock(out.mutex);
+    for (const std::string& line : out.logged)
+      if (line.starts_with("viewer: http://127.0.0.1:")) port = std::stoi(line.substr(25));
+  }
+  ASSERT_GT(port, 0);
+  ASSERT_EQ(order_of_a_visitor(port, "pause"), "HTTP/1.1 200 OK");
+  feed(*core, 3);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("paused") == "1"; }));
+  {
+    const std::lock_guard lock(out.mutex);
+    EXPECT_EQ(out.last_value("state"), "paused");
+    EXPECT_EQ(out.diagnostics.back().message, "paused on the page");
+    EXPECT_EQ(out.diagnostics.back().level, DiagnosticsOutput::Level::warning);
+    ASSERT_EQ(out.transforms.size(), 4U);
+    ASSERT_EQ(out.transforms[3].size(), 1U);
+    EXPECT_EQ(out.transforms[3][0].child, "odom");
+    EXPECT_EQ(out.transforms[3][0].stamp_ns, frames()[3].stamp_ns());
+    EXPECT_EQ(out.odometry.size(), 3U);
+  }
+  ASSERT_EQ(order_of_a_visitor(port, "resume"), "HTTP/1.1 200 OK");
+  feed_all(*core, 4, 1);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "tracking"; }));
+}
+
+TEST_F(SlamCoreTest, AcrossAPoseThatWasSetTheTwistIsNotKnown) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 10);
+  EXPECT_LT(out.odometry.back().twist_covariance(0, 0), 1);
+  PoseMessage here;
+  here.pose = out.odometry.back().pose.pose;  // nothing has moved the map yet
+  here.covariance.diagonal().setConstant(0.01);
+  core->initial_pose(here);
+  feed_all(*core, 10, 2);
+  ASSERT_EQ(out.odometry.size(), 12U);
+  EXPECT_EQ(out.odometry[10].pose.stamp_ns, frames()[10].stamp_ns()) << "found at once";
+  EXPECT_LT((out.odometry[9].pose.pose.translation - out.odometry[10].pose.pose.translation).norm(), 1e-9)
+      << "odometry is held, which tells of no motion";
+  EXPECT_EQ(out.odometry[10].twist_covariance(0, 0), 1e6);
+  EXPECT_LT(out.odometry[11].twist_covariance(0, 0), 1);
 }
 
 TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {

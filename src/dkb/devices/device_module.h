@@ -55,6 +55,9 @@ struct DkbDeviceApi {
   // The place is a serial number or a URI; empty = the first device. Null when that fails.
   void* (*open)(const char* place, const struct DkbDeviceMode* mode, char* error, size_t error_size);
   void (*camera)(void* device, struct DkbDeviceCamera* camera);
+  // The place by which this very device is found again when it has been unplugged, wherever it is plugged in; empty
+  // where it has none.
+  void (*place)(void* device, char* place, size_t place_size);
   // Depth comes registered to colour. Returns a DkbDeviceState; images may come one at a time.
   int (*next)(void* device, int timeout_ms, struct DkbDeviceImage* colour, struct DkbDeviceImage* depth, char* error,
               size_t error_size);
@@ -62,7 +65,7 @@ struct DkbDeviceApi {
 };
 
 // The one symbol looked up. The number in its name changes with the interface.
-__attribute__((visibility("default"))) const struct DkbDeviceApi* dkb_device_api_2();
+__attribute__((visibility("default"))) const struct DkbDeviceApi* dkb_device_api_3();
 
 }  // extern "C"
 
@@ -84,8 +87,8 @@ inline double depth_factor_of(double metres_per_unit) {
 }
 
 // For the modules: the interface around a class that has places() (static: of the devices that are plugged in),
-// Device(place, mode), describe(camera) and next(timeout_ms, colour, depth). `Calls` runs what may throw; it turns what
-// is no std::exception into one.
+// Device(place, mode), describe(camera), place() and next(timeout_ms, colour, depth). `Calls` runs what may throw; it
+// turns what is no std::exception into one.
 template <class Device, class Calls = AsItIs>
 const DkbDeviceApi* device_api() {
   static const DkbDeviceApi api{
@@ -109,6 +112,13 @@ const DkbDeviceApi* device_api() {
         char error[1];
         const auto describe = [&] { return static_cast<Device*>(device)->describe(&told), true; };
         if (guarded(false, error, sizeof error, [&] { return Calls::run(describe); })) *camera = told;
+      },
+      [](void* device, char* place, size_t place_size) {  // a device that fails here has none
+        std::string told;
+        char error[1];
+        const auto ask = [&] { return told = static_cast<Device*>(device)->place(), true; };
+        guarded(false, error, sizeof error, [&] { return Calls::run(ask); });
+        std::snprintf(place, place_size, "%s", told.c_str());
       },
       [](void* device, int timeout_ms, DkbDeviceImage* colour, DkbDeviceImage* depth, char* error, size_t error_size) {
         return guarded<int>(dkb_failed, error, error_size, [&] {

@@ -21,7 +21,7 @@ using Error = std::array<char, 512>;
 
 const DkbDeviceApi* load(const DeviceModule& module, std::string* reason) {
   void* symbol = module_symbol({module.file, DKB_MODULE_LIBDIR, {DKB_MODULE_BUILD_DIR, DKB_MODULE_INSTALL_DIR}},
-                               "dkb_device_api_2", reason);
+                               "dkb_device_api_3", reason);
   return symbol == nullptr ? nullptr : reinterpret_cast<const DkbDeviceApi* (*)()>(symbol)();
 }
 
@@ -37,6 +37,10 @@ class ModuleDevice final : public ImageDevice {
       : api_(api), where_(std::move(where)), place_(std::move(place)), mode_(mode) {
     Error error{};
     if (!open(&error)) throw InputError(where_ + ": " + one_line(error.data()));
+    camera_ = camera();
+    std::array<char, 256> lasting{};
+    api_.place(device_, lasting.data(), lasting.size());
+    if (place_.empty()) place_ = lasting.data();
   }
   ~ModuleDevice() override { close(); }
   ModuleDevice(const ModuleDevice&) = delete;
@@ -62,7 +66,11 @@ class ModuleDevice final : public ImageDevice {
   bool reopen() override {
     close();
     Error error{};
-    return open(&error);
+    if (!open(&error)) return false;
+    // Where devices have no lasting place, the first one may be another camera now.
+    if (!place_.empty() || same_camera(camera(), camera_)) return true;
+    close();
+    return false;
   }
 
   std::string description() const override { return where_; }
@@ -71,6 +79,12 @@ class ModuleDevice final : public ImageDevice {
   static DeviceImage image_of(const DkbDeviceImage& image) {
     return {{image.data, image.width, image.height, image.stride, static_cast<PixelFormat>(image.pixels)},
             image.stamp_ns};
+  }
+  static bool same_camera(const DkbDeviceCamera& a, const DkbDeviceCamera& b) {
+    const auto numbers = [](const DkbDeviceCamera& c) {
+      return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6, c.depth_factor};
+    };
+    return a.width == b.width && a.height == b.height && a.lens == b.lens && numbers(a) == numbers(b);
   }
   bool open(Error* error) {
     device_ = api_.open(place_.c_str(), &mode_, error->data(), error->size());
@@ -82,8 +96,10 @@ class ModuleDevice final : public ImageDevice {
   }
 
   const DkbDeviceApi& api_;
-  const std::string where_, place_;
+  const std::string where_;
+  std::string place_;  // given, or that of the device that was opened first
   const DkbDeviceMode mode_;
+  DkbDeviceCamera camera_{};  // of that device
   void* device_ = nullptr;
 };
 

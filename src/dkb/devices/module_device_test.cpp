@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "dkb/util/test_errors.h"
 
 namespace dkb {
@@ -15,6 +17,30 @@ TEST(DeviceModules, WhatWasNotBuiltInSaysSoWithTheRemedy) {
       "build again";
   EXPECT_EQ(why_no_module(module), why);
   EXPECT_EQ(test::input_error_of([&] { open_module_device(module, "nonesuch:1", {}); }), "nonesuch:1: " + why);
+}
+
+// What each frame shows: the first letter of its camera's name, ! where the camera was gone, ? where it does not fit.
+std::string play_scripted(const char* cameras) {
+  ::setenv("DKB_TEST_CAMERAS", cameras, 1);
+  const DeviceModule module{"scripted", "libdkb_scripted_device.so", "", ""};
+  devices_of(module);  // the script begins
+  SourceOptions options;
+  options.max_frames = 4;
+  const auto source = open_module_device(module, "scripted", options);
+  std::string shown;
+  for (SourceFrame f = source->next(); f.state != SourceState::ended; f = source->next())
+    shown += f.state == SourceState::unplugged ? '!'
+             : f.state == SourceState::frame   ? static_cast<char>(*f.frame.grey().row(0))
+                                               : '?';
+  return shown;
+}
+
+TEST(DeviceModules, TheFirstCameraIsWaitedForWhenItIsUnplugged) {
+  EXPECT_EQ(play_scripted("a/32 b/32"), "aa!aa") << "not another one, which is the first now";
+}
+
+TEST(DeviceModules, WithoutASerialNumberACameraThatTellsOtherNumbersIsAnother) {
+  EXPECT_EQ(play_scripted("/32 /16 /32"), "xx!xx");
 }
 
 // Debian's OpenNI 2 brings a driver that draws two moving discs.

@@ -68,6 +68,8 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
     if (std::string(info->getUri()) == device_.getDeviceInfo().getUri()) gone_ = true;
   }
 
+  static std::string place() { return ""; }  // URIs name the port, and the system counts up what is plugged in
+
   void describe(DkbDeviceCamera* camera) const {
     const openni::VideoMode mode = colour_.getVideoMode();
     camera->width = mode.getResolutionX(), camera->height = mode.getResolutionY();
@@ -174,6 +176,6 @@ class Device final : public OpenNI::DeviceDisconnectedListener {
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_2() {
+extern "C" const DkbDeviceApi* dkb_device_api_3() {
   return dkb::device_api<Device>();
 }

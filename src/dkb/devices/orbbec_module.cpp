@@ -74,6 +74,8 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
+  std::string place() const { return serial_; }
+
   void describe(DkbDeviceCamera* camera) const {
     const OBCameraParam parameters = pipeline_->getCameraParam();
     const OBCameraIntrinsic& in = parameters.rgbIntrinsic;
@@ -131,6 +133,6 @@ struct Calls {
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_2() {
+extern "C" const DkbDeviceApi* dkb_device_api_3() {
   return dkb::device_api<Device, Calls>();
 }

@@ -54,6 +54,8 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
+  std::string place() const { return serial_; }
+
   void describe(DkbDeviceCamera* camera) const {
     const rs2_intrinsics in = profile_.get_stream(RS2_STREAM_COLOR).as<rs2::video_stream_profile>().get_intrinsics();
     camera->width = in.width, camera->height = in.height, camera->fps = fps_;
@@ -108,6 +110,6 @@ class Device {
 
 }  // namespace
 
-extern "C" const DkbDeviceApi* dkb_device_api_2() {
+extern "C" const DkbDeviceApi* dkb_device_api_3() {
   return dkb::device_api<Device>();
 }

@@ -13,9 +13,10 @@ namespace {
 constexpr size_t kPointsPerBox = 40;  // features followed to carry a box
 constexpr int kMissedResults = 2;     // detector results that may miss an object before its box is dropped
 
-// What `from` marks in a box is marked in `to` as well, where both are there.
+// What `from` marks in a box is marked in `to` as well; an empty `to` takes its size.
 void keep_within(const Box& box, const GreyImage& from, GreyImage& to) {
-  if (from.empty() || to.empty()) return;
+  if (from.empty()) return;
+  if (to.empty()) to = GreyImage(from.width(), from.height());
   for (int y = 0; y < to.height(); ++y)
     for (int x = 0; x < to.width(); ++x)
       if (from(x, y) != 0 && box.contains(static_cast<float>(x), static_cast<float>(y))) to(x, y) = from(x, y);
@@ -56,6 +57,13 @@ std::vector<Detection> CarriedObjects::boxes() const {
   return boxes;
 }
 
+std::vector<Detection> CarriedObjects::unmasked_boxes() const {
+  std::vector<Detection> boxes;
+  for (const Carried& c : carried_)
+    if (!c.masked) boxes.push_back(c.detection);
+  return boxes;
+}
+
 void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid) {
   if (carried_.empty()) mask_ = {};  // what it showed has left the image
   if (past.empty() || carried_.empty()) return;
@@ -63,7 +71,10 @@ void CarriedObjects::follow(const PastFrames& past, const ImagePyramid& pyramid)
   std::vector<size_t> kept;
   Detections there = carry(here, motions(past.back(), pyramid, here.boxes), 1, camera_.width, camera_.height, &kept);
   std::vector<Carried> moved;
-  for (size_t i = 0; i < kept.size(); ++i) moved.push_back({there.boxes[i], carried_[kept[i]].missed});
+  for (size_t i = 0; i < kept.size(); ++i) {
+    const Carried& before = carried_[kept[i]];
+    moved.push_back({there.boxes[i], before.missed, before.masked});
+  }
   carried_ = std::move(moved);
   mask_ = std::move(there.mask);
 }
@@ -94,15 +105,15 @@ std::vector<LateMask> CarriedObjects::receive(FrameIndex from, const Detections&
     here = carry_to(*source, *past.back().pyramid, detections, past.back().frame - from);
   }
   std::vector<Carried> next;
-  for (const Detection& d : here.boxes) next.push_back({d, 0});
+  for (const Detection& d : here.boxes) next.push_back({d, 0, !answer.mask.empty()});
   // What the detector overlooks once or twice does not vanish.
   for (const Carried& old : carried_) {
     const bool seen_again = std::any_of(here.boxes.begin(), here.boxes.end(), [&](const Detection& d) {
       return intersection_over_union(d.box, old.detection.box) > 0.3f;
     });
     if (seen_again || old.missed == kMissedResults) continue;
-    next.push_back({old.detection, old.missed + 1});
-    keep_within(old.detection.box, mask_, here.mask);
+    next.push_back({old.detection, old.missed + 1, old.masked});
+    if (old.masked) keep_within(old.detection.box, mask_, here.mask);
   }
   carried_ = std::move(next);
   mask_ = std::move(here.mask);

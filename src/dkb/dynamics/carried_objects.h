@@ -45,7 +45,8 @@ class CarriedObjects {
   void follow(const PastFrames& past, const ImagePyramid& pyramid);
 
   std::vector<Detection> boxes() const;
-  const GreyImage& mask() const { return mask_; }  // empty when the detector gives none
+  std::vector<Detection> unmasked_boxes() const;   // those whose answers gave no mask with them
+  const GreyImage& mask() const { return mask_; }  // of the others; empty when there are none
   // The same as what movers cover: with a rim as silhouettes have, since at its edge a carried mask is off by some
   // pixels.
   MoverMask mover_mask() const { return with_rim(mask_); }
@@ -54,6 +55,7 @@ class CarriedObjects {
   struct Carried {
     Detection detection;
     int missed = 0;
+    bool masked = false;  // its answer gave a mask
   };
   std::vector<PointMotion> motions(const PastFrame& from, const ImagePyramid& to,
                                    const std::vector<Detection>& boxes) const;

@@ -233,12 +233,46 @@ TEST_F(CarriedObjectsTest, ABoxThatIsSeenAgainIsNotKeptTwice) {
   expect_near(carried.boxes()[0].box, person(4), 0.5f);
 }
 
-TEST_F(CarriedObjectsTest, AMaskLivesUntilTheNextAnswer) {
+TEST_F(CarriedObjectsTest, WhoeverIsOverlookedTwiceKeepsHisMask) {
   see(4);
-  receive(3, {{}, mask_of(3)});
-  EXPECT_FALSE(carried.mask().empty());
+  receive(4, {{{"person", person(4), 1}}, mask_of(4)});
   receive(4, {});
-  EXPECT_TRUE(carried.mask().empty());
+  EXPECT_EQ(shares(carried.mask(), 4).first, 1);
+  GreyImage another(320, 240);
+  const Box beside{250, 60, 40, 60};
+  for (int y = 60; y < 120; ++y)
+    for (int x = 250; x < 290; ++x) another(x, y) = 255;
+  receive(4, {{{"person", beside, 1}}, another});
+  ASSERT_EQ(carried.boxes().size(), 2U);
+  EXPECT_EQ(shares(carried.mask(), 4).first, 1);
+  EXPECT_EQ(carried.mask()(270, 90), 255);
+}
+
+TEST_F(CarriedObjectsTest, BoxesOfAnswersWithAndWithoutMasksStandSideBySide) {
+  const Box beside{250, 60, 40, 60};
+  for (const bool masked_first : {false, true}) {
+    see(4);
+    const Detections masked{{{"person", person(4), 1}}, mask_of(4)}, bare{{{"person", beside, 1}}, {}};
+    receive(4, masked_first ? masked : bare);
+    receive(4, masked_first ? bare : masked);
+    ASSERT_EQ(carried.boxes().size(), 2U);
+    EXPECT_EQ(shares(carried.mask(), 4).first, 1);
+    ASSERT_EQ(carried.unmasked_boxes().size(), 1U);
+    EXPECT_EQ(carried.unmasked_boxes()[0].box, beside);
+    carried = CarriedObjects(small_camera(), {});
+    past.clear();
+  }
+}
+
+TEST_F(CarriedObjectsTest, AMaskLivesAsLongAsItsBox) {
+  see(4);
+  receive(4, {{}, mask_of(4)});
+  for (int missed = 1; missed <= 2; ++missed) {
+    receive(4, {});
+    EXPECT_EQ(shares(carried.mask(), 4).first, 1) << missed;
+  }
+  receive(4, {});
+  EXPECT_EQ(shares(carried.mask(), 4).first, 0);
 }
 
 TEST_F(CarriedObjectsTest, AnAnswerOfAFrameThatIsForgottenCountsWhereItWas) {

@@ -283,6 +283,8 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
   if (tracked.state == TrackingState::relocalised) {
     last_relocalisation_ = tracked.index;
     last_keyframe_ = last_keyframe_of(tracker_.map().view(), tracked.reference);
+    // The clock of the session that made it may be another one.
+    if (last_keyframe_.frame < 0) last_keyframe_.stamp_ns = scene.extracted.frame.stamp_ns();
   }
   const Stopwatch watch;
   KeyframeDecision decision;

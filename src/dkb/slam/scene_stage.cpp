@@ -116,8 +116,7 @@ Carried SceneStage::carry(const CarryTask& task) {
   receive(false);
   if (slow_stage_) objects_.follow(past_, *pyramid);
   receive(true);
-  if (!rival_ && objects_.mask().empty())
-    made.silhouettes = silhouettes(image.depth, objects_.boxes(), camera_, noise_);
+  if (!rival_) made.silhouettes = silhouettes(image.depth, objects_.unmasked_boxes(), camera_, noise_);
   made.mask = objects_.mover_mask();
   made.pyramid = std::move(pyramid);
   made.ms = watch.ms();

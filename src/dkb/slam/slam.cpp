@@ -158,6 +158,8 @@ void Slam::explain_keyframes(bool on) {
 }
 
 void Slam::save_map(const std::filesystem::path& path) const {
+  // After a failure the map as it was then may be saved; where no world could begin there is none.
+  if (!impl_->pipeline) impl_->throw_failure();
   if (!impl_->failure) impl_->guarded([&] { impl_->pipeline->catch_up(); });
   dkb::save_map(path, *impl_->shared_record()->map().map(), impl_->map_context());
 }

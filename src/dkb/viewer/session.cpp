@@ -109,13 +109,14 @@ void Session::show_dense_map(std::function<DenseMap()> task) {
     making_dense_ = true;
   }
   if (dense_.joinable()) dense_.join();
-  dense_ = std::thread([this, task = std::move(task)] {
+  // It is left out where that world ends meanwhile.
+  dense_ = std::thread([this, task = std::move(task), world = model_.world()] {
     set_thread_priority(ThreadPriority::background);
     const auto start = std::chrono::steady_clock::now();
     try {
       std::string messages = dense_messages(task());
       const auto lock = model_.hold();
-      model_.take_dense(std::move(messages));
+      model_.take_dense(std::move(messages), world);
     } catch (const std::exception& e) {
       model_.say(std::string("no dense map: ") + e.what());
     }

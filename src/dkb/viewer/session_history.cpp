@@ -27,10 +27,14 @@ void SessionHistory::add(FrameFact fact) {
   path_.push_back({fact.frame, fact.stamp_ns, fact.host, fact.position_in_host});
   if (path_.size() < kPath) return;
   // Every second point goes; where the path is broken it stays so.
-  size_t kept = 0;
-  for (size_t i = 0; i < path_.size(); ++i)
-    if (i % 2 == 0 || path_[i].host == kNoKeyframe) path_[kept++] = path_[i];
-  path_.resize(std::min(kept, kPath / 2));
+  size_t kept = 0, points = 0;
+  for (const PathPoint& p : path_) {
+    const bool broken = p.host == kNoKeyframe;
+    // Of breaks that have no point between them any more one is left: a third of all goes at least.
+    const bool stays = broken ? kept > 0 && path_[kept - 1].host != kNoKeyframe : points++ % 2 == 0;
+    if (stays) path_[kept++] = p;
+  }
+  path_.resize(kept);
   spacing_ *= 2;
   ++path_generation_;
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 namespace dkb {
 namespace {
 
@@ -62,6 +64,51 @@ TEST(SessionHistory, StaysBoundedOverADay) {
   SessionHistory::Client late;
   EXPECT_LT(bytes_for(history, late), 1'000'000U);
   EXPECT_LT(bytes_for(history, early), 1'000'000U);
+}
+
+// Frames of the points of the path, -1 where it is broken.
+std::vector<int> path_frames(const SessionHistory& history) {
+  SessionHistory::Client client;
+  StreamWriter out;
+  history.write(client, out, 1);
+  const std::string& bytes = out.bytes();
+  std::vector<int> frames;
+  for (size_t at = 0; at < bytes.size();) {
+    uint32_t head[2];
+    std::memcpy(head, bytes.data() + at, sizeof head);
+    at += sizeof head;
+    for (size_t p = at; head[1] == static_cast<uint32_t>(StreamMessage::path) && p < at + head[0]; p += 20) {
+      int32_t point[2];
+      std::memcpy(point, bytes.data() + p, sizeof point);
+      frames.push_back(point[1] == kNoKeyframe ? -1 : point[0]);
+    }
+    at += head[0];
+  }
+  return frames;
+}
+
+TEST(SessionHistory, APathThatIsOftenBrokenIsThinnedAsAWhole) {
+  for (const int stretch : {1, 2, 5}) {  // frames until the camera is lost for one
+    SessionHistory history;
+    const int count = static_cast<int>(2.5 * static_cast<double>(SessionHistory::kPath));
+    for (int i = 0; i < count; ++i) {
+      FrameFact f = fact(i, 10 * i);
+      if (i % (stretch + 1) == stretch) f.host = kNoKeyframe;
+      history.add(f);
+      ASSERT_LE(history.path_size(), SessionHistory::kPath) << i;
+    }
+    const std::vector<int> frames = path_frames(history);
+    int last = 0;
+    for (size_t i = 0; i < frames.size(); ++i) {
+      if (frames[i] < 0) {
+        EXPECT_TRUE(i > 0 && frames[i - 1] >= 0) << "broken once is enough";
+        continue;
+      }
+      EXPECT_LE(frames[i] - last, 8 * (stretch + 1)) << "a part is missing";
+      last = frames[i];
+    }
+    EXPECT_GE(last, count - 8 * (stretch + 1)) << "the newest part is missing";
+  }
 }
 
 TEST(SessionHistory, StandingStillMakesNoPath) {

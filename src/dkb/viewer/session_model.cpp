@@ -82,7 +82,7 @@ void put_mask(StreamWriter& m, const MoverMask& mask) {
 }  // namespace
 
 SessionModel::SessionModel(const ViewerOptions& options)
-    : options_(options), map_(options_.camera.depth_max > 30 ? 0.01 : 0.001) {}
+    : options_(options), map_(options_.camera.depth_max > 30 ? 0.01 : 0.001), world_(map_.world()) {}
 
 void SessionModel::show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events) {
   const FrameFact fact = fact_of(result, map);
@@ -153,11 +153,21 @@ void SessionModel::take_in() {
 void SessionModel::take_in_map(int rest) {
   const auto now = std::chrono::steady_clock::now();
   if (shown_ == nullptr || (!ended_ && now < map_taken_ + rest * map_cost_)) return;
-  const uint64_t world = map_.world();
   map_.update(shown_->map);
-  if (map_.world() != world) history_.clear_path();  // it hung on the keyframes of the world before
+  if (map_.world() != world_) forget_world();
   map_taken_ = std::chrono::steady_clock::now();
   map_cost_ = map_taken_ - now;
+}
+
+// What hung on the keyframes of the world before, or lay in it.
+void SessionModel::forget_world() {
+  world_ = map_.world();
+  history_.clear_path();
+  world_from_truth_.reset();
+  aligned_at_ = 0;
+  frame_message_.clear();
+  dense_.clear();
+  ++dense_number_;
 }
 
 double SessionModel::seconds() const {
@@ -182,7 +192,8 @@ void SessionModel::write(Client& client, StreamWriter& out, size_t budget) {
   if (client.depth) out.put_bytes(image_message(true));
 }
 
-void SessionModel::take_dense(std::string messages) {
+void SessionModel::take_dense(std::string messages, uint64_t world) {
+  if (world != world_) return;
   dense_ = std::move(messages);
   ++dense_number_;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -26,7 +27,9 @@ class SessionModel {
   void say(const std::string& line);
   void end(MapSnapshot map);
 
-  void set_paused(bool paused);  // any thread
+  // --- Any thread.
+  void set_paused(bool paused);
+  uint64_t world() const { return world_; }  // the number of the world that clients are told of
 
   // --- Any thread that holds the lock.
   [[nodiscard]] std::unique_lock<std::mutex> hold() { return std::unique_lock(mutex_); }
@@ -37,7 +40,8 @@ class SessionModel {
   // a while to compare.
   void take_in_map(int rest);
 
-  void take_dense(std::string messages);  // dense_messages.h
+  // dense_messages.h; nothing of a world that is over.
+  void take_dense(std::string messages, uint64_t world);
 
   struct Client {
     bool images = false, depth = false;  // wanted
@@ -68,6 +72,7 @@ class SessionModel {
     bool ended = false, paused = false;
   };
 
+  void forget_world();
   std::string hello() const;
   void write_truth(StreamWriter& out) const;
   const std::string& frame_message();
@@ -84,6 +89,7 @@ class SessionModel {
   int offered_ = 0, tracked_ = 0, lost_ = 0;
   bool ended_ = false, paused_ = false;
   MapDeltas map_;
+  std::atomic<uint64_t> world_;  // map_.world(), for those who do not hold the lock
   std::chrono::steady_clock::time_point map_taken_{};
   std::chrono::steady_clock::duration map_cost_{};
   SessionHistory history_;
