@@ -282,7 +282,9 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
   if (!tracked.tracked()) return {};
   if (tracked.state == TrackingState::relocalised) {
     last_relocalisation_ = tracked.index;
-    last_keyframe_ = last_keyframe_of(tracker_.map().view(), tracked.reference);
+    // One that mapping has not answered for yet is among the newest anyway.
+    if (tracker_.map().view().keyframe(tracked.reference) != nullptr)
+      last_keyframe_ = last_keyframe_of(tracker_.map().view(), tracked.reference);
     // The clock of the session that made it may be another one.
     if (last_keyframe_.frame < 0) last_keyframe_.stamp_ns = scene.extracted.frame.stamp_ns();
   }

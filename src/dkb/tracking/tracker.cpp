@@ -105,7 +105,9 @@ void Tracker::reset_motion() {
   last_.reset();
   odometry_.clear();
   place_evidence_.clear();
-  state_ = map_.view().keyframe_count() > 0 ? TrackingState::lost : TrackingState::initialising;
+  // A map whose first keyframe mapping has not answered for yet is a map.
+  state_ = state_ != TrackingState::initialising || map_.view().keyframe_count() > 0 ? TrackingState::lost
+                                                                                      : TrackingState::initialising;
 }
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const {
