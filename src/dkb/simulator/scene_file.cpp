@@ -89,7 +89,6 @@ class Section {
   [[noreturn]] void fail(const YAML::Node& at, const std::string& what) const {
     throw InputError(file_ + ":" + std::to_string(at.Mark().line + 1) + ": " + what);
   }
-  const YAML::Node& node() const { return node_; }
 
  private:
   double checked(const YAML::Node& n, const std::string& key, double low, double high) const {
