@@ -63,11 +63,6 @@ void set_exact_stamps(std::vector<DatasetPair>& pairs, const std::string& name) 
 
 }  // namespace
 
-void AssociationOptions::check() const {
-  require_option(std::isfinite(max_difference) && max_difference > 0, "association.max_difference", max_difference,
-                 "greater than 0 s");
-}
-
 void DatasetSelection::check() const {
   require_option(skip_pairs >= 0, "skip-pairs", skip_pairs, "at least 0");
   require_option(std::isfinite(start) && start >= 0, "start", start, "at least 0 s");
@@ -108,7 +103,7 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
 }
 
 std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
-                                                 const AssociationOptions& options) {
+                                                 double max_difference) {
   // The nearest free pair is one of neighbours in time: whatever lay between the two would be nearer to one of them. So
   // only neighbours are candidates, and taking a pair out makes at most one new pair of neighbours.
   struct Candidate {
@@ -134,7 +129,7 @@ std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, c
   const size_t end = all.size();
   all.push_back({false, 0, end - 1, end});
 
-  const double limit = options.max_difference + kStampRounding;
+  const double limit = max_difference + kStampRounding;
   std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> nearest;
   const auto offer = [&](size_t left, size_t right) {
     if (left == 0 || right == end || all[left].of_b == all[right].of_b) return;
@@ -162,8 +157,7 @@ bool has_tum_lists(const fs::path& folder) {
   return fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error);
 }
 
-TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& options) {
-  options.check();
+TumDataset open_tum_dataset(const fs::path& folder) {
   std::error_code ec;
   if (!fs::exists(folder, ec)) throw InputError(folder.string() + ": no such folder");
   if (!fs::is_directory(folder, ec))
@@ -185,11 +179,10 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
       throw InputError(list.string() +
                        ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt, with a line " +
                        "`seconds image` for each image (docs/sources.md, \"Your own images\")");
-  return pair_image_lists(folder, "rgb.txt", "depth.txt", options);
+  return pair_image_lists(folder, "rgb.txt", "depth.txt");
 }
 
-TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list,
-                            const AssociationOptions& options) {
+TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list) {
   TumDataset dataset;
   dataset.folder = folder;
   dataset.list = colour_list + " and " + depth_list;
@@ -199,13 +192,13 @@ TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_li
   std::vector<double> colour_stamps, depth_stamps;
   for (const ListRow& row : colour_rows) colour_stamps.push_back(row.timestamp);
   for (const ListRow& row : depth_rows) depth_stamps.push_back(row.timestamp);
-  for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
+  for (const auto& [i, j] : associate(colour_stamps, depth_stamps)) {
     const ListRow &c = colour_rows[i], &d = depth_rows[j];
     dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
   }
   if (dataset.pairs.empty())
     throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
-                     std::to_string(options.max_difference).substr(0, 5) +
+                     std::to_string(kPairDifference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
   dataset.unpaired = colour_rows.size() + depth_rows.size() - 2 * dataset.pairs.size();
   set_exact_stamps(dataset.pairs, rgb.string());
