@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What motion priors are for: stretches without vision, and places that somebody names.
+// Motion priors, and what they are for: stretches without vision, and places that somebody names.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "library_support.h"
@@ -26,6 +27,61 @@ class LibraryPriors : public ::testing::Test {
 
   WallWorld world{320, 240};
 };
+
+TEST_F(LibraryPriors, APriorGuidesAJumpThatTheMotionModelMisses) {
+  // The wall's picture repeats itself: a jump by one period looks like standing still.
+  const int period = 48;
+  const WallWorld repeating(320, 240, period);
+  const double jump = repeating.camera_x(period);
+  Options options;
+  options.readout.estimate = false;  // a picture of the wall is made at once, and a jump is no motion while it is read
+  for (const bool told : {false, true}) {
+    Slam slam(repeating.camera(), options, Detectors::none());
+    for (int i = 0; i < 6; ++i) ASSERT_TRUE(slam.process(repeating.frame(i, {})).tracked());
+    Frame frame = repeating.frame(6, {.shift = period});
+    MotionPrior prior;
+    prior.previous_from_current.translation.x() = jump;
+    if (told) frame.set_prior(prior);
+    const FrameResult r = slam.process(frame);
+    ASSERT_TRUE(r.tracked());
+    EXPECT_NEAR(r.world_from_cam->translation.x(), told ? jump : 0, 0.005);
+  }
+}
+
+TEST_F(LibraryPriors, AWrongPriorIsOverruledByTheImages) {
+  Slam slam(world.camera(), Options(), Detectors::none());
+  for (int i = 0; i < 10; ++i) {
+    Frame frame = world.frame(i, {.shift = i});
+    MotionPrior prior;
+    prior.previous_from_current.translation = {0.4, -0.3, 0.2};
+    frame.set_prior(prior);
+    const FrameResult r = slam.process(frame);
+    ASSERT_TRUE(r.tracked()) << i;
+    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 3e-3);
+  }
+}
+
+TEST_F(LibraryPriors, APriorThatIsNoNumberIsRefusedAndHarmsNothing) {
+  Slam slam(world.camera(), Options(), Detectors::none()), undisturbed(world.camera(), Options(), Detectors::none());
+  const auto frames = world.walk(0, 12);
+  for (size_t i = 0; i < frames.size(); ++i) {
+    if (i == 5) {
+      MotionPrior prior;
+      prior.previous_from_current.translation.z() = std::numeric_limits<double>::quiet_NaN();
+      Frame bad = frames[i];
+      EXPECT_NE(error_of([&] {
+                  bad.set_prior(prior);
+                  slam.process(bad);
+                }).find("motion prior"),
+                std::string::npos);
+    }
+    slam.process(frames[i]);
+    undisturbed.process(frames[i]);
+  }
+  slam.finish();
+  undisturbed.finish();
+  EXPECT_EQ(bytes_of(slam), bytes_of(undisturbed));
+}
 
 TEST_F(LibraryPriors, InTheDarkThePoseGoesOnAndItsCovarianceGrows) {
   Slam slam(world.camera(), Options(), Detectors::none());

@@ -176,6 +176,13 @@ Detections DepthDetector::detect(const DetectorInput& image) {
   return found;
 }
 
+std::string told(const std::vector<Event>& events) {
+  std::string line;
+  for (const Event& e : events)
+    if (e.kind != Event::Kind::keyframe) line += std::to_string(e.frame) + ":" + name_of(e.kind) + " ";
+  return line;
+}
+
 std::string error_of(const std::function<void()>& work) {
   try {
     work();

@@ -52,6 +52,9 @@ std::string feed(Slam& slam, const std::vector<Frame>& frames);
 // The same, finished, with all that is left in the end.
 std::string run(Slam& slam, const std::vector<Frame>& frames);
 
+// The events but for keyframes, as "0:new_map 6:lost ".
+std::string told(const std::vector<Event>& events);
+
 // Map points on the card.
 int leaked_points(const Slam& slam);
 

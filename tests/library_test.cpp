@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 
 #include "library_support.h"
 
@@ -118,214 +117,6 @@ TEST_F(Library, TrackingThatCannotBeginIsToldOnce) {
   EXPECT_EQ(events[0].kind, Kind::warning);
   EXPECT_EQ(events[0].frame, 29);
   EXPECT_NE(events[0].text.find("100 features with depth"), std::string::npos) << events[0].text;
-}
-
-// Motion priors.
-
-TEST_F(Library, APriorGuidesAJumpThatTheMotionModelMisses) {
-  // The wall's picture repeats itself: a jump by one period looks like standing still.
-  const int period = 48;
-  const WallWorld repeating(320, 240, period);
-  const double jump = repeating.camera_x(period);
-  Options options;
-  options.readout.estimate = false;  // a picture of the wall is made at once, and a jump is no motion while it is read
-  for (const bool told : {false, true}) {
-    Slam slam(repeating.camera(), options, Detectors::none());
-    for (int i = 0; i < 6; ++i) ASSERT_TRUE(slam.process(repeating.frame(i, {})).tracked());
-    Frame frame = repeating.frame(6, {.shift = period});
-    MotionPrior prior;
-    prior.previous_from_current.translation.x() = jump;
-    if (told) frame.set_prior(prior);
-    const FrameResult r = slam.process(frame);
-    ASSERT_TRUE(r.tracked());
-    EXPECT_NEAR(r.world_from_cam->translation.x(), told ? jump : 0, 0.005);
-  }
-}
-
-TEST_F(Library, AWrongPriorIsOverruledByTheImages) {
-  Slam slam = slam_with();
-  for (int i = 0; i < 10; ++i) {
-    Frame frame = world.frame(i, {.shift = i});
-    MotionPrior prior;
-    prior.previous_from_current.translation = {0.4, -0.3, 0.2};
-    frame.set_prior(prior);
-    const FrameResult r = slam.process(frame);
-    ASSERT_TRUE(r.tracked()) << i;
-    EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 3e-3);
-  }
-}
-
-TEST_F(Library, APriorThatIsNoNumberIsRefusedAndHarmsNothing) {
-  Slam slam = slam_with(), undisturbed = slam_with();
-  const auto frames = world.walk(0, 12);
-  for (size_t i = 0; i < frames.size(); ++i) {
-    if (i == 5) {
-      MotionPrior prior;
-      prior.previous_from_current.translation.z() = std::numeric_limits<double>::quiet_NaN();
-      Frame bad = frames[i];
-      EXPECT_NE(error_of([&] {
-                  bad.set_prior(prior);
-                  slam.process(bad);
-                }).find("motion prior"),
-                std::string::npos);
-    }
-    slam.process(frames[i]);
-    undisturbed.process(frames[i]);
-  }
-  slam.finish();
-  undisturbed.finish();
-  EXPECT_EQ(bytes_of(slam), bytes_of(undisturbed));
-}
-
-// Events.
-
-std::string told(const std::vector<Event>& events) {
-  std::string line;
-  for (const Event& e : events)
-    if (e.kind != Kind::keyframe) line += std::to_string(e.frame) + ":" + name_of(e.kind) + " ";
-  return line;
-}
-
-// Six frames, ten in the dark, back again, and then another place for good.
-std::vector<Frame> eventful(const WallWorld& world) {
-  std::vector<Frame> frames;
-  for (int i = 0; i < 6; ++i) frames.push_back(world.frame(i, {.shift = i}));
-  for (int i = 6; i < 16; ++i) frames.push_back(world.frame(i, {.dark = true}));
-  for (int i = 16; i < 22; ++i) frames.push_back(world.frame(i, {.shift = i - 12}));
-  for (int i = 22; i < 60; ++i) frames.push_back(world.frame(i, {.shift = i, .picture = 9}));
-  return frames;
-}
-
-TEST_F(Library, EventsTellWhatHappened) {
-  Slam slam = slam_with(std::make_shared<EveryNth>(4));
-  std::vector<Event> events;
-  std::vector<int> keyframes;
-  for (const Frame& frame : eventful(world)) {
-    const FrameResult r = slam.process(frame);
-    if (r.keyframe) keyframes.push_back(r.frame);
-    EXPECT_EQ(r.map, r.tracked() && r.frame >= 53 ? 1 : 0) << r.frame;
-    for (const Event& e : slam.take_events()) {
-      EXPECT_EQ(e.frame, r.frame);
-      EXPECT_EQ(e.stamp_ns, r.stamp_ns);
-      if (e.kind == Kind::keyframe) {
-        EXPECT_EQ(e.keyframe, r.reference_keyframe);
-      }
-      events.push_back(e);
-    }
-  }
-  // A map is begun a second after the loss: 31 frames of 33,333,333 ns.
-  EXPECT_EQ(told(events), "0:new_map 6:lost 17:found 22:lost 53:new_map 53:found ");
-  std::vector<int> announced;
-  for (const Event& e : events)
-    if (e.kind == Kind::keyframe) announced.push_back(e.frame);
-  EXPECT_EQ(announced, keyframes);
-  EXPECT_GE(announced.size(), 5U);
-  EXPECT_EQ(slam.statistics().maps, 2);
-  EXPECT_EQ(slam.trajectory().front().map, 0);
-  EXPECT_EQ(slam.trajectory().back().map, 1);
-  EXPECT_TRUE(slam.take_events().empty()) << "they were taken";
-}
-
-TEST_F(Library, EventsComeByCallbackByExecutorOrByPolling) {
-  const auto frames = eventful(world);
-  Slam polled = slam_with(), called = slam_with(), deferred = slam_with();
-  std::vector<Event> by_polling, by_callback, by_executor;
-  std::vector<std::function<void()>> tasks;
-  called.on_event([&](const Event& e) { by_callback.push_back(e); });
-  deferred.on_event([&](const Event& e) { by_executor.push_back(e); },
-                    [&](std::function<void()> task) { tasks.push_back(std::move(task)); });
-  for (const Frame& frame : frames) {
-    polled.process(frame);
-    const size_t before = by_callback.size();
-    const FrameResult r = called.process(frame);
-    for (size_t i = before; i < by_callback.size(); ++i)
-      EXPECT_EQ(by_callback[i].frame, r.frame) << "before it returns";
-    deferred.process(frame);
-  }
-  by_polling = polled.take_events();
-  EXPECT_TRUE(called.take_events().empty()) << "nothing while a callback is set";
-  EXPECT_TRUE(by_executor.empty()) << "the executor has not run yet";
-  for (const auto& task : tasks) task();
-  EXPECT_EQ(told(by_callback), told(by_polling));
-  EXPECT_EQ(told(by_executor), told(by_polling));
-  EXPECT_EQ(by_callback.size(), by_polling.size());
-}
-
-TEST_F(Library, AnEmptyCallbackEndsItAndWhatACallbackThrowsLeavesProcess) {
-  Slam slam = slam_with();
-  slam.on_event([](const Event&) { throw InputError("enough of events"); });
-  EXPECT_EQ(error_of([&] { slam.process(world.frame(0, {})); }), "enough of events");
-  slam.on_event({});
-  EXPECT_EQ(slam.statistics().frames, 1) << "the frame counts";
-  EXPECT_TRUE(slam.process(world.frame(1, {})).tracked()) << "the system goes on";
-  slam.process(world.frame(2, {.dark = true}));
-  EXPECT_EQ(told(slam.take_events()), "2:lost ");
-}
-
-TEST_F(Library, ACallbackMaySetAnother) {
-  Slam slam = slam_with();
-  int first = 0, second = 0;
-  slam.on_event([&](const Event&) {
-    ++first;
-    slam.on_event([&](const Event&) { ++second; });
-  });
-  slam.process(world.frame(0, {}));  // a new map, and its first keyframe
-  EXPECT_EQ(first, 2);
-  EXPECT_EQ(second, 0) << "from the next frame on";
-  slam.process(world.frame(1, {.dark = true}));
-  EXPECT_EQ(first, 2);
-  EXPECT_EQ(second, 1);
-}
-
-TEST_F(Library, AKeyframeRuleIsToldPlainNumbers) {
-  struct Counting final : KeyframePolicy {
-    KeyframeAnswer decide(const KeyframeQuery& q) override {
-      close = std::max(close, q.tracked_close_points);
-      EXPECT_LE(q.tracked_close_points, static_cast<int>(q.points.size()));
-      EXPECT_LE(q.reference_points, 300);
-      return {};
-    }
-    int close = 0;
-  };
-  const auto rule = std::make_shared<Counting>();
-  Options few;
-  few.set("features.count", "300");
-  Slam slam(world.camera(), few, {}, rule);
-  for (int i = 0; i < 8; ++i) slam.process(world.frame(i, {.shift = i}));
-  EXPECT_GT(rule->close, 50);
-}
-
-TEST_F(Library, WhatACallbackThrowsCostsNoOtherEvent) {
-  Slam polled = slam_with(), called = slam_with();
-  std::vector<Event> seen;
-  called.on_event([&](const Event& e) {
-    seen.push_back(e);
-    throw InputError("number " + std::to_string(seen.size()));
-  });
-  for (const Frame& frame : eventful(world)) {  // some have two events
-    polled.process(frame);
-    const size_t before = seen.size();
-    const std::string error = error_of([&] { called.process(frame); });
-    if (seen.size() > before) {
-      EXPECT_EQ(error, "number " + std::to_string(before + 1));
-    }
-  }
-  const std::vector<Event> expected = polled.take_events();
-  EXPECT_EQ(told(seen), told(expected));
-  EXPECT_EQ(seen.size(), expected.size());
-}
-
-TEST_F(Library, EventsThatNobodyTakesAreForgottenInTheEnd) {
-  Slam slam(world.camera(), Options(), [] {
-    Detectors detectors = Detectors::none();
-    detectors.prompt.push_back(std::make_shared<FunctionDetector>(
-        [](const DetectorInput&) -> Detections { throw std::runtime_error("out of order"); }));
-    return detectors;
-  }());
-  for (int i = 0; i < 29; ++i) slam.process(world.frame(i, {.dark = true}));
-  const auto events = slam.take_events();
-  EXPECT_EQ(events.size(), 29U);
-  for (const Event& e : events) EXPECT_EQ(e.text, "detector function: out of order");
 }
 
 // Pause and localise.
@@ -464,6 +255,24 @@ TEST_F(Library, AMapThatDoesNotFitLeavesAllAsItWas) {
 }
 
 // A rule of the user's for keyframes.
+
+TEST_F(Library, AKeyframeRuleIsToldPlainNumbers) {
+  struct Counting final : KeyframePolicy {
+    KeyframeAnswer decide(const KeyframeQuery& q) override {
+      close = std::max(close, q.tracked_close_points);
+      EXPECT_LE(q.tracked_close_points, static_cast<int>(q.points.size()));
+      EXPECT_LE(q.reference_points, 300);
+      return {};
+    }
+    int close = 0;
+  };
+  const auto rule = std::make_shared<Counting>();
+  Options few;
+  few.set("features.count", "300");
+  Slam slam(world.camera(), few, {}, rule);
+  for (int i = 0; i < 8; ++i) slam.process(world.frame(i, {.shift = i}));
+  EXPECT_GT(rule->close, 50);
+}
 
 TEST_F(Library, AKeyframeRuleOfOnesOwnDecides) {
   const auto policy = std::make_shared<EveryNth>(4);

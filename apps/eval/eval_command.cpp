@@ -32,9 +32,7 @@ void run_eval(const EvalArguments& arguments) {
   const Evaluation evaluation = evaluate_files(arguments);
   if (!arguments.json.empty()) write_file_atomically(arguments.json, evaluation_json(evaluation));
   if (!arguments.plot.empty()) {
-    PlotNames names;
-    names.title = fs::path(arguments.estimate).filename().string();
-    write_file_atomically(arguments.plot, evaluation_svg(evaluation, names));
+    write_file_atomically(arguments.plot, evaluation_svg(evaluation, fs::path(arguments.estimate).filename().string()));
   }
   std::fputs(evaluation_table(evaluation).c_str(), stdout);
 }

@@ -61,7 +61,6 @@ std::string keyframe_chart(const std::vector<KeyframeTicks>& rules, double durat
 struct StageRow {
   std::string name;
   std::vector<int> counts;  // as Statistics::stage_histograms
-  double mean_ms = 0;
 };
 std::string stage_chart(const std::vector<StageRow>& stages, double frame_ms);
 

@@ -58,7 +58,6 @@ void RunLog::frame(const Frame& frame, const FrameResult& result) {
   row.state = result.state;
   row.keyframe = result.keyframe;
   row.ambiguous = result.ambiguous;
-  row.movers = static_cast<uint16_t>(result.movers.size());
   row.inliers = result.inliers;
   row.masked = masked_share(result.mask);
   row.tracking_ms = static_cast<float>(result.tracking_ms);
@@ -67,7 +66,6 @@ void RunLog::frame(const Frame& frame, const FrameResult& result) {
   judge_features(frame, result, row);
   if (result.world_from_cam && last_pose_) {
     const Rigid3 moved = last_pose_->inverse() * *result.world_from_cam;
-    row.moved_m = static_cast<float>(moved.translation.norm());
     row.turned_deg = static_cast<float>(2 * std::atan2(moved.rotation.vec().norm(), std::abs(moved.rotation.w())) *
                                         180 / 3.14159265358979);
   }

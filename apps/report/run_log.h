@@ -16,16 +16,15 @@ struct FrameRow {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::initialising;
   bool keyframe = false;
-  bool ambiguous = false;             // lost, before one of two places that look alike
-  uint8_t rule = 0;                   // of a keyframe, index into RunLog::rules()
-  uint16_t movers = 0;                // as obstacles
-  int features = 0;                   // extracted
-  int removed = 0, inliers = 0;       // kept from tracking by the filter; map points that the pose rests on
-  float masked = 0, depth = 0;        // shares of the image: on movers; with depth
-  float with_depth = 0;               // share of the features that have depth where they are
-  float brightness = 0;               // mean grey level
-  float turned_deg = 0, moved_m = 0;  // since the frame before, when both have poses
-  float position_sd = 0;              // [m] by the covariance; 0 = unknown
+  bool ambiguous = false;        // lost, before one of two places that look alike
+  uint8_t rule = 0;              // of a keyframe, index into RunLog::rules()
+  int features = 0;              // extracted
+  int removed = 0, inliers = 0;  // kept from tracking by the filter; map points that the pose rests on
+  float masked = 0, depth = 0;   // shares of the image: on movers; with depth
+  float with_depth = 0;          // share of the features that have depth where they are
+  float brightness = 0;          // mean grey level
+  float turned_deg = 0;          // since the frame before, when both have poses
+  float position_sd = 0;         // [m] by the covariance; 0 = unknown
   float tracking_ms = 0, waiting_ms = 0;
 
   bool tracked() const { return state != TrackingState::initialising && state != TrackingState::lost; }
@@ -51,7 +50,6 @@ class RunLog {
   const std::vector<Happening>& happenings() const { return happenings_; }  // the first 200
   const std::vector<OverlayPicture>& even() const { return even_; }         // spread evenly over the run
   const std::vector<OverlayPicture>& lost() const { return lost_; }         // first of a stretch without poses
-  const std::optional<OverlayPicture>& fewest() const { return fewest_; }   // with about the fewest inliers
   std::vector<const OverlayPicture*> pictures() const;                      // all of them, by row, none twice
 
  private:
@@ -64,7 +62,7 @@ class RunLog {
   size_t stride_;
   std::optional<size_t> first_tracked_;  // row
   std::vector<OverlayPicture> even_, lost_;
-  std::optional<OverlayPicture> fewest_;
+  std::optional<OverlayPicture> fewest_;  // with about the fewest inliers
 };
 
 }  // namespace dkb::report

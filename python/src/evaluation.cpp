@@ -55,9 +55,7 @@ void bind_evaluation(py::module_& module) {
                 bool scale) { return evaluation_json(evaluated(truth, estimate, max_diff, rpe_delta, scale)); });
   module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
     if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);
-    PlotNames names;
-    names.title = title;
-    return evaluation_svg(evaluated(truth, estimate, EvaluationOptions().max_difference, "1f", false), names);
+    return evaluation_svg(evaluated(truth, estimate, EvaluationOptions().max_difference, "1f", false), title);
   });
 }
 

@@ -198,12 +198,10 @@ void RgbdReader::fill(std::unique_lock<std::mutex>& lock, const std::shared_ptr<
 }
 
 DatasetFrame RgbdReader::hand_out(Slot& slot) {
-  times_.add("decoding", slot.decoded->ms);
   const StoredPair& pair = slot.pair;
-  return {slot.index,    pair.timestamp,
-          pair.stamp_ns, pair.depth_stamp_ns,
-          pair.stamp,    std::move(slot.decoded->image),
-          pair.prior,    std::move(slot.decoded->skipped)};
+  auto& [image, skipped, ms] = *slot.decoded;
+  times_.add("decoding", ms);
+  return {slot.index, pair.stamp_ns, pair.depth_stamp_ns, pair.stamp, std::move(image), pair.prior, std::move(skipped)};
 }
 
 std::optional<DatasetFrame> RgbdReader::next() {

@@ -28,7 +28,6 @@ struct RgbdReaderOptions {
 // One pair of the recording, in order, decoded or skipped.
 struct DatasetFrame {
   size_t index = 0;                          // of the pair, skipped ones counted
-  double timestamp = 0;                      // [s] colour
   int64_t stamp_ns = 0, depth_stamp_ns = 0;  // exactly
   std::string stamp;                         // colour, as read
   std::shared_ptr<const RgbdImage> image;    // null when skipped

@@ -95,14 +95,13 @@ std::vector<ListRow> rows_by_name(const fs::path& folder, const std::string& ima
 }
 
 // One to one, nearest stamps first; stamps in nanoseconds are not set.
-TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour, const std::vector<ListRow>& depth,
-                     const AssociationOptions& options) {
+TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour, const std::vector<ListRow>& depth) {
   TumDataset dataset;
   dataset.folder = folder;
   std::vector<double> colour_stamps, depth_stamps;
   for (const ListRow& row : colour) colour_stamps.push_back(row.timestamp);
   for (const ListRow& row : depth) depth_stamps.push_back(row.timestamp);
-  for (const auto& [i, j] : associate(colour_stamps, depth_stamps, options)) {
+  for (const auto& [i, j] : associate(colour_stamps, depth_stamps)) {
     const ListRow &c = colour[i], &d = depth[j];
     dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
   }
@@ -111,11 +110,6 @@ TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour,
 }
 
 }  // namespace
-
-void AssociationOptions::check() const {
-  require_option(std::isfinite(max_difference) && max_difference > 0, "association.max_difference", max_difference,
-                 "greater than 0 s");
-}
 
 void DatasetSelection::check() const {
   require_option(skip_pairs >= 0, "skip-pairs", skip_pairs, "at least 0");
@@ -157,7 +151,7 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
 }
 
 std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
-                                                 const AssociationOptions& options) {
+                                                 double max_difference) {
   // The nearest free pair is one of neighbours in time: whatever lay between the two would be nearer to one of them. So
   // only neighbours are candidates, and taking a pair out makes at most one new pair of neighbours.
   struct Candidate {
@@ -183,7 +177,7 @@ std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, c
   const size_t end = all.size();
   all.push_back({false, 0, end - 1, end});
 
-  const double limit = options.max_difference + kStampRounding;
+  const double limit = max_difference + kStampRounding;
   std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> nearest;
   const auto offer = [&](size_t left, size_t right) {
     if (left == 0 || right == end || all[left].of_b == all[right].of_b) return;
@@ -211,8 +205,7 @@ bool has_tum_lists(const fs::path& folder) {
   return fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error);
 }
 
-TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& options) {
-  options.check();
+TumDataset open_tum_dataset(const fs::path& folder) {
   std::error_code ec;
   if (!fs::exists(folder, ec)) throw InputError(folder.string() + ": no such folder");
   if (!fs::is_directory(folder, ec))
@@ -235,19 +228,18 @@ TumDataset open_tum_dataset(const fs::path& folder, const AssociationOptions& op
                        ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt, with a line " +
                        "`seconds image` for each image, or images named rgb/STAMP.png and depth/STAMP.png "
                        "(docs/sources.md, \"Your own images\")");
-  return pair_image_lists(folder, "rgb.txt", "depth.txt", options);
+  return pair_image_lists(folder, "rgb.txt", "depth.txt");
 }
 
-TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list,
-                            const AssociationOptions& options) {
+TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_list, const std::string& depth_list) {
   const fs::path rgb = folder / colour_list, depth = folder / depth_list;
   const std::vector<ListRow> colour_rows = parse_image_list(read_file(rgb), rgb.string());
   const std::vector<ListRow> depth_rows = parse_image_list(read_file(depth), depth.string());
-  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows, options);
+  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows);
   dataset.list = colour_list + " and " + depth_list;
   if (dataset.pairs.empty())
     throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
-                     std::to_string(options.max_difference).substr(0, 5) +
+                     std::to_string(kPairDifference).substr(0, 5) +
                      " s; the two lists must be of one recording and one clock");
   set_exact_stamps(dataset.pairs, rgb.string());
   return dataset;
@@ -257,17 +249,16 @@ bool is_stamp(std::string_view name) {
   return !name.empty() && name.find_first_not_of("0123456789.") == std::string_view::npos && parse_stamp_ns(name);
 }
 
-TumDataset pair_image_folders(const fs::path& folder, const std::string& colour_folder, const std::string& depth_folder,
-                              const AssociationOptions& options) {
-  options.check();
+TumDataset pair_image_folders(const fs::path& folder, const std::string& colour_folder,
+                              const std::string& depth_folder) {
   const fs::path colour = folder / colour_folder;
   const std::vector<ListRow> colour_rows = rows_by_name(folder, colour_folder, kColourEndings);
   const std::vector<ListRow> depth_rows = rows_by_name(folder, depth_folder, kDepthEndings);
-  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows, options);
+  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows);
   dataset.list = "the names in " + colour_folder + " and " + depth_folder;
   if (dataset.pairs.empty())
     throw InputError(colour.string() + ": no image has one of " + depth_folder + " whose name is a stamp within " +
-                     std::to_string(options.max_difference).substr(0, 5) +
+                     std::to_string(kPairDifference).substr(0, 5) +
                      " s of its own; the names must be of one recording and one clock, in seconds");
   set_exact_stamps(dataset.pairs, colour.string());
   return dataset;

@@ -23,10 +23,7 @@ struct DatasetPair {
   std::filesystem::path depth_path;
 };
 
-struct AssociationOptions {
-  double max_difference = 0.02;  // [s] between the stamps of a pair, > 0
-  void check() const;            // throws InvalidOption
-};
+inline constexpr double kPairDifference = 0.02;  // [s] most between the stamps of a pair
 
 struct TumDataset {
   std::filesystem::path folder;
@@ -43,17 +40,17 @@ bool has_tum_lists(const std::filesystem::path& folder);
 // rgb.txt and depth.txt (`stamp path`), paired one to one, nearest stamps first. Comments, blank lines and CRLF are
 // fine. Throws InputError with file:line: folder or lists missing or empty; a row malformed, with too few columns, with
 // a stamp that is not finite, repeated or out of order; nothing pairs. In associations.txt depth stamps may repeat.
-TumDataset open_tum_dataset(const std::filesystem::path& folder, const AssociationOptions& options = {});
+TumDataset open_tum_dataset(const std::filesystem::path& folder);
 
 // Likewise by two lists of these names alone.
 TumDataset pair_image_lists(const std::filesystem::path& folder, const std::string& colour_list,
-                            const std::string& depth_list, const AssociationOptions& options = {});
+                            const std::string& depth_list);
 
 // The same without lists, where images are named by their stamps [s]: COLOUR/1305031102.175304.png. Files that are no
 // images by their endings are left alone. Throws InputError naming the image whose name is no stamp, or one that
 // another image has as well.
 TumDataset pair_image_folders(const std::filesystem::path& folder, const std::string& colour_folder,
-                              const std::string& depth_folder, const AssociationOptions& options = {});
+                              const std::string& depth_folder);
 
 // Whether the name of an image, without its ending, is a stamp: plain decimals, below 9e9 s.
 bool is_stamp(std::string_view name);
@@ -70,7 +67,7 @@ std::vector<DatasetPair> parse_associations(const std::string& text, const std::
 
 // Index pairs (i of a, j of b), rising in i: each used once, nearest stamps first (ties: earlier i, then earlier j).
 std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, const std::vector<double>& b,
-                                                 const AssociationOptions& options);
+                                                 double max_difference = kPairDifference);
 
 // What --skip-pairs, --start, --end and --max-frames choose.
 struct DatasetSelection {

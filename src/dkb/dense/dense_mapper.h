@@ -31,7 +31,6 @@ class DenseMapper {
   void add_keyframe(FrameIndex frame, const RgbdImage& image, const MoverMask& movers);
   // Movers of an earlier frame that became known later. Frames that were not added are passed over.
   void remove_movers(FrameIndex frame, const MoverMask& movers);
-  size_t keyframes() const { return views_.size(); }
 
   // Poses by time, of colour images; a view takes its pose at its depth image's time from them and is left out when
   // they do not reach within 0.2 s of it. `seed` is that of the floor's RANSAC. The floor's normal is looked for within

@@ -16,13 +16,8 @@ std::string evaluation_table(const Evaluation& evaluation);
 // alignment's rotation.
 std::string evaluation_json(const Evaluation& evaluation);
 
-struct PlotNames {
-  std::string title = "Trajectory error";
-  std::string truth = "ground truth";
-  std::string estimate = "estimate";
-};
 // Both paths in their two widest projections, and the APE over time, as one SVG picture without outside references.
-std::string evaluation_svg(const Evaluation& evaluation, const PlotNames& names = {});
+std::string evaluation_svg(const Evaluation& evaluation, const std::string& title = "Trajectory error");
 
 // A path alone, in its two widest projections, likewise. Throws InputError when it has no pose.
 std::string trajectory_svg(const Trajectory& trajectory, const std::string& title = "Trajectory");

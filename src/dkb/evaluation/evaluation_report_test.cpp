@@ -95,7 +95,7 @@ TEST(EvaluationReport, TableNamesApeAndUnits) {
 }
 
 TEST(EvaluationReport, PictureIsWholeAndEscapesNames) {
-  const std::string svg = evaluation_svg(example(), {.title = "a<b> & \"c\""});
+  const std::string svg = evaluation_svg(example(), "a<b> & \"c\"");
   EXPECT_EQ(svg.rfind("<svg xmlns=", 0), 0u);
   EXPECT_EQ(svg.substr(svg.size() - 7), "</svg>\n");
   EXPECT_NE(svg.find("a&lt;b&gt; &amp; &quot;c&quot;"), std::string::npos);

@@ -70,17 +70,18 @@ std::string heading(const std::string& title, const std::string& line) {
 
 }  // namespace
 
-std::string evaluation_svg(const Evaluation& e, const PlotNames& names) {
+std::string evaluation_svg(const Evaluation& e, const std::string& title) {
   std::string out = svg::opening(kWidth, 800);
   const std::string rpe = e.rpe.translation.count == 0
                               ? "no pair of poses is that far apart"
                               : fmt::format("{:.4f} m, {:.3f} deg rmse", e.rpe.translation.rmse, e.rpe.rotation.rmse);
   const std::string turned =
       e.rotation_determined ? fmt::format("{:.3f} deg rmse", e.ape.rotation.rmse) : "rotation not determined";
-  out += heading(names.title, fmt::format("APE {:.4f} m, {}; RPE ({}) {}; {} poses", e.ape.translation.rmse, turned,
-                                          to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
+  out += heading(title, fmt::format("APE {:.4f} m, {}; RPE ({}) {}; {} poses", e.ape.translation.rmse, turned,
+                                    to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
   double legend = 70;
-  for (const auto& [colour, name] : {std::pair{kTruth, names.truth}, std::pair{kEstimate, names.estimate}}) {
+  for (const auto& [colour, name] :
+       {std::pair{kTruth, std::string("ground truth")}, std::pair{kEstimate, std::string("estimate")}}) {
     out += fmt::format("<line x1=\"{:.1f}\" y1=\"76\" x2=\"{:.1f}\" y2=\"76\" stroke=\"{}\" stroke-width=\"3\"/>\n",
                        legend, legend + 26, colour);
     out += svg::label(legend + 32, 80, "start", 12, svg::kInk, name);

@@ -34,7 +34,6 @@ class ImagePyramid {
   // Levels built; less than asked for when the image is small. 0 before the first build().
   int levels() const { return levels_; }
   const GreyImage& level(int index) const { return images_[static_cast<size_t>(index)]; }
-  const ImagePyramidOptions& options() const { return options_; }
 
   // Size of level 0 over that of level `index`, by its rounded width and height.
   double scale_x(int index) const { return scales_[static_cast<size_t>(index)].x; }

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 
-#include "dkb/util/errors.h"
-
 namespace dkb {
 namespace {
 
-constexpr size_t kBlock = 64;  // distances computed before they are looked at
+constexpr int kMaxDistance = 64;  // [bits] largest Hamming distance of a match
+constexpr float kRatio = 0.8F;    // best distance over second best must be below this
+constexpr size_t kBlock = 64;     // distances computed before they are looked at
 
 // The nearest descriptor, and the distance of the next one.
 struct BestTwo {
@@ -52,14 +52,8 @@ void offer(BestTwo& best, int index, int distance) {
 
 }  // namespace
 
-void MatchOptions::check() const {
-  require_option(max_distance >= 0 && max_distance <= 256, "max_distance", max_distance, "0 ... 256 bits");
-  require_option(ratio >= 0 && ratio <= 1, "ratio", ratio, "0 ... 1");
-}
-
 std::vector<DescriptorMatch> match_brute_force(std::span<const Descriptor> a, std::span<const Descriptor> b,
-                                               const MatchOptions& options, Simd simd) {
-  options.check();
+                                               Simd simd) {
   std::vector<DescriptorMatch> best_of_b(b.size(), {.a = -1, .b = -1, .distance = 257});  // the nearest of a to each b
   std::vector<DescriptorMatch> matches;
   std::array<int32_t, kBlock> distances;
@@ -74,12 +68,11 @@ std::vector<DescriptorMatch> match_brute_force(std::span<const Descriptor> a, st
         if (distances[j] < of_b.distance) of_b = {static_cast<int>(i), static_cast<int>(first + j), distances[j]};
       }
     }
-    if (best.index < 0 || best.distance > options.max_distance) continue;
-    if (static_cast<float>(best.distance) >= options.ratio * static_cast<float>(best.second)) continue;
+    if (best.index < 0 || best.distance > kMaxDistance) continue;
+    if (static_cast<float>(best.distance) >= kRatio * static_cast<float>(best.second)) continue;
     matches.push_back({static_cast<int>(i), best.index, best.distance});
   }
-  if (options.mutual)
-    std::erase_if(matches, [&](const DescriptorMatch& m) { return best_of_b[static_cast<size_t>(m.b)].a != m.a; });
+  std::erase_if(matches, [&](const DescriptorMatch& m) { return best_of_b[static_cast<size_t>(m.b)].a != m.a; });
   return matches;
 }
 

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "dkb/features/rgbd_features.h"
-#include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -44,7 +43,7 @@ TEST(Matching, HammingDistanceCountsDifferingBits) {
 TEST(Matching, TiesGoToTheFirstAndNothingMatchesNothing) {
   const std::vector<Descriptor> set = random_descriptors(3, 2);
   const std::vector<Descriptor> b = {set[1], set[1], set[2]};
-  EXPECT_EQ(match_brute_force(set, b, {.max_distance = 0, .ratio = 1.0F}), (std::vector<DescriptorMatch>{{2, 2, 0}}))
+  EXPECT_EQ(match_brute_force(set, b), (std::vector<DescriptorMatch>{{2, 2, 0}}))
       << "two as near as each other are told apart by nothing";
   const std::vector<Descriptor> twice = {set[1], set[1]}, once = {set[1]};
   EXPECT_EQ(match_brute_force(twice, once), (std::vector<DescriptorMatch>{{0, 0, 0}}));
@@ -64,26 +63,21 @@ TEST(Matching, BruteForceFindsDisturbedCopiesAndNothingElse) {
     EXPECT_EQ(matches[i].b, static_cast<int>(149 - i));
     EXPECT_LE(matches[i].distance, 30);
   }
-  EXPECT_EQ(match_brute_force(a, b, {}, Simd::scalar), matches);
+  EXPECT_EQ(match_brute_force(a, b, Simd::scalar), matches);
 }
 
 TEST(Matching, RatioAndMutualTestsRejectRepeatedStructure) {
   const std::vector<Descriptor> a = random_descriptors(1, 7);
   Random random(8);
   const std::vector<Descriptor> twice = {disturbed(a[0], 5, random), disturbed(a[0], 6, random)};
-  EXPECT_TRUE(match_brute_force(a, twice, {.ratio = 0.8F}).empty());
-  EXPECT_EQ(match_brute_force(a, twice, {.ratio = 1.0F}).size(), 1u);
+  EXPECT_TRUE(match_brute_force(a, twice).empty());
+  EXPECT_EQ(match_brute_force(a, std::span(twice).first(1)).size(), 1u);
   // Two of a look like the one b: only the nearer one may have it.
   const std::vector<Descriptor> pair = {disturbed(a[0], 20, random), a[0]};
-  const std::vector<DescriptorMatch> mutual = match_brute_force(pair, a, {.ratio = 1.0F});
+  const std::vector<DescriptorMatch> mutual = match_brute_force(pair, a);
   ASSERT_EQ(mutual.size(), 1u);
   EXPECT_EQ(mutual[0].a, 1);
-  EXPECT_EQ(match_brute_force(pair, a, {.ratio = 1.0F, .mutual = false}).size(), 2u);
-}
-
-TEST(Matching, RefusesBadOptions) {
-  EXPECT_THROW(match_brute_force({}, {}, {.max_distance = 257}), InvalidOption);
-  EXPECT_THROW(match_brute_force({}, {}, {.ratio = 1.5F}), InvalidOption);
+  EXPECT_EQ(match_brute_force(std::span(pair).first(1), a).size(), 1u);
 }
 
 TEST(KeypointGrid, FindsExactlyThePointsWithinTheSquareInAFixedOrder) {

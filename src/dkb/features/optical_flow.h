@@ -11,16 +11,11 @@
 namespace dkb {
 
 struct OpticalFlowOptions {
-  int window = 11;          // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
-  int levels = 4;           // pyramid levels used, >= 1; the pyramids may have fewer
-  int max_iterations = 10;  // per level, >= 1
-  double epsilon = 0.02;    // [px] a smaller step ends the search at full resolution (0.1 px of the level before), > 0
-  double min_eigenvalue = 1;  // [(grey levels / px)^2] mean over the window; flatter windows are not followed, >= 0
-  double max_residual = 30;   // [grey levels] a larger mean absolute difference means lost, > 0
-  void check() const;         // throws InvalidOption
+  int window = 11;     // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
+  void check() const;  // throws InvalidOption
 
   // What build() of both frames' pyramids is best given.
-  ImagePyramidOptions pyramid() const { return {.levels = levels, .scale = 2.0, .min_size = 2 * window}; }
+  ImagePyramidOptions pyramid() const { return {.levels = 4, .scale = 2.0, .min_size = 2 * window}; }
 };
 
 struct FlowResult {
@@ -38,14 +33,12 @@ class OpticalFlow {
   explicit OpticalFlow(OpticalFlowOptions options = {}, Simd simd = best_simd());
 
   // Positions [px, full resolution] of the previous image's `points` in the current image. Both pyramids must be of
-  // equal size (InputError). `guesses`: where to begin in the current image, as many as points or none (at the points).
+  // equal size (InputError).
   std::vector<FlowResult> track(const ImagePyramid& previous, const ImagePyramid& current,
-                                std::span<const Eigen::Vector2f> points,
-                                std::span<const Eigen::Vector2f> guesses = {}) const;
+                                std::span<const Eigen::Vector2f> points) const;
 
  private:
-  FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point,
-                       const Eigen::Vector2f& guess) const;
+  FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point) const;
 
   OpticalFlowOptions options_;
   Simd simd_;

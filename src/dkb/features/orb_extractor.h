@@ -46,7 +46,6 @@ class OrbExtractor {
   void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
   const ImagePyramid& pyramid() const { return pyramid_; }
-  const OrbOptions& options() const { return options_; }
 
  private:
   // What one thread keeps its buffers in.

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "dkb/features/feature_test_util.h"
-#include "dkb/features/matching.h"
 #include "dkb/features/orientation.h"
 #include "dkb/features/subpixel.h"
 #include "dkb/util/errors.h"
@@ -36,16 +36,18 @@ struct MatchQuality {
 MatchQuality match_quality(const SquareWorld& world, const Motion& motion, const OrbFeatures& first,
                            const OrbFeatures& second) {
   MatchQuality quality;
-  const std::vector<DescriptorMatch> matches =
-      match_brute_force(first.descriptors, second.descriptors, {.max_distance = 256, .ratio = 1.0F, .mutual = false});
   for (const Corner& corner : first.corners) {
     double x = 0, y = 0;
     world.move(motion, corner.x, corner.y, x, y);
     quality.in_view += x > 30 && y > 30 && x < 610 && y < 450;
   }
-  for (const DescriptorMatch& match : matches) {
-    const Corner& a = first.corners[static_cast<size_t>(match.a)];
-    const Corner& b = second.corners[static_cast<size_t>(match.b)];
+  for (size_t i = 0; i < first.corners.size(); ++i) {
+    const auto nearer = [&](const Descriptor& one, const Descriptor& other) {
+      return hamming_distance(first.descriptors[i], one) < hamming_distance(first.descriptors[i], other);
+    };
+    const auto nearest = std::min_element(second.descriptors.begin(), second.descriptors.end(), nearer);
+    const Corner& a = first.corners[i];
+    const Corner& b = second.corners[static_cast<size_t>(nearest - second.descriptors.begin())];
     double x = 0, y = 0;
     world.move(motion, a.x, a.y, x, y);
     if (x <= 30 || y <= 30 || x >= 610 || y >= 450) continue;

@@ -24,16 +24,12 @@ Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_f
   return {std::acos(cosine) * 180 / M_PI, units_in_metre * metres};
 }
 
-ParallaxWeights parallax_weights(const Parallax& mean) {
+double parallax_factor(const Parallax& mean) {
   constexpr double kEpsilon = 1e-5;
   const double sum = mean.sum() + kEpsilon;
-  return {mean.rotation_deg / sum, mean.translation / sum};
-}
-
-double parallax_factor(const Parallax& mean) {
-  const ParallaxWeights w = parallax_weights(mean);
-  const double motion = std::log(1 + w.rotation * mean.rotation_deg) + std::log(1 + w.translation * mean.translation);
-  const double largest = std::log(1 + w.rotation * kRotationMax) + std::log(1 + w.translation * kTranslationMax);
+  const double w_rotation = mean.rotation_deg / sum, w_translation = mean.translation / sum;
+  const double motion = std::log(1 + w_rotation * mean.rotation_deg) + std::log(1 + w_translation * mean.translation);
+  const double largest = std::log(1 + w_rotation * kRotationMax) + std::log(1 + w_translation * kTranslationMax);
   return largest < 1e-9 ? 0.0 : std::clamp(motion / largest, 0.0, 1.0);
 }
 

@@ -26,14 +26,7 @@ double units_per_metre(TranslationUnit unit, double median_depth);
 // DKB eqs. 14-16. Both poses in the same world; the translation is in the unit that a metre has so many of.
 Parallax parallax_between(const Rigid3& last_cam_from_world, const Rigid3& cam_from_world, double units_in_metre);
 
-struct ParallaxWeights {
-  double rotation = 0, translation = 0;  // each 0 ... 1, together at most 1
-};
-
-// DKB eqs. 19, 20. Both 0 for a still camera.
-ParallaxWeights parallax_weights(const Parallax& mean);
-
-// DKB eqs. 21-24, clamped to 0 ... 1. A still camera, for which eq. 24 is 0/0, gives 0.
+// DKB eqs. 19-24, clamped to 0 ... 1. A still camera, for which eq. 24 is 0/0, gives 0.
 double parallax_factor(const Parallax& mean);
 
 // DKB eq. 25: the larger the less a camera moves.

@@ -37,15 +37,7 @@ TEST(TranslationUnits, AreCentimetresOrPercentOfTheDepth) {
   EXPECT_EQ(units_per_metre(TranslationUnit::depth_percent, 0), 100);  // unknown
 }
 
-TEST(ParallaxWeights, ShareOutTheMotion) {  // DKB eqs. 19, 20
-  const ParallaxWeights w = parallax_weights({3, 1});
-  EXPECT_NEAR(w.rotation, 0.75, 1e-5);
-  EXPECT_NEAR(w.translation, 0.25, 1e-5);
-  EXPECT_EQ(parallax_weights({0, 0}).rotation, 0);  // 0 / (0 + 1e-5)
-  EXPECT_EQ(parallax_weights({0, 0}).translation, 0);
-}
-
-TEST(ParallaxFactor, IsTheLogarithmicShareOfTheLargestMotion) {  // DKB eqs. 21-24
+TEST(ParallaxFactor, IsTheLogarithmicShareOfTheLargestMotion) {  // DKB eqs. 19-24
   // Means 3 deg and 1 cm: w = 0.75 and 0.25, M = ln(1 + 2.25) + ln(1 + 0.25) = 1.178655 + 0.223144 = 1.401799,
   // the largest is ln(1 + 0.75 * 45) + ln(1 + 0.25 * 10) = 3.548180 + 1.252763 = 4.800943, F = 0.291984.
   EXPECT_NEAR(parallax_factor({3, 1}), 0.291984, 1e-5);

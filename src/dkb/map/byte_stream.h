@@ -12,6 +12,11 @@ namespace dkb {
 // CRC-32C (Castagnoli polynomial, reflected), as in iSCSI (RFC 3720): "123456789" gives 0xE3069283.
 uint32_t crc32c(std::string_view bytes, uint32_t crc = 0);
 
+// What ByteWriter::zigzag() made of a signed number, turned back.
+inline int64_t signed_of(uint64_t zigzag) {
+  return static_cast<int64_t>(zigzag >> 1) ^ -static_cast<int64_t>(zigzag & 1);
+}
+
 // Appends numbers to a string, little-endian whatever the machine.
 class ByteWriter {
  public:
@@ -57,10 +62,7 @@ class ByteReader {
   int32_t i32() { return static_cast<int32_t>(fixed<uint32_t>()); }
   double f64() { return std::bit_cast<double>(fixed<uint64_t>()); }
   uint64_t varint();
-  int64_t zigzag() {
-    const uint64_t v = varint();
-    return static_cast<int64_t>(v >> 1) ^ -static_cast<int64_t>(v & 1);
-  }
+  int64_t zigzag() { return signed_of(varint()); }
   std::string_view raw(size_t size);
   // A number of items that follow, each of at least `min_bytes` bytes (> 0): more cannot be there.
   size_t count(uint64_t claimed, size_t min_bytes) const;

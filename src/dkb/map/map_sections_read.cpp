@@ -17,10 +17,6 @@ constexpr size_t kMinKeyframeBytes = 1 + 4 + 8 + 4 + 7 * 8 + 2;
 constexpr size_t kMinPointBytes = 1 + 3 * 8;
 constexpr size_t kMaxVarintBytes = 10;
 
-int64_t signed_of(uint64_t zigzag) {
-  return static_cast<int64_t>(zigzag >> 1) ^ -static_cast<int64_t>(zigzag & 1);
-}
-
 template <class Integer>
 Integer narrow(const ByteReader& in, int64_t v) {
   if (v < static_cast<int64_t>(std::numeric_limits<Integer>::min()) ||

@@ -35,9 +35,8 @@ Matrix6d common_error(const Map& map, const BaWindow& window, const BaResult& re
 
 }  // namespace
 
-LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
-                                      const LocalBaOptions& options) {
-  LocalBaReport report;
+std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
+                                             const LocalBaOptions& options) {
   std::vector<KeyframeId> keyframes = {newest};
   for (const Covisible& c : map.keyframe(newest)->covisible)
     if (static_cast<int>(keyframes.size()) < options.free_keyframes) keyframes.push_back(c.keyframe);
@@ -86,18 +85,7 @@ LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics&
   for (size_t o = 0; o < window.sources.size(); ++o)
     if (result.outlier[o])
       map.forget(window.points[static_cast<size_t>(window.sources[o].point)], window.sources[o].keyframe);
-
-  report.cameras = static_cast<int>(std::count(
-      problem.fixed.begin(), problem.fixed.begin() + static_cast<std::ptrdiff_t>(window.keyframes.size()), uint8_t{0}));
-  report.fixed = static_cast<int>(window.keyframes.size()) - report.cameras;
-  report.points = static_cast<int>(window.points.size());
-  report.observations = static_cast<int>(window.sources.size());
-  report.outliers = result.outliers;
-  report.iterations = result.iterations;
-  report.initial_cost = result.initial_cost;
-  report.final_cost = result.final_cost;
-  report.moved_points = std::move(window.points);
-  return report;
+  return std::move(window.points);
 }
 
 }  // namespace dkb

@@ -17,14 +17,9 @@ struct LocalBaOptions {
   GeometricWeightOptions weights;
 };
 
-struct LocalBaReport {
-  int cameras = 0, fixed = 0, points = 0, observations = 0, outliers = 0, iterations = 0;
-  double initial_cost = 0, final_cost = 0;
-  std::vector<PointId> moved_points;  // increasing
-};
-
 // Adjusts the neighbourhood of a keyframe (DKB eqs. 42-48) and writes the result into the map; observations that end as
-// outliers are forgotten. The oldest keyframe of the map never moves.
-LocalBaReport local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics, const LocalBaOptions& options);
+// outliers are forgotten. The oldest keyframe of the map never moves. Gives the points that moved, by increasing id.
+std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
+                                             const LocalBaOptions& options);
 
 }  // namespace dkb

@@ -36,7 +36,7 @@ class LocalBa : public ::testing::Test {
     map = std::move(made.map);
     id_of = std::move(made.id_of);
   }
-  LocalBaReport adjust(KeyframeId newest, const LocalBaOptions& options = {}) {
+  std::vector<PointId> adjust(KeyframeId newest, const LocalBaOptions& options = {}) {
     SensorNoise noise;
     noise.scale_exponent = 1;  // the test scene's corners blur with their level's scale
     return local_bundle_adjustment(map, newest, scene.optics(noise), options);
@@ -68,14 +68,10 @@ TEST_F(LocalBa, APerturbedMapReturnsToTheTruth) {
   const double before = median_point();
   LocalBaOptions options;
   options.weighted = false;  // with weights, what does not fit at the start is left out
-  const LocalBaReport report = adjust(5, options);
+  adjust(5, options);
   EXPECT_LT(worst_camera(), 2e-4);
   EXPECT_LT(median_point(), 1e-3);
   EXPECT_GT(before, 0.02);
-  EXPECT_LT(report.final_cost, 1e-2 * report.initial_cost);
-  EXPECT_EQ(report.outliers, 0);
-  EXPECT_EQ(report.cameras, 5);
-  EXPECT_EQ(report.fixed, 1);
 }
 
 // In the dark only a motion joins it to the keyframe before, whose error it shares.
@@ -115,9 +111,7 @@ TEST_F(LocalBa, KeyframesOutsideTheWindowHoldItInPlace) {
   options.free_keyframes = 3;
   std::vector<Rigid3> before;
   for (KeyframeId k = 0; k < 8; ++k) before.push_back(map.keyframe(k)->cam_from_world);
-  const LocalBaReport report = adjust(7, options);
-  EXPECT_EQ(report.cameras, 3);
-  EXPECT_EQ(report.fixed, 5);
+  adjust(7, options);
   int moved = 0;
   for (size_t k = 0; k < 8; ++k)
     moved += map.keyframe(static_cast<KeyframeId>(k))->cam_from_world.translation != before[k].translation;
@@ -154,8 +148,7 @@ TEST_F(LocalBa, AMotionHoldsAKeyframeThatSharesNoPointWithTheRest) {
       map.add_point(std::move(p));
       map.observe(make_point_id(4, f), 4, f);
     }
-    const LocalBaReport report = adjust(4);
-    EXPECT_EQ(report.points, 5);
+    EXPECT_EQ(adjust(4).size(), 5U);
     return distance_between(map.keyframe(4)->cam_from_world * map.keyframe(3)->cam_from_world.inverse(), true_step);
   };
   EXPECT_GT(error_of_step(nullptr), 0.09);
@@ -168,9 +161,21 @@ TEST_F(LocalBa, NoMoreFixedKeyframesThanAskedFor) {
   LocalBaOptions options;
   options.free_keyframes = 2;
   options.fixed_keyframes = 3;
-  const LocalBaReport report = adjust(7, options);
-  EXPECT_EQ(report.cameras, 2);
-  EXPECT_EQ(report.fixed, 3);
+  const KeyframeId other = map.keyframe(7)->covisible.front().keyframe;
+  std::vector<Covisible> around = map.observers_of(map.points_of({other, 7}));
+  std::erase_if(around, [&](const Covisible& c) { return c.keyframe == 7 || c.keyframe == other; });
+  // How keyframe 7 is adjusted after the one that sees so many-th most points was moved.
+  const Map before = map;
+  const auto adjusted = [&](size_t place) {
+    map = before;
+    map.set_pose(around[place].keyframe, Rigid3());
+    adjust(7, options);
+    return Eigen::Vector3d(map.keyframe(7)->cam_from_world.translation);
+  };
+  ASSERT_EQ(around.size(), 6U);
+  EXPECT_EQ(adjusted(3), adjusted(4));
+  EXPECT_EQ(adjusted(3), adjusted(5));
+  EXPECT_NE(adjusted(3), adjusted(2));
 }
 
 TEST_F(LocalBa, OutlierObservationsAreForgotten) {
@@ -189,7 +194,7 @@ TEST_F(LocalBa, OutlierObservationsAreForgotten) {
       const bool wrong = (at - views[k].features->keypoints[f].pixel.cast<double>()).norm() > 15;
       if (map.point(id_of[i])->observations.size() >= 4) seen.push_back({id_of[i], static_cast<KeyframeId>(k), wrong});
     }
-  const LocalBaReport report = adjust(5);
+  adjust(5);
   int wrong = 0, wrong_kept = 0, right = 0, right_lost = 0;
   for (const Seen& s : seen) {
     const MapPoint* p = map.point(s.point);
@@ -202,21 +207,14 @@ TEST_F(LocalBa, OutlierObservationsAreForgotten) {
   EXPECT_GT(wrong, 30);
   EXPECT_LE(wrong_kept, wrong / 20);
   EXPECT_LE(right_lost, right / 20);
-  EXPECT_GE(report.outliers, wrong - wrong_kept);
   EXPECT_LT(worst_camera(), 0.01);
 }
 
 TEST_F(LocalBa, MovedPointsAreReportedByIncreasingId) {
   build(4, {}, 0.0003, 0.0005);
-  const LocalBaReport report = adjust(3);
-  ASSERT_EQ(report.outliers, 0);
-  EXPECT_EQ(report.moved_points.size(), static_cast<size_t>(report.points));
-  EXPECT_TRUE(std::is_sorted(report.moved_points.begin(), report.moved_points.end()));
-  EXPECT_EQ(report.observations, static_cast<int>([&] {
-              size_t n = 0;
-              for (PointId p : report.moved_points) n += map.point(p)->observations.size();
-              return n;
-            }()));
+  const std::vector<PointId> moved = adjust(3);
+  EXPECT_EQ(moved, map.live_points());
+  EXPECT_TRUE(std::is_sorted(moved.begin(), moved.end()));
 }
 
 TEST_F(LocalBa, TheSameMapGivesTheSameBits) {

@@ -69,9 +69,9 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   if (packet.planes) planes_.recognise(map_, packet.id);
   if (map_.live_keyframe_count() > 1) {
     const Stopwatch ba;
-    const LocalBaReport adjusted = local_bundle_adjustment(map_, packet.id, optics_, options_.ba);
+    const std::vector<PointId> moved = local_bundle_adjustment(map_, packet.id, optics_, options_.ba);
     times_.add("local_ba", ba.ms());
-    refresh(adjusted.moved_points);  // those that were fused are among them
+    refresh(moved);  // those that were fused are among them
     cull_keyframes(packet.id);
   }
   times_.add("mapping", whole.ms());

@@ -25,7 +25,6 @@ class MessageReader {
   uint8_t u8() { return fixed<uint8_t>(); }
   bool boolean() { return u8() != 0; }
   uint32_t u32() { return fixed<uint32_t>(); }
-  float f32() { return std::bit_cast<float>(fixed<uint32_t>()); }
   double f64() { return std::bit_cast<double>(fixed<uint64_t>()); }
   template <class Numbers>
   void f64s(Numbers* numbers) {  // of a fixed or known count

@@ -180,7 +180,7 @@ class StampedPairs {
   struct Pair {
     double colour, depth;  // [s]
   };
-  static constexpr double kLimit = AssociationOptions().max_difference + kStampRounding;
+  static constexpr double kLimit = kPairDifference + kStampRounding;
   std::deque<Pair> pairs_;
 };
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
 
@@ -109,8 +110,7 @@ std::optional<StoredPair> RecordedPairs::next() {
     if (ended_) {
       if (filter_.seen() == 0)
         throw InputError(name_ + ": no colour image of " + decoder_->colour.topic.name + " has a depth image of " +
-                         decoder_->depth.topic.name + " within " +
-                         std::to_string(std::lround(1000 * AssociationOptions().max_difference)) +
+                         decoder_->depth.topic.name + " within " + std::to_string(std::lround(1000 * kPairDifference)) +
                          " ms; both must be of one clock");
       filter_.require_any(name_);
       return std::nullopt;

@@ -5,20 +5,23 @@
 #include <cmath>
 #include <utility>
 
+#include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
+
+// The very comparisons of associate(), with their rounding.
+bool in_reach(double colour_time, double depth_time) {
+  constexpr double kLimit = kPairDifference + kStampRounding;
+  return depth_time >= colour_time - kLimit && depth_time <= colour_time + kLimit;
+}
 
 StampPairing::Kind other(StampPairing::Kind kind) {
   return kind == StampPairing::colour ? StampPairing::depth : StampPairing::colour;
 }
 
 }  // namespace
-
-StampPairing::StampPairing(const AssociationOptions& options) : limit_(options.max_difference + kStampRounding) {
-  options.check();
-}
 
 bool StampPairing::add(Kind kind, Stored image) {
   Side& side = sides_[kind];
@@ -55,7 +58,8 @@ int64_t StampPairing::behind() const {
 }
 
 bool StampPairing::far_ahead(const Waiting& colour_image) const {
-  return !closed_ && sides_[colour].images.size() == 1 && (!taken_ || colour_image.time - *taken_ > RisingStamps::kFarAhead);
+  return !closed_ && sides_[colour].images.size() == 1 &&
+         (!taken_ || colour_image.time - *taken_ > RisingStamps::kFarAhead);
 }
 
 void StampPairing::close() {
@@ -76,11 +80,6 @@ std::optional<StampPairing::Pair> StampPairing::take() {
     return Pair{std::move(front.image), std::move(front.partner)};
   }
   return std::nullopt;
-}
-
-// The very comparisons of associate(), with their rounding.
-bool StampPairing::in_reach(double colour_time, double depth_time) const {
-  return depth_time >= colour_time - limit_ && depth_time <= colour_time + limit_;
 }
 
 std::optional<size_t> StampPairing::nearest(Kind kind, const Waiting& image) const {

@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 
-#include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/rising_stamps.h"
 
 namespace dkb {
@@ -31,8 +30,6 @@ class StampPairing {
   static constexpr size_t kPatienceImages = 30;  // newer ones of its kind, until an image is far behind
   static constexpr size_t kMaxWaiting = 256;     // [images] of one kind
   static constexpr size_t kMaxBytes = 1 << 29;   // of all that wait
-
-  explicit StampPairing(const AssociationOptions& options = {});
 
   // False, and nothing is added, when the stamp is not after that of the last image of this kind. After ten of these in
   // a row whose own stamps rise (RisingStamps) what waits with later stamps is left over, and theirs count.
@@ -61,7 +58,6 @@ class StampPairing {
     double beyond = -1e300;  // [s] where those lie that are still to come
   };
 
-  bool in_reach(double colour_time, double depth_time) const;
   // The nearest one that waits on the other side; earlier ones go first.
   std::optional<size_t> nearest(Kind kind, const Waiting& image) const;
   bool could_still_be_nearer(Kind kind, const Waiting& image, double difference) const;
@@ -72,7 +68,6 @@ class StampPairing {
   void resolve();
   void bound();
 
-  double limit_;
   std::optional<double> taken_;  // [s] of the last pair's colour image
   std::array<Side, 2> sides_;
   size_t bytes_ = 0;

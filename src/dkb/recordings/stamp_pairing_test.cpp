@@ -26,7 +26,7 @@ std::vector<double> seconds(const Stamps& stamps) {
 
 StampPairs by_lists(const Stamps& a, const Stamps& b) {
   StampPairs pairs;
-  for (const auto& [i, j] : associate(seconds(a), seconds(b), {})) pairs.emplace_back(a[i], b[j]);
+  for (const auto& [i, j] : associate(seconds(a), seconds(b))) pairs.emplace_back(a[i], b[j]);
   return pairs;
 }
 

@@ -16,7 +16,6 @@ class StaticTransforms {
  public:
   // The newest word of a frame's parent counts; what is not finite or no rotation is left out.
   void add(const TransformsMessage& transforms);
-  bool empty() const { return parents_.empty(); }
   // Where frames are linked. A frame is at home in itself; nobody knows where the frame without a name is.
   std::optional<Rigid3> find(const std::string& to, const std::string& from) const;  // to_from_from
 

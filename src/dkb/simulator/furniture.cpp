@@ -64,14 +64,14 @@ void Furnisher::reserve(const Rigid3& at, double x0, double y0, double x1, doubl
   target_->footprints.push_back(f);
 }
 
-void Furnisher::wall(double x0, double y0, double x1, double y1, double z0, double z1) {
+void Furnisher::wall(double x0, double y0, double x1, double y1, double height) {
   const Vector3d along(x1 - x0, y1 - y0, 0);
   Patch p;
   // Seen from the left of the direction: the viewer's right is against it.
-  p.origin = Vector3d(x1, y1, z1);
+  p.origin = Vector3d(x1, y1, height);
   p.u = -along;
-  p.v = Vector3d(0, 0, z0 - z1);
-  p.look.texture = texture(Material::plaster, 6, along.norm(), z1 - z0);
+  p.v = Vector3d(0, 0, -height);
+  p.look.texture = texture(Material::plaster, 6, along.norm(), height);
   p.shade = lambert_shade(-p.u.cross(p.v).normalized());
   target_->surfaces.patches.push_back(p);
 }
@@ -98,17 +98,17 @@ void Furnisher::shell(double x0, double y0, double x1, double y1, double height,
       box(&s, Vector3d(x, y, height - 0.06), Vector3d(0.6, 0.4, 0.06), {t, t, t, t, t, -1});
       target_->surfaces.append(s);
     }
-  wall(x0, y0, x1, y0, 0, height);
-  wall(x1, y0, x1, y1, 0, height);
-  wall(x1, y1, x0, y1, 0, height);
-  wall(x0, y1, x0, y0, 0, height);
+  wall(x0, y0, x1, y0, height);
+  wall(x1, y0, x1, y1, height);
+  wall(x1, y1, x0, y1, height);
+  wall(x0, y1, x0, y0, height);
 }
 
 void Furnisher::block(double x0, double y0, double x1, double y1, double height) {
-  wall(x0, y1, x1, y1, 0, height);
-  wall(x1, y1, x1, y0, 0, height);
-  wall(x1, y0, x0, y0, 0, height);
-  wall(x0, y0, x0, y1, 0, height);
+  wall(x0, y1, x1, y1, height);
+  wall(x1, y1, x1, y0, height);
+  wall(x1, y0, x0, y0, height);
+  wall(x0, y0, x0, y1, height);
   target_->footprints.push_back({x0, y0, x1, y1});
 }
 

@@ -39,8 +39,8 @@ class Furnisher {
 
   // Floor, ceiling and four walls seen from inside.
   void shell(double x0, double y0, double x1, double y1, double height, Material floor);
-  // One plain wall face from (x0, y0) to (x1, y1), seen from its left side; z0 ... z1.
-  void wall(double x0, double y0, double x1, double y1, double z0, double z1);
+  // One plain wall face from (x0, y0) to (x1, y1), seen from its left side.
+  void wall(double x0, double y0, double x1, double y1, double height);
   // Solid block from floor to `height`.
   void block(double x0, double y0, double x1, double y1, double height);
 

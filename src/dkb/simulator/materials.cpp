@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "dkb/simulator/noise.h"
 #include "dkb/util/random.h"
@@ -60,6 +61,14 @@ void shapes(Canvas& c, double x0, double y0, double x1, double y1, int count, Ra
       }
     }
   }
+}
+
+void border(Canvas& c, double thickness, const Colour& colour) {
+  const double w = c.width_m(), h = c.height_m();
+  c.rect(0, 0, w, thickness, colour);
+  c.rect(0, h - thickness, w, h, colour);
+  c.rect(0, 0, thickness, h, colour);
+  c.rect(w - thickness, 0, w, h, colour);
 }
 
 void paint_planks(Canvas& c, Random& random) {
@@ -126,12 +135,7 @@ void paint_picture(Canvas& c, Random& random) {
   c.stain(w * 0.15, ink(vivid, random), 0.7F);
   shapes(c, 0, h * 0.3, w, h, 34, random);
   c.stain(w * 0.05, ink(dark, random), 0.35F);
-  const double f = 0.035 * std::min(w, h) + 0.008;
-  const Colour frame = dark(random);
-  c.rect(0, 0, w, f, frame);
-  c.rect(0, h - f, w, h, frame);
-  c.rect(0, 0, f, h, frame);
-  c.rect(w - f, 0, w, h, frame);
+  border(c, 0.035 * std::min(w, h) + 0.008, dark(random));
 }
 
 void paint_page(Canvas& c, Random& random) {
@@ -220,11 +224,7 @@ void paint_screen(Canvas& c, Random& random) {
       c.paragraph(x + 0.01, y + h * 0.07, x1 - 0.01, y1 - 0.005, 0.007, ink(i == 1 ? vivid : dark, random));
     }
   }
-  const Colour frame{24, 24, 27};
-  c.rect(0, 0, w, 0.015, frame);
-  c.rect(0, h - 0.015, w, h, frame);
-  c.rect(0, 0, 0.015, h, frame);
-  c.rect(w - 0.015, 0, w, h, frame);
+  border(c, 0.015, {24, 24, 27});
   c.text(w * 0.46, h - 0.012, w * 0.55, 0.008, {random.next(), {180, 180, 185}});
 }
 
@@ -250,11 +250,15 @@ void paint_fabric(Canvas& c, Random& random) {
   c.grain(0.01, 0.01, 0.12F, 2, random.next());
 }
 
-void paint_skin(Canvas& c, Random& random, bool face) {
-  const double w = c.width_m(), h = c.height_m(), tone = random.uniform(0.75, 1.1);
+void paint_skin(Canvas& c, Random& random) {
+  const double tone = random.uniform(0.75, 1.1);
   c.fill({static_cast<float>(200 * tone), static_cast<float>(152 * tone), static_cast<float>(124 * tone)});
   c.grain(0.05, 0.05, 0.16F, 3, random.next());
-  if (!face) return;
+}
+
+void paint_face(Canvas& c, Random& random) {
+  const double w = c.width_m(), h = c.height_m();
+  paint_skin(c, random);
   // u = 0.5 looks ahead; v runs from crown to chin.
   for (const double side : {-1.0, 1.0}) {
     const double x = w * (0.5 + side * 0.075);
@@ -286,11 +290,7 @@ void paint_whiteboard(Canvas& c, Random& random) {
       }
     }
   }
-  const Colour frame{110, 112, 116};
-  c.rect(0, 0, w, 0.03, frame);
-  c.rect(0, h - 0.03, w, h, frame);
-  c.rect(0, 0, 0.03, h, frame);
-  c.rect(w - 0.03, 0, w, h, frame);
+  border(c, 0.03, {110, 112, 116});
 }
 
 void paint_door(Canvas& c, Random& random) {
@@ -392,42 +392,18 @@ void paint_plain(Canvas& c, Material material, Random& random) {
 }
 
 void paint(Canvas& c, Material material, Random& random) {
-  switch (material) {
-    case Material::planks:
-      return paint_planks(c, random);
-    case Material::wood:
-      return paint_wood(c, random);
-    case Material::poster:
-      return paint_poster(c, random);
-    case Material::picture:
-      return paint_picture(c, random);
-    case Material::page:
-      return paint_page(c, random);
-    case Material::cover:
-      return paint_cover(c, random);
-    case Material::spine:
-      return paint_spine(c, random);
-    case Material::carton:
-      return paint_carton(c, random);
-    case Material::keyboard:
-      return paint_keyboard(c, random);
-    case Material::screen:
-      return paint_screen(c, random);
-    case Material::fabric:
-      return paint_fabric(c, random);
-    case Material::skin:
-      return paint_skin(c, random, false);
-    case Material::face:
-      return paint_skin(c, random, true);
-    case Material::whiteboard:
-      return paint_whiteboard(c, random);
-    case Material::door:
-      return paint_door(c, random);
-    case Material::drawers:
-      return paint_drawers(c, random);
-    default:
-      return paint_plain(c, material, random);
-  }
+  constexpr std::pair<Material, void (*)(Canvas&, Random&)> kPainters[] = {
+      {Material::planks, paint_planks},     {Material::wood, paint_wood},
+      {Material::poster, paint_poster},     {Material::picture, paint_picture},
+      {Material::page, paint_page},         {Material::cover, paint_cover},
+      {Material::spine, paint_spine},       {Material::carton, paint_carton},
+      {Material::keyboard, paint_keyboard}, {Material::screen, paint_screen},
+      {Material::fabric, paint_fabric},     {Material::skin, paint_skin},
+      {Material::face, paint_face},         {Material::whiteboard, paint_whiteboard},
+      {Material::door, paint_door},         {Material::drawers, paint_drawers}};
+  for (const auto& [painted, painter] : kPainters)
+    if (painted == material) return painter(c, random);
+  paint_plain(c, material, random);
 }
 
 // [texels per metre]: a little finer than the camera resolves from where such things are usually seen.

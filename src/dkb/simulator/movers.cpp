@@ -24,13 +24,7 @@ struct Stretch {
   // Smooth start and stop: share of the path at a time.
   Eigen::Vector2d at(double t) const {
     if (end <= start) return b;
-    const double s = std::clamp((t - start) / (end - start), 0.0, 1.0), ramp = std::min(0.5, 0.35 / (end - start));
-    // Trapezoid of speed with ramps of `ramp`.
-    const double v = 1 / (1 - ramp);
-    const double share = s < ramp       ? 0.5 * v * s * s / ramp
-                         : s > 1 - ramp ? 1 - 0.5 * v * (1 - s) * (1 - s) / ramp
-                                        : v * (s - 0.5 * ramp);
-    return a + share * (b - a);
+    return a + eased((t - start) / (end - start), std::min(0.5, 0.35 / (end - start))) * (b - a);
   }
 };
 

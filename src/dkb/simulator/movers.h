@@ -40,8 +40,6 @@ class Track {
   // Lets a person sway about the feet as people do who stand: 3 mrad (5 mm at the head), up to 1 Hz; less in a stride.
   void add_sway(uint64_t seed);
   MoverState at(double t) const;
-  double duration() const { return kStep * static_cast<double>(states_.size()); }
-  bool empty() const { return states_.empty(); }
 
  private:
   std::vector<MoverState> states_;

@@ -6,16 +6,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "dkb/util/random.h"
+
 namespace dkb::sim {
 
 // Stateless noise: a value is a function of its coordinates and a seed alone, so that any pixel of any frame can be
 // made on any thread in any order.
 
 inline uint64_t hash64(uint64_t z) {
-  z += 0x9E3779B97F4A7C15ULL;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-  return z ^ (z >> 31);
+  return Random(z).next();
 }
 inline uint64_t hash64(uint64_t a, uint64_t b) {
   return hash64(hash64(a) ^ b);
@@ -45,20 +44,8 @@ inline float lattice_value(uint32_t ix, uint32_t iy, uint64_t seed) {
   return static_cast<float>(h) * 0x1.0p-31F - 1.0F;
 }
 
-// Smooth noise in [-1, 1] with features of size 1.
-inline float lattice_noise(float x, float y, uint64_t seed) {
-  const float fx = std::floor(x), fy = std::floor(y);
-  const auto ix = static_cast<uint32_t>(static_cast<int32_t>(fx)), iy = static_cast<uint32_t>(static_cast<int32_t>(fy));
-  float u = x - fx, v = y - fy;
-  u = u * u * (3 - 2 * u);
-  v = v * v * (3 - 2 * v);
-  const auto at = [&](uint32_t dx, uint32_t dy) { return lattice_value(ix + dx, iy + dy, seed); };
-  const float a = at(0, 0) * (1 - u) + at(1, 0) * u, b = at(0, 1) * (1 - u) + at(1, 1) * u;
-  return a * (1 - v) + b * v;
-}
-
-// Values of lattice_noise() along a row, y fixed and x rising: the corners of a lattice cell are looked up once for all
-// pixels in it. The same bits.
+// Smooth noise in [-1, 1] with features of size 1, along a row, y fixed and x rising: the corners of a lattice cell are
+// looked up once for all pixels in it.
 class LatticeRow {
  public:
   LatticeRow(float y, uint64_t seed) : seed_(seed) {

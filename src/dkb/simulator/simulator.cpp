@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/simulator/simulator.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 
 #include "dkb/dataset/trajectory_file.h"
@@ -30,13 +30,6 @@ constexpr int kBandRows = 16;           // rows read at the same time, as far as
 constexpr double kStampSpread = 0.016;  // [s] largest difference between the stamps of colour and depth, up to 30 Hz
 constexpr double kSceneRate = 30;       // [Hz] in which scenes count their frames
 constexpr double kLongest = 36000;      // [s]
-
-std::string stamp_text(int64_t microseconds) {
-  const long long size = std::abs(static_cast<long long>(microseconds));
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%s%lld.%06lld", microseconds < 0 ? "-" : "", size / 1000000, size % 1000000);
-  return text.data();
-}
 
 std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
   std::vector<sim::TimedPose> poses;
@@ -99,32 +92,26 @@ struct Simulator::Impl {
     return readout * ((rows.first + rows.end) / (2.0 * camera.height) - 0.5);
   }
 
-  // Surfaces of all movers at a time, with the owner of each primitive.
-  struct MoverSurfaces {
-    std::vector<sim::Surfaces> parts;
-  };
-  // `seen`: which cells are; empty where the scene has none.
-  MoverSurfaces movers_at(double t, const std::vector<bool>& seen) const {
-    MoverSurfaces m;
+  // Surfaces of each mover at a time. `seen`: which cells are; empty where the scene has none.
+  std::vector<sim::Surfaces> movers_at(double t, const std::vector<bool>& seen) const {
+    std::vector<sim::Surfaces> out;
     for (const sim::Mover& mover : scene.movers) {
       const bool hidden = !seen.empty() && !seen[sim::cell_at(scene.cells, mover.track.at(t).position)];
-      m.parts.push_back(hidden ? sim::Surfaces() : mover.surfaces(t));
+      out.push_back(hidden ? sim::Surfaces() : mover.surfaces(t));
     }
-    return m;
+    return out;
   }
-  static sim::DrawList with(const sim::DrawList& still, const MoverSurfaces& movers) {
+  static sim::DrawList with(const sim::DrawList& still, const std::vector<sim::Surfaces>& movers) {
     sim::DrawList list = still;
-    for (const sim::Surfaces& s : movers.parts) list.add(s);
+    for (const sim::Surfaces& s : movers) list.add(s);
     return list;
   }
   // Index of the mover that owns each id; -1 for still things.
-  static std::vector<int> owners(const sim::DrawList& still, const MoverSurfaces& movers) {
+  static std::vector<int> owners(const sim::DrawList& still, const std::vector<sim::Surfaces>& movers) {
     std::vector<int> out(still.patches.size(), -1);
-    for (size_t m = 0; m < movers.parts.size(); ++m)
-      out.insert(out.end(), movers.parts[m].patches.size(), static_cast<int>(m));
+    for (size_t m = 0; m < movers.size(); ++m) out.insert(out.end(), movers[m].patches.size(), static_cast<int>(m));
     out.insert(out.end(), still.quadrics.size(), -1);
-    for (size_t m = 0; m < movers.parts.size(); ++m)
-      out.insert(out.end(), movers.parts[m].quadrics.size(), static_cast<int>(m));
+    for (size_t m = 0; m < movers.size(); ++m) out.insert(out.end(), movers[m].quadrics.size(), static_cast<int>(m));
     return out;
   }
   // `bands`: the rows that were drawn at one moment each.
@@ -305,16 +292,14 @@ SimulatedFrame Simulator::render_without_true_depth(int index) const {
 SimulatedFrame Simulator::render(int index, bool with_true_depth) const {
   const Impl& m = *impl_;
   SimulatedFrame frame;
-  frame.index = index;
   const int64_t colour_us = m.colour_us(index), depth_us = m.depth_us(index);
-  frame.stamp = stamp_text(m.start_us() + colour_us);
-  frame.depth_stamp = stamp_text(m.start_us() + depth_us);
   frame.image.timestamp = static_cast<double>(m.start_us() + colour_us) * 1e-6;
   frame.image.depth_timestamp = static_cast<double>(m.start_us() + depth_us) * 1e-6;
+  frame.stamp = fmt::format("{:.6f}", frame.image.timestamp);
+  frame.depth_stamp = fmt::format("{:.6f}", frame.image.depth_timestamp);
   const double t = static_cast<double>(colour_us) * 1e-6, depth_t = static_cast<double>(depth_us) * 1e-6;
   const Rigid3 middle = m.scene.path(t);
   frame.world_from_cam = m.scene.world_from_scene * middle;
-  frame.world_from_depth_cam = m.scene.world_from_scene * m.scene.path(depth_t);
 
   if (black(index)) {
     frame.image.colour = ColourImage(m.camera.width, m.camera.height);

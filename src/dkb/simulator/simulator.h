@@ -53,14 +53,12 @@ struct SimulatedMover {
 };
 
 struct SimulatedFrame {
-  int index = 0;                   // in the sequence as it is written
   std::string stamp, depth_stamp;  // [s] with 6 decimals
   RgbdImage image;                 // as the sensor gives it; the depth is that of the 16-bit file, exactly
   GreyImage mask;                  // 255 = mover, at the middle of the exposure
   DepthImage true_depth;           // [m] without noise, seen from world_from_cam at the colour stamp; 0 = nothing there
   std::vector<SimulatedMover> movers;  // visible ones, by id
   Rigid3 world_from_cam;               // truth at the colour stamp, the middle of the exposure
-  Rigid3 world_from_depth_cam;         // truth at the depth stamp
 };
 
 // Synthetic RGB-D sequences: furnished rooms with procedural textures and articulated people, drawn by exact ray

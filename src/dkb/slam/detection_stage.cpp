@@ -75,7 +75,7 @@ void DetectionStage::offer(FrameIndex index, const Frame& frame) {
   const bool first = next_ == 0;
   if (rests_ && !first && (stage_.outstanding() > 0 || index < rest_until_)) return;
   next_ = index + schedule_.every;
-  if (realtime_ && !first) dropped_ += stage_.drop_waiting();  // only the newest image is worth waiting
+  if (realtime_ && !first) stage_.drop_waiting();  // only the newest image is worth waiting
   stage_.push({index, frame}, first ? index : index + schedule_.latency);
 }
 

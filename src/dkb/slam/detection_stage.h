@@ -45,7 +45,6 @@ class DetectionStage {
 
   bool failed() const { return failed_; }  // as of the last take_due()
   double rate_hz() const;                  // answers per second of the sequence
-  size_t dropped() const { return dropped_; }
   // Durations of detection and wait_detector since they were taken last.
   StageTimes take_times() { return times_.take(); }
 
@@ -73,7 +72,7 @@ class DetectionStage {
   bool rests_ = false;
   bool threw_ = false;  // the stage's thread's
   bool answered_ = false, failed_ = false;
-  size_t answers_ = 0, dropped_ = 0;
+  size_t answers_ = 0;
   int64_t first_stamp_ = 0, last_stamp_ = 0;  // [ns] of answers
   std::vector<std::string> warnings_;
   StageTimes times_;

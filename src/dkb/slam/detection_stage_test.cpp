@@ -175,13 +175,12 @@ TEST(DetectionStage, RealtimeNeverWaitsForOneThatHangsAndDropsWhatPilesUp) {
   EXPECT_TRUE(exchange(*stage, 1, frame_at(1)).empty());
   detector.entered.get_future().wait();
   for (FrameIndex frame = 2; frame < 6; ++frame) EXPECT_TRUE(exchange(*stage, frame, frame_at(frame)).empty());
-  EXPECT_EQ(stage->dropped(), 3u) << "2, 3 and 4 gave way to 5";
   detector.gate.set_value();
   std::vector<DueDetections> due;
   for (FrameIndex frame = 6; due.size() < 2; ++frame)
     for (DueDetections& d : exchange(*stage, frame, frame_at(frame))) due.push_back(std::move(d));
   EXPECT_EQ(due[0].frame, 1);
-  EXPECT_GE(due[1].frame, 5);
+  EXPECT_GE(due[1].frame, 5) << "2, 3 and 4 gave way to it";
 }
 
 TEST(DetectionStage, EndsWithTheWorkInHandAndDropsTheRest) {

@@ -23,7 +23,6 @@ class FrameRate {
     known_ = stamps_.size() == 5;
     if (known_) rate_ = frame_rate_of(stamps_);
   }
-  double hz() const { return rate_; }
   // The frames that cover so many seconds, at least one.
   FrameIndex frames(double seconds) const {
     return std::max(1, static_cast<FrameIndex>(std::ceil(seconds * rate_ - 1e-6)));

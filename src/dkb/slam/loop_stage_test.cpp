@@ -32,12 +32,12 @@ TEST(FrameRate, IsTheCamerasOrWhatTheFirstFiveStampsSay) {
   FrameRate known(60), unknown(0);
   const int64_t stamps[] = {0, 100'000'000, 205'000'000, 300'000'000, 700'000'000, 710'000'000};
   for (int64_t stamp : stamps) {
-    EXPECT_EQ(unknown.hz(), stamp <= 700'000'000 ? 30 : 10);
+    EXPECT_EQ(unknown.frames(1), stamp <= 700'000'000 ? 30 : 10);
     known.add(stamp);
     unknown.add(stamp);
   }
-  EXPECT_EQ(known.hz(), 60);
-  EXPECT_EQ(unknown.hz(), 10) << "a gap and a short interval do not count";
+  EXPECT_EQ(known.frames(1), 60);
+  EXPECT_EQ(unknown.frames(1), 10) << "a gap and a short interval do not count";
   EXPECT_EQ(unknown.frames(0.06), 1);
 }
 

@@ -62,7 +62,6 @@ class Pipeline {
     odometry_.lost();  // how the camera came there is not known
   }
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
-  const TrackingMap& map() const { return tracker_.map(); }
   // From the keyframes so far. Throws InputError when dense mapping is off.
   std::function<DenseMap()> dense_map_task() const;
 

@@ -11,6 +11,7 @@
 #include "dkb/geometry/decompositions.h"
 #include "dkb/solver/ba_layout.h"
 #include "dkb/solver/nielsen_damping.h"
+#include "dkb/solver/pose_optimiser.h"
 #include "dkb/solver/relative_pose.h"
 #include "dkb/util/errors.h"
 
@@ -77,7 +78,6 @@ class BundleAdjuster {
     for (size_t p = 0; p < problem_.points.size(); ++p) {
       std::copy_n(state_.points.data() + 4 * p, 3, problem_.points[p].data());
     }
-    result.outliers = static_cast<int>(std::count(result.outlier.begin(), result.outlier.end(), 1));
     if (problem_.asked >= 0) result.covariance = covariance(layout_.free_of_camera[problem_.asked]);
     return result;
   }
@@ -90,7 +90,7 @@ class BundleAdjuster {
     const Rigid3& pose = state.poses[camera];
     const CameraModel& model = problem_.camera;
     solver::BaCameraInput in{};
-    in.camera = {model.fx, model.fy, model.cx, model.cy, {}, {}, options_.depth_in_front};
+    in.camera = {model.fx, model.fy, model.cx, model.cy, {}, {}, kDepthInFront};
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(in.camera.rotation) = pose.matrix3();
     Eigen::Map<Eigen::Vector3d>(in.camera.translation) = pose.translation;
     in.observations = {array(kU),         array(kV), array(kInvSigma), array(kDepth), array(kUsedInvDepthSigma),
@@ -261,7 +261,7 @@ class BundleAdjuster {
     const double size = model.width / kPartsAcross;
     const Eigen::Vector3d at =
         state_.poses[camera] * Eigen::Map<const Eigen::Vector3d>(state_.points.data() + 4 * static_cast<size_t>(point));
-    const double z = std::max(std::abs(at.z()), options_.depth_in_front);
+    const double z = std::max(std::abs(at.z()), kDepthInFront);
     const auto cell = [&](double f, double x) {
       return static_cast<int>(std::floor(std::clamp(f * x / z / size, -1e6, 1e6)));
     };
@@ -364,7 +364,6 @@ void BaOptions::check() const {
   for (const int iterations : rounds) require_option(iterations >= 1, "rounds", iterations, ">= 1");
   require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
   require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
-  require_option(depth_in_front > 0, "depth_in_front", depth_in_front, "> 0 m");
   require_option(initial_damping > 0, "initial_damping", initial_damping, "> 0");
   require_option(relative_tolerance >= 0, "relative_tolerance", relative_tolerance, ">= 0");
 }

@@ -39,7 +39,6 @@ struct BaOptions {
   bool prefilter = false;               // leave out observations beyond the limits before the first round (DKB 3.3)
   double chi2_pixel = kChi2TwoDof95;    // outlier limit and Huber corner of the unweighted error without depth, > 0
   double chi2_depth = kChi2ThreeDof95;  // the same with depth, > 0
-  double depth_in_front = 0.01;         // [m] points nearer than this along the optical axis are outliers, > 0
   double initial_damping = 1e-5;        // Marquardt's factor on the diagonal at the start, > 0
   double relative_tolerance = 1e-5;     // a step that lowers the cost by less than this part ends the round, >= 0
 
@@ -58,7 +57,6 @@ struct BaResult {
   double initial_cost = 0,
          final_cost = 0;  // sum of w rho(e^T Sigma^-1 e) of the first round's start and the last one's end
   int iterations = 0;     // accepted and rejected steps of all rounds
-  int outliers = 0;
   // Of the camera that was asked for, where the fixed cameras are known exactly: the inverse of the normal equations at
   // the end, times how much farther apart the parts of its image pull than they claim (Liang and Zeger, "Longitudinal
   // data analysis using generalized linear models", 1986). Right perturbation of world_from_cam, [translation m,

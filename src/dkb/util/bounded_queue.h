@@ -9,22 +9,13 @@
 
 namespace dkb {
 
-// First-in first-out queue between two threads. push() waits while the queue is full, pop() while it is empty.
-// After close() pushes are refused and pops drain what is left, then return nothing: that is how a stage ends.
+// First-in first-out queue between two threads. pop() waits while it is empty. After close() pushes are refused and
+// pops drain what is left, then return nothing: that is how a stage ends.
 template <class T>
 class BoundedQueue {
  public:
   explicit BoundedQueue(size_t capacity) : capacity_(capacity) {}
 
-  // False when the queue was closed.
-  bool push(T value) {
-    std::unique_lock lock(mutex_);
-    not_full_.wait(lock, [&] { return closed_ || items_.size() < capacity_; });
-    if (closed_) return false;
-    items_.push_back(std::move(value));
-    not_empty_.notify_one();
-    return true;
-  }
   // Never waits: when full, the oldest item is dropped, and `leave_to(dropped, waiting)` may hand what it held to those
   // that wait, the oldest first. Returns how many were dropped (0 or 1).
   template <class LeaveTo>
@@ -41,33 +32,24 @@ class BoundedQueue {
     not_empty_.notify_one();
     return dropped;
   }
-  size_t push_dropping_oldest(T value) {
-    return push_dropping_oldest(std::move(value), [](const T&, std::deque<T>&) {});
-  }
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     not_empty_.wait(lock, [&] { return closed_ || !items_.empty(); });
     if (items_.empty()) return std::nullopt;
     std::optional<T> value(std::move(items_.front()));
     items_.pop_front();
-    not_full_.notify_one();
     return value;
   }
   void close() {
     std::unique_lock lock(mutex_);
     closed_ = true;
-    not_full_.notify_all();
     not_empty_.notify_all();
-  }
-  size_t size() const {
-    std::unique_lock lock(mutex_);
-    return items_.size();
   }
 
  private:
   const size_t capacity_;
-  mutable std::mutex mutex_;
-  std::condition_variable not_full_, not_empty_;
+  std::mutex mutex_;
+  std::condition_variable not_empty_;
   std::deque<T> items_;
   bool closed_ = false;
 };

@@ -73,12 +73,10 @@ class DueStage {
     const std::lock_guard lock(mutex_);
     return finished_.empty() && answer_is_due(now);
   }
-  // Drops the tasks that nobody has begun; how many these were. For real-time runs alone.
-  size_t drop_waiting() {
+  // Drops the tasks that nobody has begun. For real-time runs alone.
+  void drop_waiting() {
     const std::lock_guard lock(mutex_);
-    const size_t dropped = waiting_.size();
     waiting_.clear();
-    return dropped;
   }
   // Tasks pushed whose results were not taken.
   size_t outstanding() const {

@@ -14,10 +14,4 @@ void WarningLog::finish() {
     if (count > 1 && sink_) sink_("warning: " + kind + ": " + std::to_string(count) + " times in all");
 }
 
-size_t WarningLog::count(const std::string& kind) const {
-  std::unique_lock lock(mutex_);
-  const auto it = counts_.find(kind);
-  return it == counts_.end() ? 0 : it->second;
-}
-
 }  // namespace dkb

@@ -18,11 +18,10 @@ class WarningLog {
   void warn(const std::string& kind, const std::string& message);
   // Passes on one line for each kind that came more than once.
   void finish();
-  size_t count(const std::string& kind) const;
 
  private:
   Sink sink_;
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   std::map<std::string, size_t> counts_;
 };
 

@@ -86,24 +86,29 @@ TEST(Quantile, IsOneOfTheValues) {
 }
 
 TEST(BoundedQueue, KeepsOrderAcrossThreadsAndDrainsAfterClose) {
-  BoundedQueue<int> queue(3);
+  BoundedQueue<int> queue(1000);
+  const auto none = [](int, std::deque<int>&) { ADD_FAILURE() << "it is never full"; };
   std::vector<int> got;
   std::thread consumer([&] {
     while (auto v = queue.pop()) got.push_back(*v);
   });
-  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(queue.push(i));
+  for (int i = 0; i < 1000; ++i) queue.push_dropping_oldest(i, none);
   queue.close();
   consumer.join();
   ASSERT_EQ(got.size(), 1000u);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(got[static_cast<size_t>(i)], i);
-  EXPECT_FALSE(queue.push(1));
+  queue.push_dropping_oldest(1, none);
+  EXPECT_EQ(queue.pop(), std::nullopt);
 }
 
 TEST(BoundedQueue, DropsTheOldestWhenAskedNotToWait) {
   BoundedQueue<int> queue(2);
-  EXPECT_EQ(queue.push_dropping_oldest(1), 0u);
-  EXPECT_EQ(queue.push_dropping_oldest(2), 0u);
-  EXPECT_EQ(queue.push_dropping_oldest(3), 1u);
+  std::vector<int> left;
+  const auto leave = [&](int dropped, const std::deque<int>& waiting) { left = {dropped, waiting.front()}; };
+  EXPECT_EQ(queue.push_dropping_oldest(1, leave), 0u);
+  EXPECT_EQ(queue.push_dropping_oldest(2, leave), 0u);
+  EXPECT_EQ(queue.push_dropping_oldest(3, leave), 1u);
+  EXPECT_EQ(left, (std::vector<int>{1, 2}));
   EXPECT_EQ(queue.pop(), 2);
   EXPECT_EQ(queue.pop(), 3);
 }

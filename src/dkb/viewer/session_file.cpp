@@ -55,7 +55,7 @@ std::optional<SessionChunk> parse_chunk_head(const char* bytes) {
 }
 
 SessionFile::SessionFile(const std::filesystem::path& path)
-    : path_(path), fd_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+    : fd_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   if (fd_ < 0) throw InputError(path.string() + ": cannot be read (" + std::strerror(errno) + ")");
   update();
   std::array<char, 16> start{};

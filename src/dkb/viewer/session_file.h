@@ -56,7 +56,6 @@ class SessionFile {
   std::string read(uint64_t from, uint64_t to) const;
 
  private:
-  const std::filesystem::path path_;
   int fd_ = -1;
   std::vector<Entry> entries_;
   size_t checkpoints_ = 0, keep_every_ = 1;
