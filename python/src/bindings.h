@@ -12,6 +12,7 @@
 
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
+#include "ending.h"
 
 // What the files of the extension module share. A function is called with the GIL held unless it says otherwise.
 namespace dkb::python {
@@ -74,18 +75,6 @@ int64_t stamp_of(const py::handle& value);
 
 // warnings.warn(text, SlamWarning) at the caller's line.
 void warn(const std::string& text);
-
-// Something with threads of its own that must be at rest before Python goes: its threads may wait for the GIL. Objects
-// are closed when the interpreter exits, if not before.
-class Closable {
- public:
-  Closable();
-  virtual ~Closable();
-  Closable(const Closable&) = delete;
-  Closable& operator=(const Closable&) = delete;
-  virtual void close() = 0;
-  static void close_all();
-};
 
 // --- frames.cpp ---
 

@@ -86,12 +86,12 @@ class PythonDetector final : public Detector {
     kind_ = py::str(name);
   }
   ~PythonDetector() override {
-    const py::gil_scoped_acquire gil;  // the library lets go of it on a thread of its choice
+    const Locked gil;  // the library lets go of it on a thread of its choice
     function_ = py::object();
   }
 
   Detections detect(const DetectorInput& input) override {
-    const py::gil_scoped_acquire gil;
+    const Locked gil;
     DetectorImage image(input);
     const py::object shown = py::cast(std::move(image));
     const std::unique_ptr<DetectorImage, void (*)(DetectorImage*)> end(shown.cast<DetectorImage*>(),
@@ -105,7 +105,7 @@ class PythonDetector final : public Detector {
   }
   std::string kind() const override { return kind_; }
   void reset() override {
-    const py::gil_scoped_acquire gil;
+    const Locked gil;
     try {
       if (py::hasattr(function_, "reset")) function_.attr("reset")();
     } catch (py::error_already_set& error) {

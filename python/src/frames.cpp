@@ -51,9 +51,14 @@ class PySource final : public Closable {
     } else if (!camera.is_none()) {
       options.camera = path_of(camera, "camera");
     }
-    const py::gil_scoped_release released;
-    source_ = open_source(where, options);
-    description_ = source_->description();
+    std::unique_ptr<Source> opened;  // close() sees a whole one or none
+    {
+      const Unlocked released;
+      opened = open_source(where, options);
+      description_ = opened->description();
+    }
+    refuse_at_end();
+    source_ = std::move(opened);
     if (!file) return;
     const size_t at = description_.find(options.camera);
     if (at != std::string::npos) description_.replace(at, options.camera.size(), "as given");
@@ -65,12 +70,12 @@ class PySource final : public Closable {
     if (!source_) return;
     source_->stop();
     {
-      const py::gil_scoped_release released;
+      const Unlocked released(Entry::always);
       reading_.lock();
     }
     std::unique_ptr<Source> ended = std::move(source_);
     reading_.unlock();
-    const py::gil_scoped_release released;
+    const Unlocked released(Entry::always);
     ended.reset();
   }
 
@@ -104,6 +109,7 @@ class PySource final : public Closable {
 
  private:
   Source& open() const {
+    refuse_at_end();
     if (!source_) throw InputError(description_ + ": it is closed");
     return *source_;
   }
@@ -111,18 +117,18 @@ class PySource final : public Closable {
   // A device may let us wait for long, and Ctrl-C must work meanwhile: Python's handler of it runs on this thread.
   SourceFrame wait_for_next() {
     std::future<SourceFrame> pending;
-    const py::gil_scoped_release released;
+    const Unlocked released;
     const std::unique_lock lock(reading_, std::try_to_lock);
     if (!lock.owns_lock()) throw InputError(description_ + ": another thread reads it; one at a time may");
     if (!source_) return {};
     pending = std::async(std::launch::async, [this] { return source_->next(); });
     while (pending.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
-      const py::gil_scoped_acquire gil;
+      const Locked gil;
       if (PyErr_CheckSignals() == 0) continue;
       py::error_already_set interrupt;
       source_->stop();
       {
-        const py::gil_scoped_release waiting;
+        const Unlocked waiting(Entry::always);
         pending.wait();
       }
       throw interrupt;
@@ -222,7 +228,7 @@ PyFrame frame_from_arguments(const Camera& camera, const py::object& stamp_ns, c
   input.depth = depth_view(depth);
   input.prior = prior_of(prior);
   if (!depth_stamp_ns.is_none()) input.depth_stamp_ns = stamp_of(depth_stamp_ns);
-  const py::gil_scoped_release released;  // the caller holds the arrays
+  const Unlocked released;  // the caller holds the arrays
   return {Frame(camera, input), stamp_text(input.stamp_ns), 0};
 }
 

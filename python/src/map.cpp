@@ -12,7 +12,7 @@ struct Points {
   explicit Points(const MapSnapshot& map) {
     std::vector<PointInfo> points;
     {
-      const py::gil_scoped_release released;
+      const Unlocked released;
       points = map.points();
     }
     const auto n = static_cast<py::ssize_t>(points.size());
@@ -117,8 +117,7 @@ void bind_map(py::module_& module) {
       .def_property_readonly("keyframe_count", &MapSnapshot::keyframe_count)
       .def(
           "points", [](const MapSnapshot& map) { return Points(map); }, "points() -> MapPoints\n\nCopies.")
-      .def("keyframes", &MapSnapshot::keyframes, py::call_guard<py::gil_scoped_release>(),
-           "keyframes() -> list[Keyframe]\n\nBy id.")
+      .def("keyframes", &MapSnapshot::keyframes, py::call_guard<Unlocked>(), "keyframes() -> list[Keyframe]\n\nBy id.")
       .def(
           "loops",
           [](const MapSnapshot& map) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <set>
-
 #include "bindings.h"
 
 namespace dkb::python {
@@ -15,19 +13,8 @@ PyObject* slam_warning = nullptr;
 
 }  // namespace
 
-Closable::Closable() {
-  open_ones().insert(this);
-}
-Closable::~Closable() {
-  open_ones().erase(this);
-}
-void Closable::close_all() {
-  const std::set<Closable*> all = open_ones();
-  for (Closable* one : all)
-    if (open_ones().contains(one)) one->close();
-}
-
 void warn(const std::string& text) {
+  const InPython calling;
   if (PyErr_WarnEx(slam_warning, text.c_str(), 1) != 0) throw py::error_already_set();
 }
 
@@ -76,5 +63,5 @@ PYBIND11_MODULE(_core, module) {
   bind_map(module);
   bind_slam(module);
   bind_evaluation(module);
-  py::module_::import("atexit").attr("register")(py::cpp_function(&Closable::close_all));
+  py::module_::import("atexit").attr("register")(py::cpp_function(&Closable::end_all));
 }

@@ -81,7 +81,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   choice = choice_beside(options, a["disable"].cast<std::string>(), std::move(choice));
   Detectors made;
   {
-    const py::gil_scoped_release released;
+    const Unlocked released;
     made = make_detectors(choice, camera);
   }
   if (options.dynamics.filter == FilterKind::none) return made;
@@ -107,15 +107,21 @@ class PySlam final : public Closable {
   PySlam(const Camera& camera, const py::kwargs& a) : camera_(camera) {
     const Options options = options_of(a);
     Detectors detectors = detectors_of(a, options, camera, interruption_);
-    const py::gil_scoped_release released;
-    slam_ = std::make_shared<Slam>(camera, options, std::move(detectors));
-    slam_->on_event([this](const Event& event) { keep(event); });
+    std::shared_ptr<Slam> made;  // close() sees a whole one or none
+    {
+      const Unlocked released;
+      made = std::make_shared<Slam>(camera, options, std::move(detectors));
+      made->on_event([this](const Event& event) { keep(event); });
+    }
+    refuse_at_end();
+    slam_ = std::move(made);
   }
   ~PySlam() override { close(); }
 
   void close() override {
+    if (!slam_) return;
     std::shared_ptr<Slam> ended = std::move(slam_);
-    const py::gil_scoped_release released;  // its threads may wait for the GIL, and it waits for them
+    const Unlocked released(Entry::always);  // its threads may wait for the GIL, and it waits for them
     ended.reset();
   }
   const Camera& camera() const { return camera_; }
@@ -140,16 +146,16 @@ class PySlam final : public Closable {
   // Work that any thread may do meanwhile, without the GIL.
   template <class Work>
   void run(const Work& work) const {
-    if (!slam_) throw InputError("slam: it is closed");
+    check_usable();
     std::shared_ptr<Slam> slam = slam_;
-    const py::gil_scoped_release released;
+    const Unlocked released;
     const std::shared_ptr<Slam> mine = std::move(slam);  // given back before the GIL is taken, see close()
     work(*mine);
   }
 
   PyResult process(const py::object& frame_or_stamp, const py::object& rgb, const py::object& depth,
                    const py::object& prior, const py::object& depth_stamp_ns, bool bgr) {
-    if (!slam_) throw InputError("slam: it is closed");
+    check_usable();
     PyFrame given;
     if (py::isinstance<PyFrame>(frame_or_stamp)) {
       if (!rgb.is_none() || !depth.is_none() || !depth_stamp_ns.is_none())
@@ -195,6 +201,10 @@ class PySlam final : public Closable {
   }
 
  private:
+  void check_usable() const {
+    refuse_at_end();
+    if (!slam_) throw InputError("slam: it is closed");
+  }
   void keep(const Event& event) {  // on the feeding thread, within feed()
     if (event.kind == Event::Kind::warning) warnings_.push_back(fmt::format("frame {}: {}", event.frame, event.text));
     const std::lock_guard lock(events_mutex_);
@@ -309,7 +319,7 @@ DenseMap dense_map(PySlam& slam) {
   std::function<DenseMap()> task;
   slam.feed([&](Slam& s) { task = s.dense_map_task(); });
   // It takes seconds, in which frames may be processed.
-  const py::gil_scoped_release other_threads;
+  const Unlocked other_threads;
   return task();
 }
 

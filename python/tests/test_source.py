@@ -122,6 +122,31 @@ def test_ctrl_c_works_while_a_frame_is_waited_for(copy):
     assert out == "interrupted\n" and child.returncode == 0, err
 
 
+@pytest.mark.parametrize("work", ["process", "process with a detector", "read", "convert"])
+def test_a_program_ends_in_peace_while_a_daemon_thread_is_in_a_call(sequence, work):
+    child = run_script("""
+        import sys, threading, time, dkb_slam
+        path, work = sys.argv[1:]
+        source = dkb_slam.open(path)
+        frames = list(source)
+        slam = dkb_slam.Slam(source.camera, detector="motion" if work == "process" else lambda image: time.sleep(0.02))
+        begun = threading.Event()
+        def feed(k):
+            for frame in dkb_slam.open(path) if work == "read" else frames:
+                begun.set()
+                if work == "convert": dkb_slam.Frame(source.camera, 1, frame.rgb, frame.depth)
+                elif work != "read": slam.process(k * 10**10 + frame.stamp_ns, frame.rgb, frame.depth)
+        def go():
+            for k in range(10000): feed(k)
+        threading.Thread(target=go, daemon=True).start()
+        begun.wait()
+        time.sleep(0.1)
+        print("end", flush=True)
+        """, sequence, work)
+    out, err = child.communicate(timeout=60)
+    assert (out, err, child.returncode) == ("end\n", "", 0)
+
+
 def test_a_program_ends_in_peace_while_threads_are_at_work(sequence):
     child = run_script("""
         import sys, time, dkb_slam
