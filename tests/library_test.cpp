@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <thread>
 
 #include "library_support.h"
 
@@ -369,6 +370,24 @@ TEST_F(Library, LocaliseOnlyMakesNoKeyframesAndNoMaps) {
   for (int i = 61; i < 66; ++i) slam.process(world.frame(i, {.shift = i - 50}));
   slam.finish();
   EXPECT_GT(slam.map().keyframe_count(), keyframes);
+}
+
+TEST_F(Library, AMapTaskWritesTheMapOfItsMoment) {
+  Slam slam = slam_with(std::make_shared<EveryNth>(3));
+  feed(slam, world.walk(0, 10));
+  slam.finish();
+  slam.save_map(folder / "now.dkb");
+  const auto task = slam.save_map_task();
+  feed(slam, world.walk(10, 30));
+  slam.finish();
+  slam.save_map(folder / "later.dkb");
+  std::thread([&] { task(folder / "task.dkb"); }).join();
+  const auto bytes = [&](const char* name) {
+    std::ifstream file(folder / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_TRUE(bytes("task.dkb") == bytes("now.dkb"));
+  EXPECT_FALSE(bytes("task.dkb") == bytes("later.dkb"));
 }
 
 TEST_F(Library, TheSwitchesOutliveAReset) {

@@ -103,6 +103,7 @@ struct PyResult {
 // What a Python detector threw that is no fault of the image: KeyboardInterrupt, SystemExit. process() throws it.
 struct Interruption {
   std::exception_ptr what;
+  static thread_local const Interruption* of_this_thread;  // whose detector this thread is in
 };
 // A detector that calls `function`, from any thread.
 std::shared_ptr<Detector> python_detector(py::object function, std::shared_ptr<Interruption> interruption);

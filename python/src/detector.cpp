@@ -78,6 +78,15 @@ Detections detections_of(const py::object& answer) {
   return found;
 }
 
+// While this thread is in a detector.
+struct Inside {
+  explicit Inside(const Interruption* whose) : before(std::exchange(Interruption::of_this_thread, whose)) {}
+  ~Inside() { Interruption::of_this_thread = before; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+  const Interruption* before;
+};
+
 class PythonDetector final : public Detector {
  public:
   PythonDetector(py::object function, std::shared_ptr<Interruption> interruption)
@@ -96,6 +105,7 @@ class PythonDetector final : public Detector {
     const py::object shown = py::cast(std::move(image));
     const std::unique_ptr<DetectorImage, void (*)(DetectorImage*)> end(shown.cast<DetectorImage*>(),
                                                                        [](DetectorImage* i) { i->end(); });
+    const Inside inside(interruption_.get());
     try {
       return detections_of(function_(shown));
     } catch (py::error_already_set& error) {
@@ -120,6 +130,8 @@ class PythonDetector final : public Detector {
 };
 
 }  // namespace
+
+thread_local const Interruption* Interruption::of_this_thread = nullptr;
 
 std::shared_ptr<Detector> python_detector(py::object function, std::shared_ptr<Interruption> interruption) {
   return std::make_shared<PythonDetector>(std::move(function), std::move(interruption));

@@ -183,6 +183,71 @@ def test_a_second_feeding_thread_is_refused(frames, camera):
     assert slam.process(frames[1]).frame == 1
 
 
+@pytest.mark.parametrize("save", [lambda slam, path: slam.save_map(path), lambda slam, path: slam.dense_map(),
+                                  lambda slam, path: slam.save_trajectory(path)])
+def test_no_frame_is_refused_while_another_thread_saves(sequence, tmp_path, save):
+    source = dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera, realtime=True, dense=True)
+    done, saved, wrong = threading.Event(), [], []
+
+    def keep_saving():
+        while not done.is_set():
+            try:
+                save(slam, tmp_path / "saved")
+                saved.append(True)
+            except BaseException as error:
+                wrong.append(error)
+
+    slam.process(next(source))
+    thread = threading.Thread(target=keep_saving)
+    thread.start()
+    try:
+        results = [slam.process(frame) for frame in source]
+    finally:
+        done.set()
+        thread.join()
+    assert len(results) == 39 and saved and not wrong
+
+
+def test_a_trajectory_is_saved_while_a_frame_is_tracked(frames, camera, tmp_path):
+    inside, go = threading.Event(), threading.Event()
+
+    def detector(image):
+        inside.set()
+        assert go.wait(20)
+
+    slam = dkb_slam.Slam(camera, detector=detector)
+    go.set()
+    slam.process(frames[0])
+    go.clear()
+    inside.clear()
+    thread = threading.Thread(target=slam.process, args=(frames[1],))
+    thread.start()
+    assert inside.wait(20)
+    slam.save_trajectory(tmp_path / "online.txt", online=True)
+    go.set()
+    thread.join()
+    rows = [row for row in (tmp_path / "online.txt").read_text().splitlines() if not row.startswith("#")]
+    assert len(rows) == 1
+
+
+def test_a_detector_that_calls_its_slam_is_told_so(frames, camera, tmp_path):
+    def detector(image):
+        for call in (lambda: slam.save_map(tmp_path / "map.dkb"), slam.finish, slam.dense_map):
+            try:
+                call()
+            except dkb_slam.InputError as error:
+                told.append(str(error))
+
+    for options in ({}, {"detect_every": 1}):
+        told = []
+        slam = dkb_slam.Slam(camera, detector=detector, **options)
+        for frame in frames[:3]:
+            slam.process(frame)
+        slam.close()
+        assert set(told) == {"slam: its detector calls it; call it between the frames"}
+
+
 def test_a_prior_is_taken_as_matrix_or_object(frames, camera):
     slam = dkb_slam.Slam(camera)
     slam.process(frames[0])
