@@ -45,6 +45,16 @@ TEST_F(Library, FollowsACameraExactly) {
   }
 }
 
+// At the velocity between the first two frames, nothing of the first keeps its depth.
+TEST_F(Library, ARecordingWhoseDepthIsOfAnotherTimeEndsNoRun) {
+  for (int64_t away = 10; away < 10'000'000; away *= 3) {  // [s]
+    Slam slam = slam_with();
+    for (int i = 0; i < 4; ++i)
+      EXPECT_NO_THROW(slam.process(world.frame(i, {.shift = i}, away * 1'000'000'000))) << away << " s, frame " << i;
+    EXPECT_NO_THROW(slam.finish());
+  }
+}
+
 TEST_F(Library, EveryFrameSaysWhatItsTimeWentInto) {
   Slam slam = slam_with();
   for (const Frame& frame : world.walk(0, 5)) {

@@ -69,6 +69,14 @@ def test_a_wrong_argument_is_one_line(camera, call, kind, says):
     assert says in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("depth_stamp", [0, 1_700_000_000_300_000_000, 1_700_000_000_000_000])
+def test_a_depth_image_of_another_time_is_refused(slam, camera, depth_stamp):
+    stamp = 1_700_000_000_000_000_000
+    for call in (slam.process, lambda *a, **k: dkb_slam.Frame(camera, *a, **k)):
+        with pytest.raises(dkb_slam.InputError, match="depth_stamp_ns"):
+            call(stamp, RGB, DEPTH, depth_stamp_ns=depth_stamp)
+
+
 def test_stamps_are_whole_and_rise(slam):
     with pytest.raises(TypeError, match="stamp_ns: must be an int"):
         slam.process(1.5, RGB, DEPTH)
