@@ -115,6 +115,13 @@ def test_a_saved_map_serves_again(whole, frames, camera, tmp_path):
         slam.load_map(tmp_path / "nothing.dkb")
 
 
+def test_a_map_of_another_camera_is_refused_by_the_field_that_differs(whole, camera, tmp_path):
+    whole[0].save_map(tmp_path / "map.dkb")
+    fields = {name: getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "depth_factor")}
+    with pytest.raises(dkb_slam.InputError, match=r"another camera \(k1 0\) than this one \(k1 0.01\)"):
+        dkb_slam.Slam(dkb_slam.Camera(**fields, k1=0.01)).load_map(tmp_path / "map.dkb")
+
+
 def test_a_suggested_pose_is_where_a_map_begins(frames, camera):
     slam = dkb_slam.Slam(camera)
     place = np.eye(4)
