@@ -41,7 +41,8 @@ class Slam(_core.Slam):
     realtime: never wait for mapping; results may differ from run to run.
     dense: keep what dense_map() needs.
     final_ba: adjust the whole map once more in finish().
-    base_from_cam: float64 [4, 4], [m], the mount: the world is the robot's base at the first tracked frame.
+    base_from_cam: float64 [4, 4], [m], the mount: the world is the robot's base at the first tracked frame. A map that
+        is loaded keeps the world that it was made with.
 
     Raises InputError (a ValueError); InvalidOption names the setting, its value and its range.
     """

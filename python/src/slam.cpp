@@ -434,6 +434,7 @@ perturbation, [translation m, rotation rad], camera axes. Raises InputError for 
       .def(
           "load_map", [](PySlam& s, const py::object& path) { s.load_map(path_of(path, "path")); }, py::arg("path"),
           "load_map(path)\n\nForgets everything and goes on in that map: frames are lost until one is found in it.\n"
+          "Poses are in the world that the map was made with, whatever base_from_cam says now.\n"
           "Raises InputError, and leaves all as it is, when the file is broken or of another camera.")
       .def(
           "save_trajectory",
