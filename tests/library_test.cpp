@@ -400,6 +400,16 @@ TEST_F(Library, AMapTaskWritesTheMapOfItsMoment) {
   EXPECT_FALSE(bytes("task.dkb") == bytes("later.dkb"));
 }
 
+TEST_F(Library, LocalisingWithoutAMapIsToldAfterASecond) {
+  Slam slam = slam_with();
+  slam.localize_only(true);
+  for (int i = 0; i < 60; ++i) slam.process(world.frame(i, {.shift = i}));
+  const auto events = slam.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].frame, 29);
+  EXPECT_EQ(events[0].text, "there is no map to localise in; load one, or end localize_only to make one");
+}
+
 TEST_F(Library, TheSwitchesOutliveAReset) {
   Slam slam = slam_with();
   slam.localize_only(true);

@@ -119,6 +119,7 @@ class Pipeline {
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
+  int frames_without_map_ = 0;  // of those that only localise
   bool prior_warned_ = false;
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
