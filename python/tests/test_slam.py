@@ -3,6 +3,7 @@
 import gc
 import threading
 import time
+import warnings
 
 import dkb_slam
 import numpy as np
@@ -253,6 +254,15 @@ def test_a_detector_that_calls_its_slam_is_told_so(frames, camera, tmp_path):
             slam.process(frame)
         slam.close()
         assert set(told) == {"slam: its detector calls it; call it between the frames"}
+
+
+def test_stamps_in_microseconds_are_told_once(frames, camera):
+    slam = dkb_slam.Slam(camera, threads=1)
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        for i in range(36):
+            slam.process(1_700_000_000_000_000 + i * 33_333, frames[0].rgb, frames[0].depth)
+    assert ["nanoseconds" in str(w.message) for w in shown].count(True) == 1
 
 
 def test_a_prior_is_taken_as_matrix_or_object(frames, camera):

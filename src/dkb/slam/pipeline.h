@@ -24,6 +24,7 @@
 #include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
+#include "dkb/slam/stamp_doubt.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -115,6 +116,7 @@ class Pipeline {
 
   // What the next frame needs of the one before.
   FrameRate rate_;
+  StampDoubt stamp_doubt_;
   FrameIndex next_frame_ = 0;
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now

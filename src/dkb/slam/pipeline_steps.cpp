@@ -45,6 +45,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
+      stamp_doubt_(context.camera.fps),
       camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
       mapping_(LocalMapper(optics_of(context), options_.mapping, map), options_.pipeline.threaded),
