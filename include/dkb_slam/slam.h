@@ -67,7 +67,7 @@ struct Statistics {
   double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
   int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
   std::string detector_inference;              ///< Detectors::inference
-  bool detector_failed = false;                ///< the slow detector threw: it is not asked any more
+  bool detector_failed = false;                ///< a detector threw ten times in a row: it is not asked any more
   /// Of a real-time run: how long [s] it was late and therefore did without half of "detection", "loop_search" and half
   /// of the "features"; each includes those after it. Empty in any other run, which leaves nothing out.
   std::map<std::string, double> degraded_s;

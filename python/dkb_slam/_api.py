@@ -23,7 +23,7 @@ class Slam(_core.Slam):
     detector: "auto" (yolo where there is a model, else motion), "yolo" (or "network"), "motion", "file", "none",
         "exec:COMMAND", several joined by "+"; or a function of one's own; or a list of both. A function is given a
         DetectorImage and returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or
-        (list, mask). What it raises becomes a SlamWarning.
+        (list, mask). What it raises becomes a SlamWarning; after ten times in a row it is not asked again.
     model, labels: ONNX file of the yolo detector (None: $DKB_SLAM_MODEL) and its class names.
     classes: those of them that may move, separated by commas or as a list (None: people, pets, and what people carry
         or ride).

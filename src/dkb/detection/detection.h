@@ -4,8 +4,15 @@
 #include <span>
 
 #include "dkb_slam/detector.h"
+#include "dkb_slam/errors.h"
 
 namespace dkb {
+
+// What a detector throws that can give no answer any more until it is reset.
+class DetectorEnded : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 // The part of `box` within an image of this size [px]; of zero width or height when there is none.
 Box clip(const Box& box, int width, int height);
