@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dkb_slam/slam.h"
@@ -71,8 +72,10 @@ std::string path_of(const py::handle& value, const char* name);
 // Nanoseconds of an int or numpy integer. Throws TypeError; a float of today's dates would not be exact.
 int64_t stamp_of(const py::handle& value);
 
-// --- warnings and ends ---
+// --- messages ---
 
+// A message of the library by the names of Python's keywords, in the place of the command line's options.
+std::string python_words(std::string_view text);
 // warnings.warn(text, SlamWarning) at the caller's line.
 void warn(const std::string& text);
 
