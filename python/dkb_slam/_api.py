@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Callable, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 from . import _core
 
@@ -58,6 +59,8 @@ class Slam(_core.Slam):
                  base_from_cam: Any = None) -> None:
         if not isinstance(camera, _core.Camera):
             raise TypeError(f"camera: must be a dkb_slam.Camera, not {type(camera).__name__}")
+        if settings is not None and not isinstance(settings, Mapping):
+            raise TypeError(f"settings: must be a dict, not {type(settings).__name__}")
         if classes is not None and not isinstance(classes, str):
             classes = ",".join(classes)
         super().__init__(camera, preset=preset, detector=detector, model=model, labels=labels, classes=classes or "",

@@ -171,12 +171,13 @@ What something else knows of the camera's motion since the frame before: wheels,
 
 previous_from_current: float64 [4, 4], camera axes, [m]; of the frames that process() was given last and now.
 covariance: float64 [6, 6], right perturbation, [translation m, rotation rad], camera axes; None = the identity.
-rotation_only: the translation is not known. Raises InputError.)")
+rotation_only: the translation is not known. Raises InputError for what is no motion or no covariance.)")
       .def(py::init([](const py::object& motion, const py::object& covariance, bool rotation_only) {
              MotionPrior prior;
              prior.previous_from_current = pose_of(motion, "previous_from_current");
              prior.rotation_only = rotation_only;
              if (!covariance.is_none()) prior.covariance = covariance_of(covariance, "covariance");
+             Frame().set_prior(prior);  // which judges it
              return prior;
            }),
            py::arg("previous_from_current"), py::arg("covariance") = py::none(), py::kw_only(),

@@ -36,7 +36,9 @@ Options options_of(const py::kwargs& a) {
   options.disable(argument<std::string>(a["disable"], "disable", "a str, parts by comma"));
   if (!a["seed"].is_none()) options.set("seed", py::str(a["seed"]), "seed");
   if (argument<bool>(a["final_ba"], "final_ba", "a bool")) options.set("global_ba.final", "true", "final_ba");
-  options.threaded = argument<int>(a["threads"], "threads", "an int") != 1;
+  const int threads = argument<int>(a["threads"], "threads", "an int");
+  if (threads < 0) throw InvalidOption("threads", std::to_string(threads), "1, or 0 for as many as there is work for");
+  options.threaded = threads != 1;
   options.realtime = argument<bool>(a["realtime"], "realtime", "a bool");
   options.dense_map = argument<bool>(a["dense"], "dense", "a bool");
   if (!a["base_from_cam"].is_none()) options.base_from_cam = pose_of(a["base_from_cam"], "base_from_cam");
@@ -61,6 +63,7 @@ std::pair<std::string, std::vector<py::object>> split_detector(const py::object&
       throw py::type_error(std::string("detector: must be a str, a callable or a list of them, not ") +
                            Py_TYPE(item.ptr())->tp_name);
   }
+  if (py::len(items) == 0) throw InputError("detector: the list is empty; give \"none\" for no detector");
   if (!command.empty()) kinds += (kinds.empty() ? "" : "+") + command;
   return {kinds.empty() ? "none" : kinds, std::move(functions)};
 }
@@ -99,6 +102,14 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
     made.schedule = {choice.every, choice.latency > 0 ? choice.latency : choice.every};
   }
   return made;
+}
+
+// The first map is there before it has begun.
+void check_map(const Slam& slam, int map) {
+  const int maps = std::max(1, slam.statistics().maps);
+  if (map < 0 || map >= maps)
+    throw InputError(fmt::format("map: there is no map {}; there {} 0{}", map, maps == 1 ? "is" : "are",
+                                 maps == 1 ? "" : fmt::format(" ... {}", maps - 1)));
 }
 
 // Slam with what Python adds: at rest before the interpreter goes, never two feeding threads, which the library's
@@ -210,6 +221,7 @@ class PySlam final : public Closable {
   }
   void save_trajectory(const std::string& path, int map, bool online) const {
     run([&](Slam& slam) {
+      check_map(slam, map);
       const auto [frames, stamps] = stamped_trajectory(slam, online);
       const auto by_map = trajectories_by_map(frames, stamps);
       const bool there = map >= 0 && static_cast<size_t>(map) < by_map.size();
@@ -294,13 +306,19 @@ py::tuple trajectory_arrays(std::vector<TrajectoryFrame> frames, int map) {
 
 py::tuple trajectory(const PySlam& slam, int map, bool online) {
   std::vector<TrajectoryFrame> frames;
-  slam.run([&](Slam& s) { frames = online ? s.online_trajectory() : s.trajectory(); });
+  slam.run([&](Slam& s) {
+    check_map(s, map);
+    frames = online ? s.online_trajectory() : s.trajectory();
+  });
   return trajectory_arrays(std::move(frames), map);
 }
 
 py::tuple keyframes(const PySlam& slam, int map) {
   std::vector<TrajectoryFrame> frames;
-  slam.run([&](Slam& s) { frames = s.keyframes(); });
+  slam.run([&](Slam& s) {
+    check_map(s, map);
+    frames = s.keyframes();
+  });
   return trajectory_arrays(std::move(frames), map);
 }
 

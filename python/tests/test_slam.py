@@ -87,7 +87,10 @@ def test_trajectory_keyframes_and_map_are_arrays(whole):
     assert (np.diff(stamps) > 0).all() and stamps[0] == results[0].stamp_ns
     stamps, poses = slam.keyframes()
     assert 0 < len(stamps) < 40 and poses.shape[1:] == (4, 4)
-    assert slam.trajectory(map=5)[1].shape == (0, 4, 4)
+    for call in (slam.trajectory, slam.keyframes, lambda map: slam.save_trajectory("/dev/null", map=map)):
+        for wrong in (5, -1):
+            with pytest.raises(dkb_slam.InputError, match=f"^map: there is no map {wrong}; there is 0$"):
+                call(map=wrong)
     xyz, rgb = slam.map_points()
     assert xyz.shape == rgb.shape and xyz.shape[1] == 3 and rgb.dtype == np.uint8 and len(xyz) > 100
     snapshot = slam.map()
