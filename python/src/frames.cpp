@@ -68,6 +68,10 @@ class PySource final : public Closable {
   // Its threads end, and so does the iteration. Nobody waits for the lock and holds the GIL.
   void close() override {
     if (!source_) return;
+    if (made_elsewhere()) {
+      static_cast<void>(source_.release());  // it would wait for threads that are not here
+      return;
+    }
     source_->stop();
     {
       const Unlocked released(Entry::always);
@@ -80,6 +84,7 @@ class PySource final : public Closable {
   }
 
   PyFrame next() {
+    check_process();
     while (true) {
       SourceFrame next = wait_for_next();
       if (!source_) throw py::stop_iteration();
@@ -105,13 +110,20 @@ class PySource final : public Closable {
   std::optional<size_t> size() const { return open().size(); }
   const std::string& description() const { return description_; }
   int skipped() const { return skipped_; }
-  SourceCounts counts() const { return open().counts(); }
+  SourceCounts counts() const {
+    check_process();
+    return open().counts();
+  }
 
  private:
   Source& open() const {
     refuse_at_end();
     if (!source_) throw InputError(description_ + ": it is closed");
     return *source_;
+  }
+  void check_process() const {
+    if (made_elsewhere())
+      throw InputError(description_ + ": it was opened in another process; open it in each process");
   }
 
   // A device may let us wait for long, and Ctrl-C must work meanwhile: Python's handler of it runs on this thread.

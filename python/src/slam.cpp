@@ -133,6 +133,10 @@ class PySlam final : public Closable {
   void close() override {
     if (!slam_) return;
     std::shared_ptr<Slam> ended = std::move(slam_);
+    if (made_elsewhere()) {
+      new std::shared_ptr<Slam>(std::move(ended));  // it would wait for threads that are not here
+      return;
+    }
     const Unlocked released(Entry::always);  // its threads may wait for the GIL, and it waits for them
     ended.reset();
   }
@@ -237,6 +241,7 @@ class PySlam final : public Closable {
 
  private:
   void check_usable() const {
+    if (made_elsewhere()) throw InputError("slam: it was made in another process; make one in each process");
     refuse_at_end();
     if (!slam_) throw InputError("slam: it is closed");
   }
@@ -378,6 +383,7 @@ py::dict statistics(const PySlam& slam) {
 }
 
 std::string repr_of(const PySlam& slam) {
+  if (slam.made_elsewhere()) return "Slam(of another process)";
   if (slam.closed()) return "Slam(closed)";
   const Statistics s = statistics_of(slam);
   return fmt::format("Slam({} x {} px, {} of {} frames tracked, {} keyframes, {} map points)", slam.camera().width,

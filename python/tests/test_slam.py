@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slam from Python: the same as the command line, by frames and by arrays, beside other threads."""
 import gc
+import os
+import signal
 import threading
 import time
 import warnings
@@ -257,6 +259,37 @@ def test_a_detector_that_calls_its_slam_is_told_so(frames, camera, tmp_path):
             slam.process(frame)
         slam.close()
         assert set(told) == {"slam: its detector calls it; call it between the frames"}
+
+
+def test_a_forked_process_is_told_to_make_its_own(sequence):
+    source = dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera)
+    slam.process(next(source))
+    child = os.fork()
+    if child == 0:
+        try:
+            for call in (lambda: slam.process(next(source)), slam.finish, slam.map, lambda: next(source)):
+                with pytest.raises(dkb_slam.InputError, match="another process"):
+                    call()
+            assert repr(slam) == "Slam(of another process)"
+            slam.close()
+            source.close()
+            with dkb_slam.open(sequence, max_frames=3) as mine:
+                with dkb_slam.Slam(mine.camera) as another:
+                    assert [another.process(frame).frame for frame in mine] == [0, 1, 2]
+            os._exit(0)
+        finally:
+            os._exit(1)
+    deadline = time.monotonic() + 60
+    done, status = os.waitpid(child, os.WNOHANG)
+    while done == 0 and time.monotonic() < deadline:
+        time.sleep(0.05)
+        done, status = os.waitpid(child, os.WNOHANG)
+    if done == 0:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert done == child and status == 0
+    assert slam.process(next(source)).frame == 1
 
 
 def test_stamps_in_microseconds_are_told_once(frames, camera):
