@@ -79,7 +79,7 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
          end: Optional[float] = None, max_frames: Optional[int] = None, skip_pairs: int = 0,
          colour_topic: Optional[str] = None, depth_topic: Optional[str] = None, info_topic: Optional[str] = None,
          odom_topic: Optional[str] = None, imu_topic: Optional[str] = None, prior: str = "auto",
-         threaded: bool = True) -> _core.Source:
+         prior_file: Optional[PathLike] = None, threaded: bool = True) -> _core.Source:
     """Opens a recording or a device: an iterator over its frames, the same as `dkb-slam run` reads.
 
     source: what the command line takes, e.g. a folder in TUM layout.
@@ -88,6 +88,8 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
         left out at the beginning, before all else.
     ..._topic: of recordings with several topics of a kind; None = the only one there is.
     prior: which prior of the motion the frames of a recording carry: "none", "odom", "imu" or "auto".
+    prior_file: a trajectory in TUM format whose motions they carry, in the place of `prior`: in the axes of the camera,
+        of the images' time. A first line `# drift 0.01` says by which share of its way it is off.
     threaded: decode ahead on a thread; the frames are the same.
 
     Pairs that cannot be read are left out, with a SlamWarning each. Ctrl-C works while a frame is waited for. Raises
@@ -95,7 +97,8 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
     """
     return _core._open(source, camera, start=start, end=end, max_frames=max_frames, skip_pairs=skip_pairs,
                        colour_topic=colour_topic, depth_topic=depth_topic, info_topic=info_topic,
-                       odom_topic=odom_topic, imu_topic=imu_topic, prior=prior, threaded=threaded)
+                       odom_topic=odom_topic, imu_topic=imu_topic, prior=prior, prior_file=prior_file,
+                       threaded=threaded)
 
 
 TrajectoryLike = Union[_core.Slam, PathLike, Tuple[Any, Any]]

@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "bindings.h"
+#include "dkb/dataset/odometry_track.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/stamps.h"
 
@@ -43,7 +44,7 @@ class CameraFile {
 // A source as an iterator over its frames.
 class PySource final : public Closable {
  public:
-  PySource(const std::string& where, const py::object& camera, SourceOptions options) {
+  PySource(const std::string& where, const py::object& camera, SourceOptions options, const std::string& prior_file) {
     std::optional<CameraFile> file;
     if (py::isinstance<Camera>(camera)) {
       file.emplace(camera.cast<const Camera&>());
@@ -55,6 +56,7 @@ class PySource final : public Closable {
     {
       const Unlocked released;
       opened = open_source(where, options);
+      if (!prior_file.empty()) opened = with_prior_file(std::move(opened), prior_file);
       description_ = opened->description();
     }
     refuse_at_end();
@@ -168,7 +170,15 @@ std::shared_ptr<PySource> open(const py::object& where, const py::object& camera
         std::pair{"info_topic", &options.info_topic}, std::pair{"odom_topic", &options.odom_topic},
         std::pair{"imu_topic", &options.imu_topic}})
     if (!a[name].is_none()) *topic = argument<std::string>(a[name], name, "a str");
-  return std::make_shared<PySource>(path_of(where, "source"), camera, options);
+  std::string prior_file;
+  if (!a["prior_file"].is_none()) {
+    prior_file = path_of(a["prior_file"], "prior_file");
+    if ((options.prior != PriorKind::automatic && options.prior != PriorKind::none) || !options.odom_topic.empty() ||
+        !options.imu_topic.empty())
+      throw InputError("prior_file: it takes the place of prior, odom_topic and imu_topic; leave them out");
+    options.prior = PriorKind::none;
+  }
+  return std::make_shared<PySource>(path_of(where, "source"), camera, options, prior_file);
 }
 
 std::string source_repr(const PySource& source) {

@@ -311,7 +311,7 @@ def test_a_prior_is_taken_as_matrix_or_object(frames, camera):
     assert frame.prior.rotation_only and slam.process(frame).tracked
 
 
-def test_dense_map_has_the_still_world(sequence):
+def test_dense_map_has_the_still_world(sequence, tmp_path):
     slam, _ = track(dkb_slam.open(sequence, max_frames=40), dense=True, settings={"dense.voxel": 0.05,
                                                                                   "dense.truncation": 0.15,
                                                                                   "dense.grid_cell": 0.1})
@@ -319,6 +319,9 @@ def test_dense_map_has_the_still_world(sequence):
     assert dense.vertices.shape == dense.colours.shape and len(dense.vertices) > 100
     assert dense.triangles.max() < len(dense.vertices) and dense.to_ply().startswith(b"ply")
     if dense.grid is not None:
+        dense.grid.save(tmp_path / "floor")
+        assert (tmp_path / "floor.pgm").read_bytes().endswith(dense.grid.cells.tobytes())
+        assert "image: floor.pgm" in (tmp_path / "floor.yaml").read_text()
         assert dense.grid.cells.dtype == np.uint8 and dense.grid.floor_from_world.shape == (4, 4)
     with pytest.raises(dkb_slam.InputError):
         dkb_slam.Slam(slam.camera).dense_map()
