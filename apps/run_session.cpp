@@ -194,20 +194,6 @@ Options checked(const RunArguments& args) {
   return options;
 }
 
-std::unique_ptr<Source> with_priors_of(const RunArguments& args, std::unique_ptr<Source> source) {
-  if (args.prior_file.empty()) return source;
-  OdometryTrack track = read_odometry(args.prior_file);
-  if (const auto* recording = dynamic_cast<const ReaderSource*>(source.get())) {
-    const std::vector<int64_t> stamps = recording->stamps_ns();
-    if (!stamps.empty() &&
-        (seconds_from_ns(stamps.back()) < track.first() || seconds_from_ns(stamps.front()) > track.last()))
-      throw InputError(fmt::format(
-          "{}: its times, {:.3f} ... {:.3f} s, are not those of the images, {:.3f} ... {:.3f} s", args.prior_file,
-          track.first(), track.last(), seconds_from_ns(stamps.front()), seconds_from_ns(stamps.back())));
-  }
-  return with_prior(std::move(source), std::move(track));
-}
-
 template <class Kind>
 std::shared_ptr<const Kind> detector_of(const Detectors& detectors) {
   for (const auto& detector : detectors.prompt)
@@ -244,7 +230,7 @@ RunSession::RunSession(const RunArguments& args)
       opened_(*recording_),
       reader_(dynamic_cast<const ReaderSource*>(recording_.get())),
       live_(is_live(args.source)) {
-  recording_ = with_priors_of(args, std::move(recording_));
+  if (!args.prior_file.empty()) recording_ = with_prior_file(std::move(recording_), args.prior_file);
   const Stopwatch loading;
   Detectors detectors = make_detectors(detector_choice(args, options_, reader_), recording_->camera());
   loading_s_ = loading.ms() / 1000;

@@ -18,16 +18,17 @@ thread_local Asked asked;
 
 }  // namespace
 
-void* operator new(size_t size) {
+// Inlined, a half of a pair looks mismatched to the compiler.
+[[gnu::noinline]] void* operator new(size_t size) {
   ++asked.times;
   asked.bytes += size;
   if (void* memory = std::malloc(std::max<size_t>(1, size))) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, size_t) noexcept {
   std::free(memory);
 }
 

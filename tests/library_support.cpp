@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <cstring>
 
+#include "dkb/image/rgbd_image.h"
+#include "dkb/util/stamps.h"
+
 namespace dkb::test {
 namespace {
 
@@ -75,6 +78,13 @@ Frame WallWorld::frame(int index, const Look& look) const {
   input.colour = {grey.data(), w, h, 0, PixelFormat::grey8};
   input.depth = {depth.data(), w, h, 0, PixelFormat::depth_f32};
   return Frame(camera_, input);
+}
+
+Frame WallWorld::frame(int index, const Look& look, int64_t depth_stamp_ns) const {
+  const Frame made = frame(index, look);
+  auto image = std::make_shared<RgbdImage>(*made.image());
+  image->depth_timestamp = seconds_from_ns(depth_stamp_ns);
+  return Frame(std::move(image), made.stamp_ns(), depth_stamp_ns);
 }
 
 std::vector<Frame> WallWorld::walk(int from, int to, int enters) const {

@@ -30,6 +30,8 @@ class WallWorld {
   const Camera& camera() const { return camera_; }
   // Frame `index`, at 30 Hz.
   Frame frame(int index, const Look& look) const;
+  // The same with a depth image of another time, as a recording may hold it.
+  Frame frame(int index, const Look& look, int64_t depth_stamp_ns) const;
   // The truth, from the camera of shift 0.
   double camera_x(int shift) const { return shift * kWall / camera_.fx; }
   // Frames `from` ... `to` - 1: the camera moves by one pixel a frame, and somebody walks through from frame `enters`

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "library_support.h"
 
@@ -40,6 +41,16 @@ TEST_F(Library, FollowsACameraExactly) {
     ASSERT_TRUE(r.tracked()) << i;
     EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 2e-3) << i;
     EXPECT_EQ(r.frame, i);
+  }
+}
+
+// At the velocity between the first two frames, nothing of the first keeps its depth.
+TEST_F(Library, ARecordingWhoseDepthIsOfAnotherTimeEndsNoRun) {
+  for (int64_t away = 10; away < 10'000'000; away *= 3) {  // [s]
+    Slam slam = slam_with();
+    for (int i = 0; i < 4; ++i)
+      EXPECT_NO_THROW(slam.process(world.frame(i, {.shift = i}, away * 1'000'000'000))) << away << " s, frame " << i;
+    EXPECT_NO_THROW(slam.finish());
   }
 }
 
@@ -160,6 +171,34 @@ TEST_F(Library, LocaliseOnlyMakesNoKeyframesAndNoMaps) {
   for (int i = 61; i < 66; ++i) slam.process(world.frame(i, {.shift = i - 50}));
   slam.finish();
   EXPECT_GT(slam.map().keyframe_count(), keyframes);
+}
+
+TEST_F(Library, AMapTaskWritesTheMapOfItsMoment) {
+  Slam slam = slam_with(std::make_shared<EveryNth>(3));
+  feed(slam, world.walk(0, 10));
+  slam.finish();
+  slam.save_map(folder / "now.dkb");
+  const auto task = slam.save_map_task();
+  feed(slam, world.walk(10, 30));
+  slam.finish();
+  slam.save_map(folder / "later.dkb");
+  std::thread([&] { task(folder / "task.dkb"); }).join();
+  const auto bytes = [&](const char* name) {
+    std::ifstream file(folder / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_TRUE(bytes("task.dkb") == bytes("now.dkb"));
+  EXPECT_FALSE(bytes("task.dkb") == bytes("later.dkb"));
+}
+
+TEST_F(Library, LocalisingWithoutAMapIsToldAfterASecond) {
+  Slam slam = slam_with();
+  slam.localize_only(true);
+  for (int i = 0; i < 60; ++i) slam.process(world.frame(i, {.shift = i}));
+  const auto events = slam.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].frame, 29);
+  EXPECT_EQ(events[0].text, "there is no map to localise in; load one, or end localize_only to make one");
 }
 
 TEST_F(Library, TheSwitchesOutliveAReset) {

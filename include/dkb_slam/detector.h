@@ -44,8 +44,8 @@ struct DetectorInput {
 class DKB_SLAM_API Detector {
  public:
   virtual ~Detector() = default;
-  /// Looks at one image. What it throws becomes a warning, and tracking goes on without an answer; a slow detector that
-  /// threw is not asked again until Slam::reset().
+  /// Looks at one image. What it throws becomes a warning, and tracking goes on by motion, without an answer; one that
+  /// threw ten times in a row is not asked again until Slam::reset().
   virtual Detections detect(const DetectorInput& image) = 0;
   /// "yolo", "file" ...: as written to statistics.
   virtual std::string kind() const = 0;

@@ -36,7 +36,7 @@ struct FrameInput {
   int64_t stamp_ns = 0;   ///< of the colour image, middle of the exposure; rises from frame to frame
   ImageView colour = {};  ///< rgb8, bgr8, rgba8, bgra8 or grey8, of the camera's size
   ImageView depth = {};   ///< depth_u16 or depth_f32, of the same size, registered to the colour camera
-  std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image; nothing = the colour image's
+  std::optional<int64_t> depth_stamp_ns = {};  ///< of the depth image, within 0.2 s; nothing = the colour image's
   std::optional<MotionPrior> prior = {};       ///< where something else knows of the motion since the last frame taken
 };
 
@@ -46,7 +46,7 @@ class DKB_SLAM_API Frame {
  public:
   Frame() = default;  ///< empty
   /// Throws InputError when an image is missing, has another size than the camera, a stride below its width, or a
-  /// format that does not fit, and when the prior is none: see set_prior().
+  /// format that does not fit, when the stamps are more than 0.2 s apart, and when the prior is none: see set_prior().
   Frame(const Camera& camera, const FrameInput& input);
   /// The library's own readers enter here.
   explicit Frame(std::shared_ptr<const RgbdImage> image, int64_t stamp_ns, int64_t depth_stamp_ns);

@@ -114,7 +114,7 @@ class DKB_SLAM_API Options {
   bool threaded = true;  ///< mapping, detection and loop search on threads of their own; false: the same bytes from one
   bool realtime = false;   ///< never wait for them but for the first detection; results may differ from run to run
   bool dense_map = false;  ///< keep what Slam::dense_map() needs: about 0.5 MB per keyframe
-  Rigid3 base_from_cam;    ///< mount: the world is the robot's base at the first tracked frame
+  Rigid3 base_from_cam;    ///< mount: the world is the robot's base at the first tracked frame (a loaded map's stays)
 
   /// Starts from "default", our best; "paper", DKB-SLAM as printed; or "orb", that without its three contributions.
   /// Throws InputError naming the nearest one.

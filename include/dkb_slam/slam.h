@@ -67,7 +67,7 @@ struct Statistics {
   double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
   int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
   std::string detector_inference;              ///< Detectors::inference
-  bool detector_failed = false;                ///< the slow detector threw: it is not asked any more
+  bool detector_failed = false;                ///< a detector threw ten times in a row: it is not asked any more
   /// Of a real-time run: how long [s] it was late and therefore did without half of "detection", "loop_search" and half
   /// of the "features"; each includes those after it. Empty in any other run, which leaves nothing out.
   std::map<std::string, double> degraded_s;
@@ -77,8 +77,8 @@ struct Statistics {
   std::map<std::string, std::vector<int>> stage_histograms;
 };
 
-/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), dense_map(), dense_map_task(),
-/// suggest_pose(), on_event() and the switches.
+/// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), save_map_task(), dense_map(),
+/// dense_map_task(), suggest_pose(), on_event() and the switches.
 /// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
 /// Several systems may live in one process and know nothing of each other.
 ///
@@ -120,8 +120,12 @@ class DKB_SLAM_API Slam {
   /// Writes the map as it is now, by a temporary file and a rename. A real-time run waits for what mapping should have
   /// done by now. Throws InputError when it cannot.
   void save_map(const std::filesystem::path& path) const;
-  /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Throws
-  /// InputError, and leaves all as it is, when the file is broken or was made with another camera or pyramid.
+  /// The same, to be called on any thread and at any time: it writes the map of the moment of this call. For robots that
+  /// save it while they go on tracking.
+  std::function<void(const std::filesystem::path& path)> save_map_task() const;
+  /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Poses are in
+  /// the world that the map was made with, whatever Options::base_from_cam says now. Throws InputError, and leaves all as
+  /// it is, when the file is broken or was made with another camera or pyramid.
   void load_map(const std::filesystem::path& path);
 
   /// The map as tracking knows it.

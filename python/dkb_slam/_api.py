@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Callable, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 from . import _core
 
@@ -23,7 +24,7 @@ class Slam(_core.Slam):
     detector: "auto" (yolo where there is a model, else motion), "yolo" (or "network"), "motion", "file", "none",
         "exec:COMMAND", several joined by "+"; or a function of one's own; or a list of both. A function is given a
         DetectorImage and returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or
-        (list, mask). What it raises becomes a SlamWarning.
+        (list, mask). What it raises becomes a SlamWarning; after ten times in a row it is not asked again.
     model, labels: ONNX file of the yolo detector (None: $DKB_SLAM_MODEL) and its class names.
     classes: those of them that may move, separated by commas or as a list (None: people, pets, and what people carry
         or ride).
@@ -41,7 +42,8 @@ class Slam(_core.Slam):
     realtime: never wait for mapping; results may differ from run to run.
     dense: keep what dense_map() needs.
     final_ba: adjust the whole map once more in finish().
-    base_from_cam: float64 [4, 4], [m], the mount: the world is the robot's base at the first tracked frame.
+    base_from_cam: float64 [4, 4], [m], the mount: the world is the robot's base at the first tracked frame. A map that
+        is loaded keeps the world that it was made with.
 
     Raises InputError (a ValueError); InvalidOption names the setting, its value and its range.
     """
@@ -57,6 +59,8 @@ class Slam(_core.Slam):
                  base_from_cam: Any = None) -> None:
         if not isinstance(camera, _core.Camera):
             raise TypeError(f"camera: must be a dkb_slam.Camera, not {type(camera).__name__}")
+        if settings is not None and not isinstance(settings, Mapping):
+            raise TypeError(f"settings: must be a dict, not {type(settings).__name__}")
         if classes is not None and not isinstance(classes, str):
             classes = ",".join(classes)
         super().__init__(camera, preset=preset, detector=detector, model=model, labels=labels, classes=classes or "",
@@ -75,7 +79,7 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
          end: Optional[float] = None, max_frames: Optional[int] = None, skip_pairs: int = 0,
          colour_topic: Optional[str] = None, depth_topic: Optional[str] = None, info_topic: Optional[str] = None,
          odom_topic: Optional[str] = None, imu_topic: Optional[str] = None, prior: str = "auto",
-         threaded: bool = True) -> _core.Source:
+         prior_file: Optional[PathLike] = None, threaded: bool = True) -> _core.Source:
     """Opens a recording or a device: an iterator over its frames, the same as `dkb-slam run` reads.
 
     source: what the command line takes, e.g. a folder in TUM layout.
@@ -84,6 +88,8 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
         left out at the beginning, before all else.
     ..._topic: of recordings with several topics of a kind; None = the only one there is.
     prior: which prior of the motion the frames of a recording carry: "none", "odom", "imu" or "auto".
+    prior_file: a trajectory in TUM format whose motions they carry, in the place of `prior`: in the axes of the camera,
+        of the images' time. A first line `# drift 0.01` says by which share of its way it is off.
     threaded: decode ahead on a thread; the frames are the same.
 
     Pairs that cannot be read are left out, with a SlamWarning each. Ctrl-C works while a frame is waited for. Raises
@@ -91,7 +97,8 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
     """
     return _core._open(source, camera, start=start, end=end, max_frames=max_frames, skip_pairs=skip_pairs,
                        colour_topic=colour_topic, depth_topic=depth_topic, info_topic=info_topic,
-                       odom_topic=odom_topic, imu_topic=imu_topic, prior=prior, threaded=threaded)
+                       odom_topic=odom_topic, imu_topic=imu_topic, prior=prior, prior_file=prior_file,
+                       threaded=threaded)
 
 
 TrajectoryLike = Union[_core.Slam, PathLike, Tuple[Any, Any]]

@@ -95,6 +95,10 @@ Matrix6d covariance_of(const py::handle& matrix, const std::string& name) {
   Matrix6d m;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) m(i, j) = in(i, j);
+  if (!m.allFinite()) throw InputError(name + ": it holds a number that is not finite; give variances of [m, rad]");
+  // As far as sums in single precision tell.
+  if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-6 * m.cwiseAbs().maxCoeff())
+    throw InputError(name + ": it is not symmetric; give a covariance matrix");
   return m;
 }
 

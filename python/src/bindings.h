@@ -9,11 +9,13 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
+#include "ending.h"
 
 // What the files of the extension module share. A function is called with the GIL held unless it says otherwise.
 namespace dkb::python {
@@ -72,22 +74,12 @@ std::string path_of(const py::handle& value, const char* name);
 // Nanoseconds of an int or numpy integer. Throws TypeError; a float of today's dates would not be exact.
 int64_t stamp_of(const py::handle& value);
 
-// --- warnings and ends ---
+// --- messages ---
 
+// A message of the library by the names of Python's keywords, in the place of the command line's options.
+std::string python_words(std::string_view text);
 // warnings.warn(text, SlamWarning) at the caller's line.
 void warn(const std::string& text);
-
-// Something with threads of its own that must be at rest before Python goes: its threads may wait for the GIL. Objects
-// are closed when the interpreter exits, if not before.
-class Closable {
- public:
-  Closable();
-  virtual ~Closable();
-  Closable(const Closable&) = delete;
-  Closable& operator=(const Closable&) = delete;
-  virtual void close() = 0;
-  static void close_all();
-};
 
 // --- frames.cpp ---
 
@@ -125,6 +117,7 @@ class Interruption {
     const std::lock_guard lock(mutex_);
     return std::exchange(what_, nullptr);
   }
+  static thread_local const Interruption* of_this_thread;  // whose detector this thread is in
 
  private:
   std::mutex mutex_;

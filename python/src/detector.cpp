@@ -78,6 +78,15 @@ Detections detections_of(const py::object& answer) {
   return found;
 }
 
+// While this thread is in a detector.
+struct Inside {
+  explicit Inside(const Interruption* whose) : before(std::exchange(Interruption::of_this_thread, whose)) {}
+  ~Inside() { Interruption::of_this_thread = before; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+  const Interruption* before;
+};
+
 class PythonDetector final : public Detector {
  public:
   PythonDetector(py::object function, std::shared_ptr<Interruption> interruption)
@@ -86,16 +95,17 @@ class PythonDetector final : public Detector {
     kind_ = py::str(name);
   }
   ~PythonDetector() override {
-    const py::gil_scoped_acquire gil;  // the library lets go of it on a thread of its choice
+    const Locked gil;  // the library lets go of it on a thread of its choice
     function_ = py::object();
   }
 
   Detections detect(const DetectorInput& input) override {
-    const py::gil_scoped_acquire gil;
+    const Locked gil;
     DetectorImage image(input);
     const py::object shown = py::cast(std::move(image));
     const std::unique_ptr<DetectorImage, void (*)(DetectorImage*)> end(shown.cast<DetectorImage*>(),
                                                                        [](DetectorImage* i) { i->end(); });
+    const Inside inside(interruption_.get());
     try {
       return detections_of(function_(shown));
     } catch (py::error_already_set& error) {
@@ -104,7 +114,7 @@ class PythonDetector final : public Detector {
   }
   std::string kind() const override { return kind_; }
   void reset() override {
-    const py::gil_scoped_acquire gil;
+    const Locked gil;
     try {
       if (py::hasattr(function_, "reset")) function_.attr("reset")();
     } catch (py::error_already_set& error) {
@@ -124,6 +134,8 @@ class PythonDetector final : public Detector {
 };
 
 }  // namespace
+
+thread_local const Interruption* Interruption::of_this_thread = nullptr;
 
 std::shared_ptr<Detector> python_detector(py::object function, std::shared_ptr<Interruption> interruption) {
   return std::make_shared<PythonDetector>(std::move(function), std::move(interruption));

@@ -16,7 +16,7 @@ struct NamedTrajectory {
 NamedTrajectory trajectory_of(const py::object& object, const char* name) {
   if (!py::isinstance<py::tuple>(object)) {
     const std::string path = path_of(object, name);
-    const py::gil_scoped_release released;
+    const Unlocked released;
     return {read_poses(path), path};
   }
   if (py::len(object) != 2) throw InputError(std::string(name) + ": give a file, or the pair (stamps_ns, poses)");
@@ -43,7 +43,7 @@ Evaluation evaluated(const py::object& truth, const py::object& estimate, double
   options.max_difference = max_diff;
   options.rpe_delta = parse_rpe_delta(rpe_delta);
   options.with_scale = scale;
-  const py::gil_scoped_release released;
+  const Unlocked released;
   return evaluate(t.poses, e.poses, options, e.name);
 }
 

@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "bindings.h"
+#include "dkb/dataset/odometry_track.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/stamps.h"
 
@@ -43,7 +44,7 @@ class CameraFile {
 // A source as an iterator over its frames.
 class PySource final : public Closable {
  public:
-  PySource(const std::string& where, const py::object& camera, SourceOptions options) {
+  PySource(const std::string& where, const py::object& camera, SourceOptions options, const std::string& prior_file) {
     std::optional<CameraFile> file;
     if (py::isinstance<Camera>(camera)) {
       file.emplace(camera.cast<const Camera&>());
@@ -51,9 +52,15 @@ class PySource final : public Closable {
     } else if (!camera.is_none()) {
       options.camera = path_of(camera, "camera");
     }
-    const py::gil_scoped_release released;
-    source_ = open_source(where, options);
-    description_ = source_->description();
+    std::unique_ptr<Source> opened;  // close() sees a whole one or none
+    {
+      const Unlocked released;
+      opened = open_source(where, options);
+      if (!prior_file.empty()) opened = with_prior_file(std::move(opened), prior_file);
+      description_ = opened->description();
+    }
+    refuse_at_end();
+    source_ = std::move(opened);
     if (!file) return;
     const size_t at = description_.find(options.camera);
     if (at != std::string::npos) description_.replace(at, options.camera.size(), "as given");
@@ -63,18 +70,23 @@ class PySource final : public Closable {
   // Its threads end, and so does the iteration. Nobody waits for the lock and holds the GIL.
   void close() override {
     if (!source_) return;
+    if (made_elsewhere()) {
+      static_cast<void>(source_.release());  // it would wait for threads that are not here
+      return;
+    }
     source_->stop();
     {
-      const py::gil_scoped_release released;
+      const Unlocked released(Entry::always);
       reading_.lock();
     }
     std::unique_ptr<Source> ended = std::move(source_);
     reading_.unlock();
-    const py::gil_scoped_release released;
+    const Unlocked released(Entry::always);
     ended.reset();
   }
 
   PyFrame next() {
+    check_process();
     while (true) {
       SourceFrame next = wait_for_next();
       if (!source_) throw py::stop_iteration();
@@ -100,29 +112,37 @@ class PySource final : public Closable {
   std::optional<size_t> size() const { return open().size(); }
   const std::string& description() const { return description_; }
   int skipped() const { return skipped_; }
-  SourceCounts counts() const { return open().counts(); }
+  SourceCounts counts() const {
+    check_process();
+    return open().counts();
+  }
 
  private:
   Source& open() const {
+    refuse_at_end();
     if (!source_) throw InputError(description_ + ": it is closed");
     return *source_;
+  }
+  void check_process() const {
+    if (made_elsewhere())
+      throw InputError(description_ + ": it was opened in another process; open it in each process");
   }
 
   // A device may let us wait for long, and Ctrl-C must work meanwhile: Python's handler of it runs on this thread.
   SourceFrame wait_for_next() {
     std::future<SourceFrame> pending;
-    const py::gil_scoped_release released;
+    const Unlocked released;
     const std::unique_lock lock(reading_, std::try_to_lock);
     if (!lock.owns_lock()) throw InputError(description_ + ": another thread reads it; one at a time may");
     if (!source_) return {};
     pending = std::async(std::launch::async, [this] { return source_->next(); });
     while (pending.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
-      const py::gil_scoped_acquire gil;
+      const Locked gil;
       if (PyErr_CheckSignals() == 0) continue;
       py::error_already_set interrupt;
       source_->stop();
       {
-        const py::gil_scoped_release waiting;
+        const Unlocked waiting(Entry::always);
         pending.wait();
       }
       throw interrupt;
@@ -150,7 +170,15 @@ std::shared_ptr<PySource> open(const py::object& where, const py::object& camera
         std::pair{"info_topic", &options.info_topic}, std::pair{"odom_topic", &options.odom_topic},
         std::pair{"imu_topic", &options.imu_topic}})
     if (!a[name].is_none()) *topic = argument<std::string>(a[name], name, "a str");
-  return std::make_shared<PySource>(path_of(where, "source"), camera, options);
+  std::string prior_file;
+  if (!a["prior_file"].is_none()) {
+    prior_file = path_of(a["prior_file"], "prior_file");
+    if ((options.prior != PriorKind::automatic && options.prior != PriorKind::none) || !options.odom_topic.empty() ||
+        !options.imu_topic.empty())
+      throw InputError("prior_file: it takes the place of prior, odom_topic and imu_topic; leave them out");
+    options.prior = PriorKind::none;
+  }
+  return std::make_shared<PySource>(path_of(where, "source"), camera, options, prior_file);
 }
 
 std::string source_repr(const PySource& source) {
@@ -165,12 +193,13 @@ What something else knows of the camera's motion since the frame before: wheels,
 
 previous_from_current: float64 [4, 4], camera axes, [m]; of the frames that process() was given last and now.
 covariance: float64 [6, 6], right perturbation, [translation m, rotation rad], camera axes; None = the identity.
-rotation_only: the translation is not known. Raises InputError.)")
+rotation_only: the translation is not known. Raises InputError for what is no motion or no covariance.)")
       .def(py::init([](const py::object& motion, const py::object& covariance, bool rotation_only) {
              MotionPrior prior;
              prior.previous_from_current = pose_of(motion, "previous_from_current");
              prior.rotation_only = rotation_only;
              if (!covariance.is_none()) prior.covariance = covariance_of(covariance, "covariance");
+             Frame().set_prior(prior);  // which judges it
              return prior;
            }),
            py::arg("previous_from_current"), py::arg("covariance") = py::none(), py::kw_only(),
@@ -222,7 +251,7 @@ PyFrame frame_from_arguments(const Camera& camera, const py::object& stamp_ns, c
   input.depth = depth_view(depth);
   input.prior = prior_of(prior);
   if (!depth_stamp_ns.is_none()) input.depth_stamp_ns = stamp_of(depth_stamp_ns);
-  const py::gil_scoped_release released;  // the caller holds the arrays
+  const Unlocked released;  // the caller holds the arrays
   return {Frame(camera, input), stamp_text(input.stamp_ns), 0};
 }
 

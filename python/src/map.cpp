@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include <filesystem>
+
 #include "bindings.h"
+#include "dkb/util/files.h"
 
 namespace dkb::python {
 namespace {
@@ -12,7 +15,7 @@ struct Points {
   explicit Points(const MapSnapshot& map) {
     std::vector<PointInfo> points;
     {
-      const py::gil_scoped_release released;
+      const Unlocked released;
       points = map.points();
     }
     const auto n = static_cast<py::ssize_t>(points.size());
@@ -65,7 +68,20 @@ void bind_dense(py::module_& module) {
           "(x, y) [m] of the lower left corner of the lower left cell, on the floor.")
       .def_property_readonly(
           "floor_from_world", [](const OccupancyGrid& g) { return pose_array(g.floor_from_world); },
-          "float64 [4, 4]: z = 0 is the floor, z up.");
+          "float64 [4, 4]: z = 0 is the floor, z up.")
+      .def(
+          "save",
+          [](const OccupancyGrid& grid, const py::object& path) {
+            std::filesystem::path image = path_of(path, "path");
+            if (image.extension() == ".yaml" || image.extension() == ".pgm") image.replace_extension();
+            std::filesystem::path yaml = image;
+            image += ".pgm", yaml += ".yaml";
+            write_file_atomically(image, occupancy_pgm(grid));
+            write_file_atomically(yaml, occupancy_yaml(grid, image.filename().string()));
+          },
+          py::arg("path"),
+          "save(path)\n\nWrites path.pgm and path.yaml, which ROS' map_server reads, as `dkb-slam run --dense` does. "
+          "Raises InputError when it cannot.");
   py::class_<DenseMap>(module, "DenseMap", "The dense map of the still world: people and what they moved are left out.")
       .def_property_readonly(
           "vertices",
@@ -117,8 +133,7 @@ void bind_map(py::module_& module) {
       .def_property_readonly("keyframe_count", &MapSnapshot::keyframe_count)
       .def(
           "points", [](const MapSnapshot& map) { return Points(map); }, "points() -> MapPoints\n\nCopies.")
-      .def("keyframes", &MapSnapshot::keyframes, py::call_guard<py::gil_scoped_release>(),
-           "keyframes() -> list[Keyframe]\n\nBy id.")
+      .def("keyframes", &MapSnapshot::keyframes, py::call_guard<Unlocked>(), "keyframes() -> list[Keyframe]\n\nBy id.")
       .def(
           "loops",
           [](const MapSnapshot& map) {

@@ -1,34 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <set>
-
 #include "bindings.h"
 
 namespace dkb::python {
 namespace {
 
-std::set<Closable*>& open_ones() {  // in no order that anything depends on; touched with the GIL held
-  static std::set<Closable*> all;
-  return all;
-}
-
-PyObject* slam_warning = nullptr;
+PyObject *slam_warning = nullptr, *input_error = nullptr, *invalid_option = nullptr;
 
 }  // namespace
 
-Closable::Closable() {
-  open_ones().insert(this);
-}
-Closable::~Closable() {
-  open_ones().erase(this);
-}
-void Closable::close_all() {
-  const std::set<Closable*> all = open_ones();
-  for (Closable* one : all)
-    if (open_ones().contains(one)) one->close();
-}
-
 void warn(const std::string& text) {
-  if (PyErr_WarnEx(slam_warning, text.c_str(), 1) != 0) throw py::error_already_set();
+  const InPython calling;
+  if (PyErr_WarnEx(slam_warning, python_words(text).c_str(), 1) != 0) throw py::error_already_set();
 }
 
 std::string path_of(const py::handle& value, const char* name) {
@@ -57,11 +39,24 @@ PYBIND11_MODULE(_core, module) {
   options.disable_function_signatures();  // the docstrings have them
   options.disable_enum_members_docstring();
 
-  // Later ones are asked first.
-  const auto& input_error = py::register_exception<dkb::InputError>(module, "InputError", PyExc_ValueError);
-  input_error.doc() = "Bad input, bad usage, or an output that cannot be written. One line: where, what, the remedy.";
-  const auto& invalid = py::register_exception<dkb::InvalidOption>(module, "InvalidOption", input_error);
-  invalid.doc() = "An option outside its range: its key, its value and its range, in one line.";
+  input_error = PyErr_NewExceptionWithDoc(
+      "dkb_slam._core.InputError",
+      "Bad input, bad usage, or an output that cannot be written. One line: where, what, the remedy.", PyExc_ValueError,
+      nullptr);
+  invalid_option = PyErr_NewExceptionWithDoc(
+      "dkb_slam._core.InvalidOption", "An option outside its range: its key, its value and its range, in one line.",
+      input_error, nullptr);
+  module.add_object("InputError", py::reinterpret_borrow<py::object>(input_error));
+  module.add_object("InvalidOption", py::reinterpret_borrow<py::object>(invalid_option));
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const dkb::InvalidOption& e) {
+      PyErr_SetString(invalid_option, python_words(e.what()).c_str());
+    } catch (const dkb::InputError& e) {
+      PyErr_SetString(input_error, python_words(e.what()).c_str());
+    }
+  });
   slam_warning = PyErr_NewExceptionWithDoc("dkb_slam._core.SlamWarning",
                                            "Something a person should know: a frame that was skipped, a detector "
                                            "that failed. One line.",
@@ -76,5 +71,5 @@ PYBIND11_MODULE(_core, module) {
   bind_map(module);
   bind_slam(module);
   bind_evaluation(module);
-  py::module_::import("atexit").attr("register")(py::cpp_function(&Closable::close_all));
+  py::module_::import("atexit").attr("register")(py::cpp_function(&Closable::end_all));
 }

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
+
 #include "bindings.h"
 
 namespace dkb::python {
@@ -14,6 +16,17 @@ py::tuple box_tuple(const Box& box) {
 std::string repr_of(const Detection& d) {
   return fmt::format("Detection(\"{}\", x={:.1f}, y={:.1f}, w={:.1f}, h={:.1f}, score={:.2f})", d.class_name, d.box.x,
                      d.box.y, d.box.w, d.box.h, d.score);
+}
+
+Detection detection_of(const std::string& class_name, float x, float y, float w, float h, float score) {
+  if (class_name.empty()) throw InputError("Detection: class_name is empty; name what it is");
+  for (const float number : {x, y, w, h})
+    if (!std::isfinite(number))
+      throw InputError(fmt::format("Detection: x={}, y={}, w={}, h={} are not all finite", x, y, w, h));
+  if (!(w > 0 && h > 0))
+    throw InputError(fmt::format("Detection: w={}, h={}; give the size, above 0, not the other corner", w, h));
+  if (!(score >= 0 && score <= 1)) throw InputError(fmt::format("Detection: score={}; it must be 0 ... 1", score));
+  return {class_name, {x, y, w, h}, score};
 }
 
 std::string at_text(const Eigen::Vector3d& p) {
@@ -48,11 +61,10 @@ py::array_t<bool> mask_array(const PyResult& result) {
 void bind_parts(py::module_& module) {
   py::class_<Detection>(module, "Detection", R"(Detection(class_name, x, y, w, h, score=1.0)
 
-One object that may move. x, y: top-left corner; w, h: size, all in [px] of the original image. score: 0 ... 1.)")
-      .def(py::init([](const std::string& class_name, float x, float y, float w, float h, float score) {
-             return Detection{class_name, {x, y, w, h}, score};
-           }),
-           py::arg("class_name"), py::arg("x"), py::arg("y"), py::arg("w"), py::arg("h"), py::arg("score") = 1.0F)
+One object that may move. x, y: top-left corner; w, h: size above 0, all in [px] of the original image. score: 0 ... 1.
+Raises InputError for what is no box.)")
+      .def(py::init(&detection_of), py::arg("class_name"), py::arg("x"), py::arg("y"), py::arg("w"), py::arg("h"),
+           py::arg("score") = 1.0F)
       .def_readonly("class_name", &Detection::class_name)
       .def_readonly("score", &Detection::score)
       .def_property_readonly(

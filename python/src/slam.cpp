@@ -36,7 +36,9 @@ Options options_of(const py::kwargs& a) {
   options.disable(argument<std::string>(a["disable"], "disable", "a str, parts by comma"));
   if (!a["seed"].is_none()) options.set("seed", py::str(a["seed"]), "seed");
   if (argument<bool>(a["final_ba"], "final_ba", "a bool")) options.set("global_ba.final", "true", "final_ba");
-  options.threaded = argument<int>(a["threads"], "threads", "an int") != 1;
+  const int threads = argument<int>(a["threads"], "threads", "an int");
+  if (threads < 0) throw InvalidOption("threads", std::to_string(threads), "1, or 0 for as many as there is work for");
+  options.threaded = threads != 1;
   options.realtime = argument<bool>(a["realtime"], "realtime", "a bool");
   options.dense_map = argument<bool>(a["dense"], "dense", "a bool");
   if (!a["base_from_cam"].is_none()) options.base_from_cam = pose_of(a["base_from_cam"], "base_from_cam");
@@ -61,6 +63,7 @@ std::pair<std::string, std::vector<py::object>> split_detector(const py::object&
       throw py::type_error(std::string("detector: must be a str, a callable or a list of them, not ") +
                            Py_TYPE(item.ptr())->tp_name);
   }
+  if (py::len(items) == 0) throw InputError("detector: the list is empty; give \"none\" for no detector");
   if (!command.empty()) kinds += (kinds.empty() ? "" : "+") + command;
   return {kinds.empty() ? "none" : kinds, std::move(functions)};
 }
@@ -81,7 +84,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   choice = choice_beside(options, a["disable"].cast<std::string>(), std::move(choice));
   Detectors made;
   {
-    const py::gil_scoped_release released;
+    const Unlocked released;
     made = make_detectors(choice, camera);
   }
   if (options.dynamics.filter == FilterKind::none) return made;
@@ -101,21 +104,40 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   return made;
 }
 
-// Slam with what Python adds: at rest before the interpreter goes, never two feeding threads, events kept for polling.
+// The first map is there before it has begun.
+void check_map(const Slam& slam, int map) {
+  const int maps = std::max(1, slam.statistics().maps);
+  if (map < 0 || map >= maps)
+    throw InputError(fmt::format("map: there is no map {}; there {} 0{}", map, maps == 1 ? "is" : "are",
+                                 maps == 1 ? "" : fmt::format(" ... {}", maps - 1)));
+}
+
+// Slam with what Python adds: at rest before the interpreter goes, never two feeding threads, which the library's
+// other calls of the feeding thread take turns with, events kept for polling.
 class PySlam final : public Closable {
  public:
   PySlam(const Camera& camera, const py::kwargs& a) : camera_(camera) {
     const Options options = options_of(a);
     Detectors detectors = detectors_of(a, options, camera, interruption_);
-    const py::gil_scoped_release released;
-    slam_ = std::make_shared<Slam>(camera, options, std::move(detectors));
-    slam_->on_event([this](const Event& event) { keep(event); });
+    std::shared_ptr<Slam> made;  // close() sees a whole one or none
+    {
+      const Unlocked released;
+      made = std::make_shared<Slam>(camera, options, std::move(detectors));
+      made->on_event([this](const Event& event) { keep(event); });
+    }
+    refuse_at_end();
+    slam_ = std::move(made);
   }
   ~PySlam() override { close(); }
 
   void close() override {
+    if (!slam_) return;
     std::shared_ptr<Slam> ended = std::move(slam_);
-    const py::gil_scoped_release released;  // its threads may wait for the GIL, and it waits for them
+    if (made_elsewhere()) {
+      new std::shared_ptr<Slam>(std::move(ended));  // it would wait for threads that are not here
+      return;
+    }
+    const Unlocked released(Entry::always);  // its threads may wait for the GIL, and it waits for them
     ended.reset();
   }
   const Camera& camera() const { return camera_; }
@@ -126,9 +148,12 @@ class PySlam final : public Closable {
   void feed(const Work& work) {
     std::exception_ptr interrupted;
     std::vector<std::string> warnings;
+    check_outside_detector();
     run([&](Slam& slam) {
-      const std::unique_lock lock(feeding_, std::try_to_lock);
-      if (!lock.owns_lock()) throw InputError("slam: another thread is in a call of it; one thread at a time feeds it");
+      const std::unique_lock feeder(feeding_, std::try_to_lock);
+      if (!feeder.owns_lock())
+        throw InputError("slam: another thread is in a call of it; one thread at a time feeds it");
+      const std::lock_guard lock(turn_);
       std::exception_ptr failed;
       try {
         work(slam);
@@ -144,19 +169,29 @@ class PySlam final : public Closable {
     if (interrupted) std::rethrow_exception(interrupted);
     for (const std::string& text : warnings) warn(text);
   }
+  // Work that waits for its turn beside the feeding thread, which in turn waits for it: it is to be short. Without the
+  // GIL.
+  template <class Work>
+  void visit(const Work& work) {
+    check_outside_detector();
+    run([&](Slam& slam) {
+      const std::lock_guard lock(turn_);
+      work(slam);
+    });
+  }
   // Work that any thread may do meanwhile, without the GIL.
   template <class Work>
   void run(const Work& work) const {
-    if (!slam_) throw InputError("slam: it is closed");
+    check_usable();
     std::shared_ptr<Slam> slam = slam_;
-    const py::gil_scoped_release released;
+    const Unlocked released;
     const std::shared_ptr<Slam> mine = std::move(slam);  // given back before the GIL is taken, see close()
     work(*mine);
   }
 
   PyResult process(const py::object& frame_or_stamp, const py::object& rgb, const py::object& depth,
                    const py::object& prior, const py::object& depth_stamp_ns, bool bgr) {
-    if (!slam_) throw InputError("slam: it is closed");
+    check_usable();
     PyFrame given;
     if (py::isinstance<PyFrame>(frame_or_stamp)) {
       if (!rgb.is_none() || !depth.is_none() || !depth_stamp_ns.is_none())
@@ -170,6 +205,7 @@ class PySlam final : public Closable {
     feed([&](Slam& slam) {
       result = {slam.process(given.frame), camera_.width, camera_.height};
       if (result.r.state == TrackingState::paused) return;
+      const std::lock_guard lock(stamps_mutex_);
       stamps_.resize(static_cast<size_t>(result.r.frame));
       stamps_.push_back(std::move(given.stamp));
     });
@@ -178,18 +214,27 @@ class PySlam final : public Closable {
   void reset() {
     feed([&](Slam& slam) {
       slam.reset();
-      stamps_.clear();
+      forget_stamps();
     });
   }
   void load_map(const std::string& path) {
     feed([&](Slam& slam) {
       slam.load_map(path);
-      stamps_.clear();
+      forget_stamps();
     });
   }
-  void save_trajectory(const std::string& path, int map, bool online) {
-    feed([&](Slam& slam) {
-      const auto by_map = trajectories_by_map(online ? slam.online_trajectory() : slam.trajectory(), stamps_);
+  // Frames may be processed while a file is written.
+  void save_map(const std::string& path) {
+    std::function<void(const std::filesystem::path&)> task;
+    visit([&](Slam& slam) { task = slam.save_map_task(); });
+    const Unlocked other_threads;
+    task(path);
+  }
+  void save_trajectory(const std::string& path, int map, bool online) const {
+    run([&](Slam& slam) {
+      check_map(slam, map);
+      const auto [frames, stamps] = stamped_trajectory(slam, online);
+      const auto by_map = trajectories_by_map(frames, stamps);
       const bool there = map >= 0 && static_cast<size_t>(map) < by_map.size();
       write_trajectory(path, there ? by_map[static_cast<size_t>(map)] : Trajectory());
     });
@@ -202,6 +247,36 @@ class PySlam final : public Closable {
   }
 
  private:
+  void check_usable() const {
+    if (made_elsewhere()) throw InputError("slam: it was made in another process; make one in each process");
+    refuse_at_end();
+    if (!slam_) throw InputError("slam: it is closed");
+  }
+  // process() waits for its detector, which must not wait for process().
+  void check_outside_detector() const {
+    if (Interruption::of_this_thread == interruption_.get())
+      throw InputError("slam: its detector calls it; call it between the frames");
+  }
+  void forget_stamps() {
+    const std::lock_guard lock(stamps_mutex_);
+    stamps_.clear();
+    ++world_;
+  }
+  // Of one world, and of frames whose stamps are known: another thread may be in the next one, or begin anew.
+  std::pair<std::vector<TrajectoryFrame>, std::vector<std::string>> stamped_trajectory(const Slam& slam,
+                                                                                       bool online) const {
+    while (true) {
+      std::unique_lock lock(stamps_mutex_);
+      std::vector<std::string> stamps = stamps_;
+      const int world = world_;
+      lock.unlock();
+      std::vector<TrajectoryFrame> frames = online ? slam.online_trajectory() : slam.trajectory();
+      lock.lock();
+      if (world != world_) continue;
+      std::erase_if(frames, [&](const TrajectoryFrame& f) { return f.frame >= static_cast<int>(stamps.size()); });
+      return {std::move(frames), std::move(stamps)};
+    }
+  }
   void keep(const Event& event) {  // on the feeding thread, within feed()
     if (event.kind == Event::Kind::warning) warnings_.push_back(fmt::format("frame {}: {}", event.frame, event.text));
     const std::lock_guard lock(events_mutex_);
@@ -211,9 +286,12 @@ class PySlam final : public Closable {
 
   const Camera camera_;
   std::shared_ptr<Slam> slam_;  // null when closed
-  std::mutex feeding_;
+  std::mutex feeding_;          // by whom no other may feed
+  std::mutex turn_;             // for who calls what only one thread at a time may
   std::shared_ptr<Interruption> interruption_ = std::make_shared<Interruption>();
+  mutable std::mutex stamps_mutex_;
   std::vector<std::string> stamps_;    // of each frame, as it shall be written
+  int world_ = 0;                      // how often they were forgotten
   std::vector<std::string> warnings_;  // not yet shown
   std::mutex events_mutex_;
   std::deque<Event> events_;
@@ -240,13 +318,19 @@ py::tuple trajectory_arrays(std::vector<TrajectoryFrame> frames, int map) {
 
 py::tuple trajectory(const PySlam& slam, int map, bool online) {
   std::vector<TrajectoryFrame> frames;
-  slam.run([&](Slam& s) { frames = online ? s.online_trajectory() : s.trajectory(); });
+  slam.run([&](Slam& s) {
+    check_map(s, map);
+    frames = online ? s.online_trajectory() : s.trajectory();
+  });
   return trajectory_arrays(std::move(frames), map);
 }
 
 py::tuple keyframes(const PySlam& slam, int map) {
   std::vector<TrajectoryFrame> frames;
-  slam.run([&](Slam& s) { frames = s.keyframes(); });
+  slam.run([&](Slam& s) {
+    check_map(s, map);
+    frames = s.keyframes();
+  });
   return trajectory_arrays(std::move(frames), map);
 }
 
@@ -306,6 +390,7 @@ py::dict statistics(const PySlam& slam) {
 }
 
 std::string repr_of(const PySlam& slam) {
+  if (slam.made_elsewhere()) return "Slam(of another process)";
   if (slam.closed()) return "Slam(closed)";
   const Statistics s = statistics_of(slam);
   return fmt::format("Slam({} x {} px, {} of {} frames tracked, {} keyframes, {} map points)", slam.camera().width,
@@ -314,9 +399,9 @@ std::string repr_of(const PySlam& slam) {
 
 DenseMap dense_map(PySlam& slam) {
   std::function<DenseMap()> task;
-  slam.feed([&](Slam& s) { task = s.dense_map_task(); });
+  slam.visit([&](Slam& s) { task = s.dense_map_task(); });
   // It takes seconds, in which frames may be processed.
-  const py::gil_scoped_release other_threads;
+  const Unlocked other_threads;
   return task();
 }
 
@@ -374,23 +459,22 @@ perturbation, [translation m, rotation rad], camera axes. Raises InputError for 
       .def("__enter__", [](const py::object& self) { return self; })
       .def("__exit__", [](PySlam& slam, const py::args&) { slam.close(); })
       .def(
-          "save_map",
-          [](PySlam& s, const py::object& path) {
-            s.feed([to = path_of(path, "path")](Slam& slam) { slam.save_map(to); });
-          },
-          py::arg("path"), "save_map(path)\n\nWrites the map as it is now. Raises InputError when it cannot.")
+          "save_map", [](PySlam& s, const py::object& path) { s.save_map(path_of(path, "path")); }, py::arg("path"),
+          "save_map(path)\n\nWrites the map as it is now; from any thread, frames may be processed meanwhile. Raises "
+          "InputError when it cannot.")
       .def(
           "load_map", [](PySlam& s, const py::object& path) { s.load_map(path_of(path, "path")); }, py::arg("path"),
           "load_map(path)\n\nForgets everything and goes on in that map: frames are lost until one is found in it.\n"
+          "Poses are in the world that the map was made with, whatever base_from_cam says now.\n"
           "Raises InputError, and leaves all as it is, when the file is broken or of another camera.")
       .def(
           "save_trajectory",
-          [](PySlam& s, const py::object& path, int map, bool online) {
+          [](const PySlam& s, const py::object& path, int map, bool online) {
             s.save_trajectory(path_of(path, "path"), map, online);
           },
           py::arg("path"), py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
           "save_trajectory(path, *, map=0, online=False)\n\nWrites what trajectory() gives in TUM format, as "
-          "`dkb-slam run` does:\nstamp [s], position [m], quaternion xyzw.")
+          "`dkb-slam run` does:\nstamp [s], position [m], quaternion xyzw. From any thread.")
       .def("trajectory", &trajectory, py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
            R"(trajectory(*, map=0, online=False) -> (stamps_ns, poses)
 
@@ -409,8 +493,8 @@ have worlds of their own. online: as each frame was published.)")
           },
           "map_points() -> (xyz, rgb)\n\nxyz: float64 [M, 3], [m] in the world; rgb: uint8 [M, 3]. From any thread.")
       .def("dense_map", &dense_map,
-           "dense_map() -> DenseMap\n\nThe still world from the keyframes so far; takes seconds, in which other "
-           "threads may go on. Raises InputError "
+           "dense_map() -> DenseMap\n\nThe still world from the keyframes so far; takes seconds, in which frames "
+           "may be processed; from any thread. Raises InputError "
            "without Slam(dense=True).")
       .def("events", &PySlam::take_events,
            "events() -> list[Event]\n\nWhat happened since the last call, oldest first; at most the newest 10,000.")

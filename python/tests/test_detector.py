@@ -118,6 +118,26 @@ def test_a_failing_detector_is_a_warning_and_tracking_goes_on(camera, frames, an
     assert any(event.kind == "warning" and says in event.text for event in slam.events())
 
 
+@pytest.mark.parametrize("options", [{}, {"detect_every": 1, "detect_latency": 1}])
+def test_a_detector_that_fails_once_is_asked_again_and_ten_times_in_a_row_not(camera, sequence, options):
+    asked = []
+
+    def detector(image):
+        asked.append(image.stamp_ns)
+        if len(asked) in failing:
+            raise RuntimeError("no memory left")
+
+    for failing, calls in (({4}, 20), (range(4, 100), 3 + 10)):
+        asked.clear()
+        with warnings.catch_warnings(record=True) as shown:
+            warnings.simplefilter("always")
+            slam, _ = run(camera, list(dkb_slam.open(sequence, max_frames=20)), detector, **options)
+        assert len(asked) == calls
+        assert slam.statistics()["detector_failed"] == (calls == 13)
+        assert ("motion" in slam.statistics()["detector"]) == (calls == 13)
+        assert len(shown) == (2 if calls == 13 else 1), [str(w.message) for w in shown]
+
+
 def test_ctrl_c_in_a_detector_reaches_the_caller(camera, frames):
     def detector(image):
         raise KeyboardInterrupt

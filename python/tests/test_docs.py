@@ -10,7 +10,7 @@ def test_the_page_works_as_printed(sequence, tmp_path, monkeypatch, capsys):
     (tmp_path / "sequence").symlink_to(sequence)
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     session = {}
     for block in blocks:
         exec(block, session)

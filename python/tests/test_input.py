@@ -53,6 +53,21 @@ def test_images_that_do_not_fit_are_named(slam, rgb, depth, says):
     (lambda c: dkb_slam.Slam(c, base_from_cam=np.ones((4, 4))), dkb_slam.InputError, "no rigid motion"),
     (lambda c: dkb_slam.Slam(c, base_from_cam=np.eye(3)), dkb_slam.InputError, "[3, 3]"),
     (lambda c: dkb_slam.MotionPrior("x"), dkb_slam.InputError, "no matrix"),
+    (lambda c: dkb_slam.MotionPrior(np.eye(4), np.full((6, 6), np.nan)), dkb_slam.InputError, "covariance: it holds a"),
+    (lambda c: dkb_slam.MotionPrior(np.eye(4), np.triu(np.ones((6, 6)))), dkb_slam.InputError, "not symmetric"),
+    (lambda c: dkb_slam.MotionPrior(np.eye(4), -np.eye(6)), dkb_slam.InputError, "negative variance"),
+    (lambda c: dkb_slam.Detection("", 0, 0, 1, 1), dkb_slam.InputError, "class_name is empty"),
+    (lambda c: dkb_slam.Detection("cat", np.nan, 0, 1, 1), dkb_slam.InputError, "not all finite"),
+    (lambda c: dkb_slam.Detection("cat", 50, 50, 40, -1), dkb_slam.InputError, "not the other corner"),
+    (lambda c: dkb_slam.Detection("cat", 0, 0, 1, 1, 1.5), dkb_slam.InputError, "score=1.5"),
+    (lambda c: dkb_slam.Slam(c, threads=-1), dkb_slam.InvalidOption, "threads: -1"),
+    (lambda c: dkb_slam.Slam(c, detector=[]), dkb_slam.InputError, "detector: the list is empty"),
+    (lambda c: dkb_slam.Slam(c, settings=[1]), TypeError, "settings: must be a dict, not list"),
+    (lambda c: dkb_slam.Slam(c, disable="x"), dkb_slam.InputError, 'disable: there is no part "x"'),
+    (lambda c: dkb_slam.Slam(c, model="a.onnx", detector="motion"), dkb_slam.InputError,
+     'model: detector="motion" has no network'),
+    (lambda c: dkb_slam.Slam(c, boxes="b.txt", detector="motion"), dkb_slam.InputError, 'add detector="file"'),
+    (lambda c: dkb_slam.Slam(c).dense_map(), dkb_slam.InputError, "set dense=True"),
     (lambda c: dkb_slam.Camera.named("fr4"), dkb_slam.InputError, "fr"),
     (lambda c: dkb_slam.Camera.load("/nothing.yaml"), dkb_slam.InputError, "/nothing.yaml"),
     (lambda c: dkb_slam.Camera(fx=1, fxx=2), dkb_slam.InputError, '"fxx" (did you mean "fx"?)'),
@@ -67,6 +82,14 @@ def test_a_wrong_argument_is_one_line(camera, call, kind, says):
     with pytest.raises(kind) as error:
         call(camera)
     assert says in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("depth_stamp", [0, 1_700_000_000_300_000_000, 1_700_000_000_000_000])
+def test_a_depth_image_of_another_time_is_refused(slam, camera, depth_stamp):
+    stamp = 1_700_000_000_000_000_000
+    for call in (slam.process, lambda *a, **k: dkb_slam.Frame(camera, *a, **k)):
+        with pytest.raises(dkb_slam.InputError, match="depth_stamp_ns"):
+            call(stamp, RGB, DEPTH, depth_stamp_ns=depth_stamp)
 
 
 def test_stamps_are_whole_and_rise(slam):

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slam from Python: the same as the command line, by frames and by arrays, beside other threads."""
 import gc
+import os
+import signal
 import threading
 import time
+import warnings
 
 import dkb_slam
 import numpy as np
@@ -86,7 +89,10 @@ def test_trajectory_keyframes_and_map_are_arrays(whole):
     assert (np.diff(stamps) > 0).all() and stamps[0] == results[0].stamp_ns
     stamps, poses = slam.keyframes()
     assert 0 < len(stamps) < 40 and poses.shape[1:] == (4, 4)
-    assert slam.trajectory(map=5)[1].shape == (0, 4, 4)
+    for call in (slam.trajectory, slam.keyframes, lambda map: slam.save_trajectory("/dev/null", map=map)):
+        for wrong in (5, -1):
+            with pytest.raises(dkb_slam.InputError, match=f"^map: there is no map {wrong}; there is 0$"):
+                call(map=wrong)
     xyz, rgb = slam.map_points()
     assert xyz.shape == rgb.shape and xyz.shape[1] == 3 and rgb.dtype == np.uint8 and len(xyz) > 100
     snapshot = slam.map()
@@ -113,6 +119,13 @@ def test_a_saved_map_serves_again(whole, frames, camera, tmp_path):
     assert slam.map().point_count == 0
     with pytest.raises(dkb_slam.InputError, match="nothing.dkb"):
         slam.load_map(tmp_path / "nothing.dkb")
+
+
+def test_a_map_of_another_camera_is_refused_by_the_field_that_differs(whole, camera, tmp_path):
+    whole[0].save_map(tmp_path / "map.dkb")
+    fields = {name: getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "depth_factor")}
+    with pytest.raises(dkb_slam.InputError, match=r"another camera \(k1 0\) than this one \(k1 0.01\)"):
+        dkb_slam.Slam(dkb_slam.Camera(**fields, k1=0.01)).load_map(tmp_path / "map.dkb")
 
 
 def test_a_suggested_pose_is_where_a_map_begins(frames, camera):
@@ -183,6 +196,111 @@ def test_a_second_feeding_thread_is_refused(frames, camera):
     assert slam.process(frames[1]).frame == 1
 
 
+@pytest.mark.parametrize("save", [lambda slam, path: slam.save_map(path), lambda slam, path: slam.dense_map(),
+                                  lambda slam, path: slam.save_trajectory(path)])
+def test_no_frame_is_refused_while_another_thread_saves(sequence, tmp_path, save):
+    source = dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera, realtime=True, dense=True)
+    done, saved, wrong = threading.Event(), [], []
+
+    def keep_saving():
+        while not done.is_set():
+            try:
+                save(slam, tmp_path / "saved")
+                saved.append(True)
+            except BaseException as error:
+                wrong.append(error)
+
+    slam.process(next(source))
+    thread = threading.Thread(target=keep_saving)
+    thread.start()
+    try:
+        results = [slam.process(frame) for frame in source]
+    finally:
+        done.set()
+        thread.join()
+    assert len(results) == 39 and saved and not wrong
+
+
+def test_a_trajectory_is_saved_while_a_frame_is_tracked(frames, camera, tmp_path):
+    inside, go = threading.Event(), threading.Event()
+
+    def detector(image):
+        inside.set()
+        assert go.wait(20)
+
+    slam = dkb_slam.Slam(camera, detector=detector)
+    go.set()
+    slam.process(frames[0])
+    go.clear()
+    inside.clear()
+    thread = threading.Thread(target=slam.process, args=(frames[1],))
+    thread.start()
+    assert inside.wait(20)
+    slam.save_trajectory(tmp_path / "online.txt", online=True)
+    go.set()
+    thread.join()
+    rows = [row for row in (tmp_path / "online.txt").read_text().splitlines() if not row.startswith("#")]
+    assert len(rows) == 1
+
+
+def test_a_detector_that_calls_its_slam_is_told_so(frames, camera, tmp_path):
+    def detector(image):
+        for call in (lambda: slam.save_map(tmp_path / "map.dkb"), slam.finish, slam.dense_map):
+            try:
+                call()
+            except dkb_slam.InputError as error:
+                told.append(str(error))
+
+    for options in ({}, {"detect_every": 1}):
+        told = []
+        slam = dkb_slam.Slam(camera, detector=detector, **options)
+        for frame in frames[:3]:
+            slam.process(frame)
+        slam.close()
+        assert set(told) == {"slam: its detector calls it; call it between the frames"}
+
+
+def test_a_forked_process_is_told_to_make_its_own(sequence):
+    source = dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera)
+    slam.process(next(source))
+    child = os.fork()
+    if child == 0:
+        try:
+            for call in (lambda: slam.process(next(source)), slam.finish, slam.map, lambda: next(source)):
+                with pytest.raises(dkb_slam.InputError, match="another process"):
+                    call()
+            assert repr(slam) == "Slam(of another process)"
+            slam.close()
+            source.close()
+            with dkb_slam.open(sequence, max_frames=3) as mine:
+                with dkb_slam.Slam(mine.camera) as another:
+                    assert [another.process(frame).frame for frame in mine] == [0, 1, 2]
+            os._exit(0)
+        finally:
+            os._exit(1)
+    deadline = time.monotonic() + 60
+    done, status = os.waitpid(child, os.WNOHANG)
+    while done == 0 and time.monotonic() < deadline:
+        time.sleep(0.05)
+        done, status = os.waitpid(child, os.WNOHANG)
+    if done == 0:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert done == child and status == 0
+    assert slam.process(next(source)).frame == 1
+
+
+def test_stamps_in_microseconds_are_told_once(frames, camera):
+    slam = dkb_slam.Slam(camera, threads=1)
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        for i in range(36):
+            slam.process(1_700_000_000_000_000 + i * 33_333, frames[0].rgb, frames[0].depth)
+    assert ["nanoseconds" in str(w.message) for w in shown].count(True) == 1
+
+
 def test_a_prior_is_taken_as_matrix_or_object(frames, camera):
     slam = dkb_slam.Slam(camera)
     slam.process(frames[0])
@@ -193,7 +311,7 @@ def test_a_prior_is_taken_as_matrix_or_object(frames, camera):
     assert frame.prior.rotation_only and slam.process(frame).tracked
 
 
-def test_dense_map_has_the_still_world(sequence):
+def test_dense_map_has_the_still_world(sequence, tmp_path):
     slam, _ = track(dkb_slam.open(sequence, max_frames=40), dense=True, settings={"dense.voxel": 0.05,
                                                                                   "dense.truncation": 0.15,
                                                                                   "dense.grid_cell": 0.1})
@@ -201,6 +319,9 @@ def test_dense_map_has_the_still_world(sequence):
     assert dense.vertices.shape == dense.colours.shape and len(dense.vertices) > 100
     assert dense.triangles.max() < len(dense.vertices) and dense.to_ply().startswith(b"ply")
     if dense.grid is not None:
+        dense.grid.save(tmp_path / "floor")
+        assert (tmp_path / "floor.pgm").read_bytes().endswith(dense.grid.cells.tobytes())
+        assert "image: floor.pgm" in (tmp_path / "floor.yaml").read_text()
         assert dense.grid.cells.dtype == np.uint8 and dense.grid.floor_from_world.shape == (4, 4)
     with pytest.raises(dkb_slam.InputError):
         dkb_slam.Slam(slam.camera).dense_map()

@@ -62,6 +62,17 @@ def test_stretches_are_those_of_the_command_line(sequence):
     assert part == [s for s in whole if 200_000_000 <= s - whole[0] <= 500_000_000][:5]
 
 
+def test_a_file_may_tell_the_motion(sequence, tmp_path):
+    frames = list(dkb_slam.open(sequence, max_frames=3, prior_file=sequence / "groundtruth.txt"))
+    assert frames[0].prior is None and frames[2].prior.covariance[0, 0] > 0
+    with pytest.raises(dkb_slam.InputError, match="prior_file: it takes the place of prior"):
+        dkb_slam.open(sequence, prior="imu", prior_file=sequence / "groundtruth.txt")
+    late = tmp_path / "late.txt"
+    late.write_text("9000 0 0 0 0 0 0 1\n9001 0 0 0 0 0 0 1\n")
+    with pytest.raises(dkb_slam.InputError, match="late.txt: its times"):
+        dkb_slam.open(sequence, prior_file=late)
+
+
 def test_a_camera_may_be_an_object_a_name_or_a_file(sequence):
     mine = dkb_slam.Camera(fx=500.25, fy=501, cx=320, cy=240, width=640, height=480, depth_factor=5000, fps=25)
     source = dkb_slam.open(sequence, camera=mine)
@@ -120,6 +131,31 @@ def test_ctrl_c_works_while_a_frame_is_waited_for(copy):
     finally:
         child.kill()
     assert out == "interrupted\n" and child.returncode == 0, err
+
+
+@pytest.mark.parametrize("work", ["process", "process with a detector", "read", "convert"])
+def test_a_program_ends_in_peace_while_a_daemon_thread_is_in_a_call(sequence, work):
+    child = run_script("""
+        import sys, threading, time, dkb_slam
+        path, work = sys.argv[1:]
+        source = dkb_slam.open(path)
+        frames = list(source)
+        slam = dkb_slam.Slam(source.camera, detector="motion" if work == "process" else lambda image: time.sleep(0.02))
+        begun = threading.Event()
+        def feed(k):
+            for frame in dkb_slam.open(path) if work == "read" else frames:
+                begun.set()
+                if work == "convert": dkb_slam.Frame(source.camera, 1, frame.rgb, frame.depth)
+                elif work != "read": slam.process(k * 10**10 + frame.stamp_ns, frame.rgb, frame.depth)
+        def go():
+            for k in range(10000): feed(k)
+        threading.Thread(target=go, daemon=True).start()
+        begun.wait()
+        time.sleep(0.1)
+        print("end", flush=True)
+        """, sequence, work)
+    out, err = child.communicate(timeout=60)
+    assert (out, err, child.returncode) == ("end\n", "", 0)
 
 
 def test_a_program_ends_in_peace_while_threads_are_at_work(sequence):

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/odometry_track.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "dkb/dataset/reader_source.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
@@ -83,6 +86,19 @@ OdometryTrack read_odometry(const std::filesystem::path& path) {
 
 std::unique_ptr<Source> with_prior(std::unique_ptr<Source> source, OdometryTrack track) {
   return std::make_unique<PriorSource>(std::move(source), std::move(track));
+}
+
+std::unique_ptr<Source> with_prior_file(std::unique_ptr<Source> source, const std::filesystem::path& path) {
+  OdometryTrack track = read_odometry(path);
+  if (const auto* recording = dynamic_cast<const ReaderSource*>(source.get())) {
+    const std::vector<int64_t> stamps = recording->stamps_ns();
+    if (!stamps.empty() &&
+        (seconds_from_ns(stamps.back()) < track.first() || seconds_from_ns(stamps.front()) > track.last()))
+      throw InputError(fmt::format(
+          "{}: its times, {:.3f} ... {:.3f} s, are not those of the images, {:.3f} ... {:.3f} s", path.string(),
+          track.first(), track.last(), seconds_from_ns(stamps.front()), seconds_from_ns(stamps.back())));
+  }
+  return with_prior(std::move(source), std::move(track));
 }
 
 }  // namespace dkb

@@ -53,5 +53,7 @@ OdometryTrack read_odometry(const std::filesystem::path& path);
 
 // The frames of a source with priors by a track.
 std::unique_ptr<Source> with_prior(std::unique_ptr<Source> source, OdometryTrack track);
+// The same by a file, see read_odometry(). Throws InputError when the file is of another time than a recording.
+std::unique_ptr<Source> with_prior_file(std::unique_ptr<Source> source, const std::filesystem::path& path);
 
 }  // namespace dkb

@@ -5,13 +5,20 @@
 
 #include "dkb/util/errors.h"
 #include "dkb_slam/detector.h"
+#include "dkb_slam/errors.h"
 
 namespace dkb {
 
-// What a detector throws that never was one: there is no such command. A run without it is not what was asked for.
-class NeverStarted : public InputError {
+// What a detector throws that can give no answer any more until it is reset.
+class DetectorEnded : public InputError {
  public:
   using InputError::InputError;
+};
+
+// And one that never was: there is no such command. A run without it is not what was asked for.
+class NeverStarted : public DetectorEnded {
+ public:
+  using DetectorEnded::DetectorEnded;
 };
 
 // The part of `box` within an image of this size [px]; of zero width or height when there is none.

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "dkb/detection/detection.h"
 #include "dkb/detection/exec_answer.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/one_line.h"
@@ -56,7 +57,7 @@ Detections ExecDetector::ask(const DetectorInput& image) {
 }
 
 Detections ExecDetector::detect(const DetectorInput& image) {
-  if (process_ == nullptr) throw InputError("\"" + excerpt(command_) + "\" has ended");
+  if (process_ == nullptr) throw DetectorEnded("\"" + excerpt(command_) + "\" has ended");
   try {
     return ask(image);
   } catch (const NeverStarted& e) {
@@ -67,7 +68,7 @@ Detections ExecDetector::detect(const DetectorInput& image) {
                        "; give a command that a shell can execute, with its path, or leave the detector out");
   } catch (const InputError& e) {
     process_.reset();
-    throw InputError("\"" + excerpt(command_) + "\": " + e.what());
+    throw DetectorEnded("\"" + excerpt(command_) + "\": " + e.what());
   }
 }
 

@@ -34,6 +34,16 @@ void check_view(const ImageView& view, bool is_depth, const Camera& camera) {
                      std::to_string(view.row_bytes()) + " of a row");
 }
 
+// A depth image is carried to the colour image by the motion between them.
+void check_depth_stamp(int64_t stamp_ns, int64_t depth_stamp_ns) {
+  constexpr double kMaxGap = 0.2;  // [s] over which motion is taken to be even (dynamics, dense)
+  const double gap = seconds_from_ns(depth_stamp_ns) - seconds_from_ns(stamp_ns);
+  if (std::abs(gap) <= kMaxGap) return;
+  throw InputError("depth image: its stamp (depth_stamp_ns) is " + stamp_text(depth_stamp_ns) +
+                   " s, that of the colour image " + stamp_text(stamp_ns) +
+                   " s; they may be 0.2 s apart: give both in nanoseconds of one clock, or leave depth_stamp_ns out");
+}
+
 void check_prior(const MotionPrior& prior) {
   const Rigid3& m = prior.previous_from_current;
   if (!m.translation.allFinite() || !m.rotation.coeffs().allFinite() || !prior.covariance.allFinite())
@@ -79,6 +89,7 @@ Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.st
   depth_stamp_ns_ = input.depth_stamp_ns.value_or(stamp_ns_);
   check_view(input.colour, false, camera);
   check_view(input.depth, true, camera);
+  check_depth_stamp(stamp_ns_, depth_stamp_ns_);
   if (prior_) check_prior(*prior_);
   auto image = std::make_shared<RgbdImage>();
   image->timestamp = seconds_from_ns(stamp_ns_);

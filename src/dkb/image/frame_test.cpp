@@ -237,6 +237,20 @@ TEST_F(FrameTest, CopiesShareTheImagesAndOutliveTheCallersBuffers) {
   EXPECT_EQ(copy.image()->colour(1, 1), before);
 }
 
+TEST(Frame, ADepthStampOfAnotherClockIsRefused) {
+  const Camera camera = small_camera();
+  const Buffer colour(PixelFormat::grey8, 0), depth(PixelFormat::depth_f32, 0);
+  constexpr int64_t kStamp = 1'700'000'000'000'000'000;
+  const auto made = [&](int64_t depth_stamp_ns) {
+    return Frame(camera, {kStamp, colour.view, depth.view, depth_stamp_ns, {}});
+  };
+  EXPECT_EQ(made(kStamp - 199'000'000).depth_stamp_ns(), kStamp - 199'000'000);
+  EXPECT_EQ(made(kStamp + 199'000'000).depth_stamp_ns(), kStamp + 199'000'000);
+  for (const int64_t wrong : {int64_t{0}, kStamp - 201'000'000, kStamp + 201'000'000, kStamp / 1000,
+                              std::numeric_limits<int64_t>::min(), std::numeric_limits<int64_t>::max()})
+    EXPECT_NE(test::input_error_of([&] { made(wrong); }).find("depth_stamp_ns"), std::string::npos) << wrong;
+}
+
 TEST(MotionPrior, JoinedOnesAreOneMotionAndItsCovarianceIsThatOfSamples) {
   const auto small = [](const Vector6d& v) {
     const Eigen::Vector3d w = v.tail<3>();

@@ -165,23 +165,48 @@ MapFile load_map(const std::filesystem::path& path) {
   return file;
 }
 
+namespace {
+
+struct OpticsField {
+  const char* name;
+  double of_map, wanted;
+};
+std::vector<OpticsField> differing_fields(const CameraModel& a, const CameraModel& b) {
+  std::vector<OpticsField> fields{{"width", static_cast<double>(a.width), static_cast<double>(b.width)},
+                                  {"height", static_cast<double>(a.height), static_cast<double>(b.height)},
+                                  {"fx", a.fx, b.fx},
+                                  {"fy", a.fy, b.fy},
+                                  {"cx", a.cx, b.cx},
+                                  {"cy", a.cy, b.cy},
+                                  {"k1", a.k1, b.k1},
+                                  {"k2", a.k2, b.k2},
+                                  {"p1", a.p1, b.p1},
+                                  {"p2", a.p2, b.p2},
+                                  {"k3", a.k3, b.k3},
+                                  {"k4", a.k4, b.k4},
+                                  {"k5", a.k5, b.k5},
+                                  {"k6", a.k6, b.k6}};
+  std::erase_if(fields, [](const OpticsField& f) { return f.of_map == f.wanted; });
+  return fields;
+}
+
+}  // namespace
+
 bool same_optics(const CameraModel& a, const CameraModel& b) {
-  const auto numbers = [](const CameraModel& c) {
-    return std::array{c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6};
-  };
-  return a.width == b.width && a.height == b.height && numbers(a) == numbers(b);
+  return differing_fields(a, b).empty();
 }
 
 void check_same_optics(const MapFileContext& of_map, const MapFileContext& wanted, const std::string& name) {
-  const auto text = [](const Camera& c) {
-    return fmt::format("{}x{} fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy);
-  };
-  const Camera &a = of_map.camera, &b = wanted.camera;
-  if (!same_optics(a, b))
+  std::string of, here;
+  for (const OpticsField& f : differing_fields(of_map.camera, wanted.camera)) {
+    of += fmt::format("{}{} {}", of.empty() ? "" : ", ", f.name, f.of_map);
+    here += fmt::format("{}{} {}", here.empty() ? "" : ", ", f.name, f.wanted);
+  }
+  if (!of.empty())
     throw InputError(
         fmt::format("{}: was made with another camera ({}) than this one ({}); give a map of this camera, "
                     "or the camera of the map",
-                    name, text(a), text(b)));
+                    name, of, here));
   if (of_map.levels != wanted.levels || of_map.scale_factor != wanted.scale_factor)
     throw InputError(
         fmt::format("{}: was made with {} pyramid levels of {}; set features.levels={} and "

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/map/map_file.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -428,6 +429,19 @@ TEST_F(MapFileOnDisk, AMapWithoutKeyframesIsRefused) {
   } catch (const InputError& e) {
     EXPECT_EQ(std::string(e.what()).find(path.string() + ": holds no keyframes"), 0u) << e.what();
   }
+}
+
+TEST(MapFile, AnotherCameraIsToldByTheFieldsThatDiffer) {
+  const MapFileContext of_map = fr1_context();
+  MapFileContext wanted = of_map;
+  const auto complaint = [&] { return test::input_error_of([&] { check_same_optics(of_map, wanted, "a.dkb"); }); };
+  EXPECT_EQ(complaint(), "no error");
+  wanted.camera.k1 = 0.5, wanted.camera.width = 4;
+  EXPECT_EQ(
+      complaint(),
+      "a.dkb: was made with another camera (width " + std::to_string(of_map.camera.width) +
+          fmt::format(", k1 {}) than this one (width 4, k1 0.5); give a map of this camera, or the camera of the map",
+                      of_map.camera.k1));
 }
 
 TEST_F(MapFileOnDisk, ErrorsNameTheFile) {

@@ -38,6 +38,40 @@ std::string make_fit(Detections& detections, int width, int height) {
   return wrong;
 }
 
+std::string DetectorFailures::told(const std::string& what) {
+  return std::exchange(told_, what) == what ? "" : what;
+}
+std::string DetectorFailures::answered(const std::string& wrong) {
+  failures_ = 0;
+  return wrong.empty() ? "" : told(": " + wrong);
+}
+std::string DetectorFailures::failed(const std::string& wrong) {
+  ++failures_;
+  if (!given_up()) return told(" failed: " + wrong);
+  return " failed " + std::to_string(kMost) + " times in a row: " + wrong + "; it is not asked again";
+}
+std::string DetectorFailures::ended(const std::string& wrong) {
+  failures_ = kMost;
+  return " failed: " + wrong + "; it is not asked again";
+}
+
+Detections asked(Detector& detector, const Frame& frame, int width, int height, DetectorFailures& failures,
+                 std::string& warning) {
+  Detections found;
+  try {
+    found = detector.detect(detector_input(frame));
+  } catch (const DetectorEnded& e) {
+    warning = failures.ended(e.what());
+    if (dynamic_cast<const NeverStarted*>(&e) != nullptr) failures.never_started = std::current_exception();
+    return {};
+  } catch (...) {
+    warning = failures.failed(what_was_thrown());
+    return {};
+  }
+  warning = failures.answered(make_fit(found, width, height));
+  return found;
+}
+
 DetectionStage::DetectionStage(Detector& detector, const Camera& camera, const DetectionSchedule& schedule,
                                bool threaded, bool realtime)
     : detector_(detector),
@@ -50,22 +84,14 @@ DetectionStage::DetectionStage(Detector& detector, const Camera& camera, const D
 
 DetectionStage::Answer DetectionStage::detect(const Task& task) {
   const Stopwatch watch;
-  Answer answer{{task.index, task.frame.stamp_ns(), {}}, threw_, nullptr, "", 0};
-  if (threw_) return answer;
-  const auto give_up = [&] {
-    answer.failed = threw_ = true;
-    answer.warning = "the detector failed: " + what_was_thrown() + "; it is not asked again";
-  };
-  try {
-    answer.due.detections = detector_.detect(detector_input(task.frame));
-    const std::string wrong = make_fit(answer.due.detections, width_, height_);
-    if (!wrong.empty()) answer.warning = "the detector: " + wrong;
-  } catch (const NeverStarted&) {
-    answer.never_started = std::current_exception();
-    give_up();
-  } catch (...) {
-    give_up();
+  Answer answer;
+  answer.due = {task.index, task.frame.stamp_ns(), {}};
+  if (!failures_.given_up()) {
+    answer.due.detections = asked(detector_, task.frame, width_, height_, failures_, answer.warning);
+    if (!answer.warning.empty()) answer.warning = "the detector" + answer.warning;
   }
+  answer.failing = failures_.failing(), answer.given_up = failures_.given_up();
+  answer.never_started = failures_.never_started;
   answer.ms = watch.ms();
   return answer;
 }
@@ -97,8 +123,8 @@ std::vector<DueDetections> DetectionStage::take_due(FrameIndex index) {
     answered_ = true;
     if (first && answer->never_started) std::rethrow_exception(answer->never_started);
     if (!answer->warning.empty()) warnings_.push_back(std::move(answer->warning));
-    failed_ = answer->failed;
-    if (!answer->failed) {
+    failing_ = answer->failing, failed_ = answer->given_up;
+    if (!answer->failing) {
       times_.add("detection", answer->ms);
       if (answers_++ == 0) first_stamp_ = answer->due.stamp_ns;
       last_stamp_ = answer->due.stamp_ns;

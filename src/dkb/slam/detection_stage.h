@@ -22,10 +22,33 @@ struct DueDetections {
   Detections detections;
 };
 
+// What becomes of a detector that fails. While it does, nothing is known of its images; when it has failed so often in
+// a row, it is not asked any more. People are told each cause once in a row.
+class DetectorFailures {
+ public:
+  // As many as stamps that do not rise (RisingStamps): a second, where every third image is asked for.
+  static constexpr int kMost = 10;
+
+  // Of one answer. `wrong`: what was wrong with it, or nothing. What to tell people, or nothing.
+  std::string answered(const std::string& wrong);
+  std::string failed(const std::string& wrong);
+  std::string ended(const std::string& wrong);  // it can give no answer any more
+  bool failing() const { return failures_ > 0; }
+  bool given_up() const { return failures_ >= kMost; }
+
+  std::exception_ptr never_started;  // what it threw, if so
+
+ private:
+  std::string told(const std::string& what);
+
+  int failures_ = 0;  // in a row
+  std::string told_;
+};
+
 // Detection beside tracking. Every n-th image goes to the detector, and its answer counts a fixed number of frames
 // later. The first answer is waited for and counts at its own frame, so that nobody gets into the map before.
-// A detector that throws is a warning, and is not asked again: from then on its answers are empty, so that what it saw
-// last is not carried for ever. Only one that never started is refused, while the first answer is waited for.
+// While the detector fails its answers are empty, so that what it saw last is not carried for ever. Only one that never
+// started is refused, while the first answer is waited for.
 class DetectionStage {
  public:
   // The detector must outlive the stage. In a real-time run answers are not waited for, but for the first, and that one
@@ -43,8 +66,10 @@ class DetectionStage {
   void rest(bool on) { rests_ = on; }
   std::vector<std::string> take_warnings();
 
-  bool failed() const { return failed_; }  // as of the last take_due()
-  double rate_hz() const;                  // answers per second of the sequence
+  // As of the last take_due(): its last answer failed; it is not asked any more.
+  bool failing() const { return failing_; }
+  bool failed() const { return failed_; }
+  double rate_hz() const;  // answers per second of the sequence
   // Durations of detection and wait_detector since they were taken last.
   StageTimes take_times() { return times_.take(); }
 
@@ -55,7 +80,7 @@ class DetectionStage {
   };
   struct Answer {
     DueDetections due;
-    bool failed = false;
+    bool failing = false, given_up = false;
     std::exception_ptr never_started;
     std::string warning;
     double ms = 0;
@@ -70,14 +95,19 @@ class DetectionStage {
   FrameIndex next_ = 0;        // the earliest frame to be offered
   FrameIndex rest_until_ = 0;  // the earliest one while it rests
   bool rests_ = false;
-  bool threw_ = false;  // the stage's thread's
-  bool answered_ = false, failed_ = false;
+  DetectorFailures failures_;  // the stage's thread's
+  bool answered_ = false, failing_ = false, failed_ = false;
   size_t answers_ = 0;
   int64_t first_stamp_ = 0, last_stamp_ = 0;  // [ns] of answers
   std::vector<std::string> warnings_;
   StageTimes times_;
   DueStage<Task, Answer> stage_;  // last: its thread uses the above
 };
+
+// What the detector says of a frame, as far as it fits the image; nothing when it fails. `warning` is what to tell
+// people after the detector's name, or nothing.
+Detections asked(Detector& detector, const Frame& frame, int width, int height, DetectorFailures& failures,
+                 std::string& warning);
 
 // Takes what lies outside the image out of `detections`, and a mask of another size; what was wrong, or nothing.
 std::string make_fit(Detections& detections, int width, int height);

@@ -13,7 +13,7 @@
 namespace dkb {
 namespace {
 
-// Says which images it saw; throws at the frame `bad`; waits for `gate` at the frame `slow`.
+// Says which images it saw; throws from the frame `bad` on, for so many; waits for `gate` at the frame `slow`.
 class ScriptedDetector final : public Detector {
  public:
   Detections detect(const DetectorInput& image) override {
@@ -24,14 +24,14 @@ class ScriptedDetector final : public Detector {
       gate.get_future().wait();
     }
     if (frame == never_started) throw NeverStarted("no such command");
-    if (frame == bad) throw std::runtime_error("network fell over");
+    if (bad >= 0 && frame >= bad && frame < bad + bad_for) throw std::runtime_error("network fell over");
     Detections found;
     found.boxes.push_back({"person", {static_cast<float>(frame), static_cast<float>(calls), 1, 1}, 1});
     return found;
   }
   std::string kind() const override { return "scripted"; }
 
-  int64_t bad = -1, never_started = -1, slow = -1;
+  int64_t bad = -1, bad_for = 1, never_started = -1, slow = -1;
   std::promise<void> gate, entered;
   int calls = 0;  // the stage's thread's, until the stage ends
 };
@@ -105,21 +105,30 @@ TEST(DetectionStage, OneThreadGivesTheSameBytes) {
                   run({.every = every, .latency = latency}, bad, 30, false));
 }
 
-TEST(DetectionStage, AFailureIsHandedOverOnceAtItsDueFrameAndWhatCarriesOnSeesNothing) {
+TEST(DetectionStage, AFailureIsAnAnswerOfNothingAtItsDueFrameAndTheDetectorIsAskedAgain) {
   EXPECT_EQ(run({.every = 2, .latency = 3}, 4, 12),
-            "0 <0#1;1;2;3;4;5 <2#2;6;7 <4 !the detector failed: network fell over; it is not asked again;8;9 <6;10;11 "
-            "<8;");
+            "0 <0#1;1;2;3;4;5 <2#2;6;7 <4 !the detector failed: network fell over;8;9 <6#4;10;11 <8#5;");
 }
 
-TEST(DetectionStage, ADetectorThatThrewIsNotAskedAgain) {
+// Frames 2 ... 11 are ten.
+TEST(DetectionStage, ADetectorThatFailsTenTimesInARowIsNotAskedAgain) {
   for (const bool threaded : {true, false}) {
     ScriptedDetector detector;
-    detector.bad = 2;
+    detector.bad = 2, detector.bad_for = 100;
+    std::vector<std::string> told;
     {
       const auto stage = stage_of(detector, {.every = 1, .latency = 4}, {.threaded = threaded});
-      for (FrameIndex frame = 0; frame < 12; ++frame) exchange(*stage, frame, frame_at(frame));
+      for (FrameIndex frame = 0; frame < 30; ++frame) {
+        exchange(*stage, frame, frame_at(frame));
+        EXPECT_EQ(stage->failing(), frame >= 2 + 4) << frame;
+        EXPECT_EQ(stage->failed(), frame >= 11 + 4) << frame;
+        for (std::string& warning : stage->take_warnings()) told.push_back(std::move(warning));
+      }
     }
-    EXPECT_EQ(detector.calls, 3);
+    EXPECT_EQ(detector.calls, 2 + 10);
+    EXPECT_EQ(told, (std::vector<std::string>{
+                        "the detector failed: network fell over",
+                        "the detector failed 10 times in a row: network fell over; it is not asked again"}));
   }
 }
 
@@ -136,6 +145,34 @@ TEST(DetectionStage, OneThatNeverStartedIsThrownWhereTheFirstAnswerIsWaitedFor) 
       EXPECT_TRUE(survived->failed());
       EXPECT_EQ(survived->take_warnings().size(), 1U);
     }
+}
+
+TEST(DetectorFailures, AnAnswerBetweenThemEndsTheRow) {
+  DetectorFailures failures;
+  for (int i = 0; i < 9; ++i) failures.failed("dark");
+  EXPECT_TRUE(failures.failing());
+  failures.answered("");
+  EXPECT_FALSE(failures.failing());
+  for (int i = 0; i < 9; ++i) failures.failed("dark");
+  EXPECT_FALSE(failures.given_up());
+  failures.failed("dark");
+  EXPECT_TRUE(failures.given_up());
+}
+
+TEST(DetectorFailures, OneThatHasEndedIsGivenUpAtOnce) {
+  DetectorFailures failures;
+  EXPECT_EQ(failures.ended("it ended"), " failed: it ended; it is not asked again");
+  EXPECT_TRUE(failures.given_up());
+}
+
+TEST(DetectorFailures, EachCauseIsToldOnceInARow) {
+  DetectorFailures failures;
+  EXPECT_EQ(failures.failed("dark"), " failed: dark");
+  EXPECT_EQ(failures.failed("dark"), "");
+  EXPECT_EQ(failures.failed("bright"), " failed: bright");
+  EXPECT_EQ(failures.answered("a box lies outside the image; it is left out"),
+            ": a box lies outside the image; it is left out");
+  EXPECT_EQ(failures.answered("a box lies outside the image; it is left out"), "");
 }
 
 TEST(DetectionStage, FramesThatWereSkippedDoNotStopTheRhythm) {

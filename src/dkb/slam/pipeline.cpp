@@ -12,6 +12,8 @@ FrameResult Pipeline::process(const Frame& given) {
   const Frame frame = priors_.calibrated(given);
   last_stamp_ns_ = frame.stamp_ns();
   rate_.add(last_stamp_ns_);
+  if (std::string doubt = stamp_doubt_.add(last_stamp_ns_); !doubt.empty())
+    note(Event::Kind::warning, std::move(doubt));
   if (load_) shed_load();
   FrameResult result;
   const Stopwatch whole;

@@ -24,6 +24,7 @@
 #include "dkb/slam/readout_calibration.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
+#include "dkb/slam/stamp_doubt.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -114,10 +115,12 @@ class Pipeline {
 
   // What the next frame needs of the one before.
   FrameRate rate_;
+  StampDoubt stamp_doubt_;
   FrameIndex next_frame_ = 0;
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
+  int frames_without_map_ = 0;  // of those that only localise
   bool prior_warned_ = false;
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;

@@ -45,6 +45,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
+      stamp_doubt_(context.camera.fps),
       camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
       mapping_(LocalMapper(optics_of(context), options_.mapping, map), options_.pipeline.threaded),
@@ -474,6 +475,8 @@ void Pipeline::note_changes(const TrackedFrame& tracked) {
          "tracking has not begun: none of the first " + std::to_string(kPatience) + " frames has " +
              std::to_string(options_.tracking.initial_points) +
              " features with depth; are there depth images, in units of the camera's depth_factor?");
+  if (tracked.state == TrackingState::initialising && localize_only_ && ++frames_without_map_ == kPatience)
+    note(Event::Kind::warning, "there is no map to localise in; load one, or end localize_only to make one");
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
 }
 

@@ -6,7 +6,6 @@
 
 #include "dkb/detection/mask_folder.h"
 #include "dkb/dynamics/mover_mask.h"
-#include "dkb/util/thrown.h"
 
 namespace dkb {
 namespace {
@@ -22,12 +21,13 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
       options_(options),
       schedule_(detectors.schedule),
       prompt_(detectors.prompt),
+      prompt_failures_(detectors.prompt.size()),
       slow_(detectors.slow),
       inference_(detectors.inference),
       objects_(camera, noise) {
   if (options_.filter == FilterKind::none) return;
   if (options_.filter != FilterKind::standard) rival_.emplace(options_.filter, camera, options_.paper);
-  segments_motion_ = detectors.motion;
+  segments_motion_ = segments_motion_asked_ = detectors.motion;
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
   if (!segments_motion_) options_.motion.cell = kSupportCell;
@@ -72,16 +72,11 @@ void SceneStage::learn(const FrameOutcome& outcome) {
 MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes,
                                            std::vector<Detection>& unmasked) {
   MoverMask given;
-  for (const auto& detector : prompt_) {
-    Detections found;
-    std::string wrong;
-    try {
-      found = detector->detect(detector_input(frame));
-      wrong = make_fit(found, camera_.width, camera_.height);
-    } catch (...) {
-      wrong = what_was_thrown();
-    }
-    if (!wrong.empty()) warnings_.push_back("detector " + detector->kind() + ": " + wrong);
+  for (size_t i = 0; i < prompt_.size(); ++i) {
+    if (prompt_failures_[i].given_up()) continue;
+    std::string warning;
+    Detections found = asked(*prompt_[i], frame, camera_.width, camera_.height, prompt_failures_[i], warning);
+    if (!warning.empty()) warnings_.push_back("detector " + prompt_[i]->kind() + warning);
     boxes.insert(boxes.end(), found.boxes.begin(), found.boxes.end());
     if (found.mask.empty())
       unmasked.insert(unmasked.end(), found.boxes.begin(), found.boxes.end());
@@ -128,8 +123,8 @@ void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDete
   // What is left of a frame that failed in between belongs to nobody.
   for (auto* task : {&segmenting_, &carrying_})
     if (*task) (*task)->drop();
-  // Motion, which only supported the detector, is all that is left without it.
-  if (slow_stage_ && slow_stage_->failed() && !rival_) segments_motion_ = true;
+  // Motion, which only supported the detectors, stands in for one that fails.
+  segments_motion_ = segments_motion_asked_ || (!rival_ && detector_failing());
   if (segmenting_) {
     const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
     segmentation_task_ = {frame, expected.cam_from_world, covariance};
@@ -216,6 +211,15 @@ Scene SceneStage::look(ExtractedFrame frame, const UndistortionTable& undistort,
   times_.add("filter", watch.ms());
   if (carried.pyramid) remember(scene.extracted, std::move(carried.pyramid));
   return scene;
+}
+
+bool SceneStage::detector_failing() const {
+  return (slow_stage_ && slow_stage_->failing()) ||
+         std::any_of(prompt_failures_.begin(), prompt_failures_.end(), [](const auto& f) { return f.failing(); });
+}
+bool SceneStage::detector_failed() const {
+  return (slow_stage_ && slow_stage_->failed()) ||
+         std::any_of(prompt_failures_.begin(), prompt_failures_.end(), [](const auto& f) { return f.given_up(); });
 }
 
 std::vector<std::string> SceneStage::take_warnings() {

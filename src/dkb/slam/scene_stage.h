@@ -106,7 +106,7 @@ class SceneStage {
   std::string detector_kind() const;
   double detector_rate_hz() const { return slow_stage_ ? slow_stage_->rate_hz() : 0; }
   int detector_latency() const { return slow_stage_ ? schedule_.latency : 0; }
-  bool detector_failed() const { return slow_stage_ && slow_stage_->failed(); }
+  bool detector_failed() const;  // one of them: it is not asked any more
   std::string detector_inference() const { return slow_stage_ ? inference_ : std::string(); }
   // Durations since they were taken last. Parts of tracking: flow and motion (what it waits for carrying and for the
   // segmentation, and what it does of them itself), filter. Beside it: carrying, segmentation, and those of the
@@ -114,6 +114,7 @@ class SceneStage {
   StageTimes take_times();
 
  private:
+  bool detector_failing() const;  // one of them: nothing is known of its last image
   MoverMask ask_prompt_detectors(const Frame& frame, std::vector<Detection>& boxes, std::vector<Detection>& unmasked);
   Segmentation segment_motion(const SegmentationTask& task);
   MoverMask take_motion(std::vector<Detection>& boxes);
@@ -125,14 +126,15 @@ class SceneStage {
   DynamicsOptions options_;
   DetectionSchedule schedule_;
   std::vector<std::shared_ptr<Detector>> prompt_;
+  std::vector<DetectorFailures> prompt_failures_;  // one each
   std::shared_ptr<Detector> slow_;
   std::string inference_;  // of the slow detector's network
   std::optional<DetectionStage> slow_stage_;
   std::optional<RivalFilter> rival_;
   std::optional<MotionSegmenter> motion_;
-  bool segments_motion_ = false;  // as a detector of its own
-  CarriedObjects objects_;        // of the slow detector
-  PastFrames past_;               // as many as the slow detector's latency needs
+  bool segments_motion_ = false, segments_motion_asked_ = false;  // as a detector of its own; whether a user wants that
+  CarriedObjects objects_;                                        // of the slow detector
+  PastFrames past_;                                               // as many as the slow detector's latency needs
   std::vector<std::string> warnings_;
   StageTimes times_;
   SegmentationTask segmentation_task_;  // these two belong to segmenting_ while it is at work

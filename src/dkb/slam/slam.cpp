@@ -158,10 +158,15 @@ void Slam::explain_keyframes(bool on) {
 }
 
 void Slam::save_map(const std::filesystem::path& path) const {
+  save_map_task()(path);
+}
+std::function<void(const std::filesystem::path&)> Slam::save_map_task() const {
   // After a failure the map as it was then may be saved; where no world could begin there is none.
   if (!impl_->pipeline) impl_->throw_failure();
   if (!impl_->failure) impl_->guarded([&] { impl_->pipeline->catch_up(); });
-  dkb::save_map(path, *impl_->shared_record()->map().map(), impl_->map_context());
+  return [map = impl_->shared_record()->map(), context = impl_->map_context()](const std::filesystem::path& path) {
+    dkb::save_map(path, *map.map(), context);
+  };
 }
 
 void Slam::load_map(const std::filesystem::path& path) {

@@ -301,6 +301,8 @@ void Tracker::finish(TrackedFrame& frame) {
   const auto most = std::max_element(pending_votes.begin(), pending_votes.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
   if (most != pending_votes.end() && (reference == kNoKeyframe || most->second > lasting)) reference = most->first;
+  // What this frame shows of the map may all have been taken out since: it hangs where the one before it does.
+  if (reference == kNoKeyframe && last_) reference = last_->reference;
   frame.reference = reference;
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(reference).inverse();
 }
