@@ -34,7 +34,7 @@ Matrix6d TrackingMap::covariance(KeyframeId id) const {
   Matrix6d sum = Matrix6d::Zero();
   for (; view_->keyframe(id) == nullptr; id = pending(id).reference) {
     sum += carried(cam_from_world(id).inverse(), pending(id).covariance);
-    if (pending(id).reference == kNoKeyframe) return Matrix6d::Zero();
+    if (pending(id).reference == kNoKeyframe) return sum;
   }
   return sum + carried(view_->cam_from_world(id).inverse(), view_->keyframe(id)->covariance);
 }

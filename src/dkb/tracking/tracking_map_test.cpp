@@ -96,6 +96,10 @@ TEST(TrackingMap, AMapThatGoesOnUnseenIsAsUncertainAsTheWayThere) {
   const Matrix6d expected = map.covariance(0) + way;  // the cameras are not turned
   EXPECT_TRUE(map.covariance(2).isApprox(expected));
   EXPECT_TRUE(map.covariance(3).isApprox(expected)) << "what hangs on it shares its uncertainty";
+  map.add_pending(4, kNoKeyframe, shifted(7), Matrix6d::Zero());
+  map.add_pending(5, 4, shifted(1), way);
+  EXPECT_TRUE(map.covariance(4).isZero());
+  EXPECT_TRUE(map.covariance(5).isApprox(way)) << "of a map that mapping has not answered for at all";
 }
 
 }  // namespace
