@@ -20,8 +20,8 @@ inline double seconds_from_ns(int64_t ns) {
   constexpr int64_t kExact = int64_t{1} << 53;  // whole numbers up to here are doubles
   if (-kExact <= ns && ns <= kExact) return static_cast<double>(ns) / static_cast<double>(kNsPerSecond);
   const int64_t fraction = ((ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
-  return static_cast<double>((ns - fraction) / kNsPerSecond) +
-         static_cast<double>(fraction) / static_cast<double>(kNsPerSecond);
+  const int64_t whole = ns / kNsPerSecond - (ns % kNsPerSecond < 0 ? 1 : 0);
+  return static_cast<double>(whole) + static_cast<double>(fraction) / static_cast<double>(kNsPerSecond);
 }
 
 // To the microsecond: what a double of today's dates can hold.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <limits>
 
 #include "dkb/util/random.h"
 
@@ -95,6 +96,12 @@ TEST(Stamps, SecondsLeadBackToTheMicrosecond) {
     if (std::abs(whole) > 2 * kToday) continue;
     ASSERT_EQ(ns_from_seconds(seconds_from_ns(whole)), whole);
   }
+}
+
+TEST(Stamps, TheFarthestStampsAreSecondsToo) {
+  EXPECT_EQ(seconds_from_ns(std::numeric_limits<int64_t>::min()), -9223372036.854775808);
+  EXPECT_EQ(seconds_from_ns(std::numeric_limits<int64_t>::max()), 9223372036.854775807);
+  EXPECT_EQ(seconds_from_ns(-9007199254740993), -9007199.254740993) << "a second less than its whole ones";
 }
 
 TEST(Stamps, OfTwoAsNearTheEarlierIsTheSame) {
