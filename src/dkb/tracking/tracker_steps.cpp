@@ -94,7 +94,6 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
   const auto agrees = [&](const PoseEstimate& pose) {
     return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() && expected.agrees(pose.cam_from_world);
   };
-  candidates_made_.reset();                            // those of a fit that failed are around a place that was none
   refresh_candidates(last_->points, frame.timestamp);  // of no matches there would be none
   for (const double radius : widening_radii(expected.covariance)) {
     std::vector<PointId> points(frame.points.size(), kNoPoint);
