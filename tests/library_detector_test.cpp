@@ -50,6 +50,22 @@ class LibraryDetectors : public ::testing::Test {
   Slam slam_with(Detectors detectors, Options options = Options()) const {
     return Slam(world.camera(), options, std::move(detectors), std::make_shared<EveryNth>(3));
   }
+  // Throws from the fourth image on; counts in `asked`.
+  static std::shared_ptr<Detector> failing_after_three(int* asked) {
+    return std::make_shared<FunctionDetector>([asked](const DetectorInput&) -> Detections {
+      if (++*asked > 3) throw std::runtime_error("no memory left");
+      return {};
+    });
+  }
+  void expect_motion_goes_on(Slam& slam, const int& asked) const {
+    int masked = 0;
+    for (const Frame& frame : people) masked += !slam.process(frame).mask.empty();
+    slam.finish();
+    EXPECT_GT(masked, 10);
+    EXPECT_EQ(leaked_points(slam), 0);
+    EXPECT_TRUE(slam.statistics().detector_failed);
+    EXPECT_EQ(asked, 3 + 10);
+  }
   static std::vector<Event> warnings_of(Slam& slam) {
     std::vector<Event> warnings;
     for (Event& e : slam.take_events())
@@ -115,36 +131,17 @@ TEST_F(LibraryDetectors, ASlowOnesMasksCountAsWellAsItsBoxes) {
 
 TEST_F(LibraryDetectors, WhereASlowOneFailsMotionGoesOn) {
   int asked = 0;
-  const auto failing = std::make_shared<FunctionDetector>([&asked](const DetectorInput&) -> Detections {
-    if (++asked > 3) throw std::runtime_error("no memory left");
-    return {};
-  });
-  Slam slam = slam_with(slow(failing, {.every = 1, .latency = 1}));
-  int masked = 0;
-  for (const Frame& frame : people) masked += !slam.process(frame).mask.empty();
-  slam.finish();
-  EXPECT_GT(masked, 10);
-  EXPECT_EQ(leaked_points(slam), 0);
-  EXPECT_TRUE(slam.statistics().detector_failed);
-  EXPECT_EQ(asked, 3 + 10);
+  Slam slam = slam_with(slow(failing_after_three(&asked), {.every = 1, .latency = 1}));
+  expect_motion_goes_on(slam, asked);
   ASSERT_EQ(warnings_of(slam).size(), 2U) << "that it fails, and that it is given up";
 }
 
 TEST_F(LibraryDetectors, WhereAPromptOneFailsMotionGoesOn) {
   Detectors detectors = Detectors::none();
   int asked = 0;
-  detectors.prompt.push_back(std::make_shared<FunctionDetector>([&asked](const DetectorInput&) -> Detections {
-    if (++asked > 3) throw std::runtime_error("no memory left");
-    return {};
-  }));
+  detectors.prompt.push_back(failing_after_three(&asked));
   Slam slam = slam_with(detectors);
-  int masked = 0;
-  for (const Frame& frame : people) masked += !slam.process(frame).mask.empty();
-  slam.finish();
-  EXPECT_GT(masked, 10);
-  EXPECT_EQ(leaked_points(slam), 0);
-  EXPECT_TRUE(slam.statistics().detector_failed);
-  EXPECT_EQ(asked, 3 + 10);
+  expect_motion_goes_on(slam, asked);
 }
 
 TEST_F(LibraryDetectors, WhatALateAnswerShowsIsRetracted) {

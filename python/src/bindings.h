@@ -126,4 +126,11 @@ class Interruption {
 // A detector that calls `function`, from any thread.
 std::shared_ptr<Detector> python_detector(py::object function, std::shared_ptr<Interruption> interruption);
 
+// --- slam_arguments.cpp ---
+
+// Of the arguments of Slam, as the command line's options say it, in its order.
+Options options_of(const py::kwargs& arguments);
+Detectors detectors_of(const py::kwargs& arguments, const Options& options, const Camera& camera,
+                       const std::shared_ptr<Interruption>& interruption);
+
 }  // namespace dkb::python

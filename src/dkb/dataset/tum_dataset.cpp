@@ -94,10 +94,13 @@ std::vector<ListRow> rows_by_name(const fs::path& folder, const std::string& ima
   return rows;
 }
 
-// One to one, nearest stamps first; stamps in nanoseconds are not set.
-TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour, const std::vector<ListRow>& depth) {
+// One to one, nearest stamps first. `list`: what names the images; `name`, `nothing` and `remedy` make the error where
+// none has a partner.
+TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour, const std::vector<ListRow>& depth,
+                     std::string list, const std::string& name, const std::string& nothing, const std::string& remedy) {
   TumDataset dataset;
   dataset.folder = folder;
+  dataset.list = std::move(list);
   std::vector<double> colour_stamps, depth_stamps;
   for (const ListRow& row : colour) colour_stamps.push_back(row.timestamp);
   for (const ListRow& row : depth) depth_stamps.push_back(row.timestamp);
@@ -106,6 +109,9 @@ TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour,
     dataset.pairs.push_back({c.timestamp, d.timestamp, 0, 0, c.stamp, d.stamp, folder / c.path, folder / d.path});
   }
   dataset.unpaired = colour.size() + depth.size() - 2 * dataset.pairs.size();
+  if (dataset.pairs.empty())
+    throw InputError(name + ": " + nothing + " within " + std::to_string(kPairDifference).substr(0, 5) + " s" + remedy);
+  set_exact_stamps(dataset.pairs, name);
   return dataset;
 }
 
@@ -235,14 +241,9 @@ TumDataset pair_image_lists(const fs::path& folder, const std::string& colour_li
   const fs::path rgb = folder / colour_list, depth = folder / depth_list;
   const std::vector<ListRow> colour_rows = parse_image_list(read_file(rgb), rgb.string());
   const std::vector<ListRow> depth_rows = parse_image_list(read_file(depth), depth.string());
-  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows);
-  dataset.list = colour_list + " and " + depth_list;
-  if (dataset.pairs.empty())
-    throw InputError(rgb.string() + ": no colour image has a depth image of " + depth_list + " within " +
-                     std::to_string(kPairDifference).substr(0, 5) +
-                     " s; the two lists must be of one recording and one clock");
-  set_exact_stamps(dataset.pairs, rgb.string());
-  return dataset;
+  return pair_rows(folder, colour_rows, depth_rows, colour_list + " and " + depth_list, rgb.string(),
+                   "no colour image has a depth image of " + depth_list,
+                   "; the two lists must be of one recording and one clock");
 }
 
 bool is_stamp(std::string_view name) {
@@ -251,17 +252,11 @@ bool is_stamp(std::string_view name) {
 
 TumDataset pair_image_folders(const fs::path& folder, const std::string& colour_folder,
                               const std::string& depth_folder) {
-  const fs::path colour = folder / colour_folder;
   const std::vector<ListRow> colour_rows = rows_by_name(folder, colour_folder, kColourEndings);
   const std::vector<ListRow> depth_rows = rows_by_name(folder, depth_folder, kDepthEndings);
-  TumDataset dataset = pair_rows(folder, colour_rows, depth_rows);
-  dataset.list = "the names in " + colour_folder + " and " + depth_folder;
-  if (dataset.pairs.empty())
-    throw InputError(colour.string() + ": no image has one of " + depth_folder + " whose name is a stamp within " +
-                     std::to_string(kPairDifference).substr(0, 5) +
-                     " s of its own; the names must be of one recording and one clock, in seconds");
-  set_exact_stamps(dataset.pairs, colour.string());
-  return dataset;
+  return pair_rows(folder, colour_rows, depth_rows, "the names in " + colour_folder + " and " + depth_folder,
+                   (folder / colour_folder).string(), "no image has one of " + depth_folder + " whose name is a stamp",
+                   " of its own; the names must be of one recording and one clock, in seconds");
 }
 
 bool PairFilter::wants(double timestamp) {

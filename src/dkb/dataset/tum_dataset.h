@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "dkb/util/stamps.h"
+
 namespace dkb {
 
 // One colour image and the depth image that goes with it.
@@ -23,7 +25,8 @@ struct DatasetPair {
   std::filesystem::path depth_path;
 };
 
-inline constexpr double kPairDifference = 0.02;  // [s] most between the stamps of a pair
+inline constexpr double kPairDifference = 0.02;                         // [s] most between the stamps of a pair
+inline constexpr double kPairLimit = kPairDifference + kStampRounding;  // [s] the same of stamps that were rounded
 
 struct TumDataset {
   std::filesystem::path folder;

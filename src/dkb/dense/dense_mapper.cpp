@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "dkb/dense/floor_plane.h"
+#include "dkb/geometry/motion_model.h"
 
 namespace dkb {
 namespace {
 
-constexpr double kMaxGap = 0.2;     // [s] between poses that motion is interpolated over
 constexpr double kMinPatch = 0.03;  // [m^2] smaller connected surfaces are dropped
 
 // The camera's pose at a time between or shortly beside two poses of the trajectory, at constant velocity.
@@ -22,9 +22,9 @@ std::optional<Rigid3> pose_at(std::span<const TimedPose> trajectory, double time
   const TimedPose& b = *next;
   const TimedPose& a = next == trajectory.begin() ? b : *(next - 1);
   const TimedPose& nearest = std::abs(time - a.timestamp) <= std::abs(time - b.timestamp) ? a : b;
-  if (std::abs(time - nearest.timestamp) > kMaxGap) return std::nullopt;
+  if (std::abs(time - nearest.timestamp) > kEvenMotion) return std::nullopt;
   const double gap = b.timestamp - a.timestamp;
-  if (!(gap > 0) || gap > kMaxGap) return nearest.world_from_cam;
+  if (!(gap > 0) || gap > kEvenMotion) return nearest.world_from_cam;
   const double share = (time - a.timestamp) / gap;
   const Eigen::Vector3d rotation =
       vector_from_rotation(a.world_from_cam.rotation.conjugate() * b.world_from_cam.rotation);

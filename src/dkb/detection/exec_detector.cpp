@@ -63,7 +63,7 @@ Detections ExecDetector::detect(const DetectorInput& image) {
   } catch (const NeverStarted& e) {
     process_.reset();
     const std::string what = "\"" + excerpt(command_) + "\" cannot be started (" + e.what() + ")";
-    if (answered_) throw InputError(what);
+    if (answered_) throw DetectorEnded(what);
     throw NeverStarted("--detector exec: " + what +
                        "; give a command that a shell can execute, with its path, or leave the detector out");
   } catch (const InputError& e) {

@@ -16,7 +16,7 @@ constexpr size_t kMostWaiting = 8;  // images of a stream whose other stream is 
 
 // [ns] between the images of a pair
 int64_t max_difference() {
-  return std::llround(1e9 * (kPairDifference + kStampRounding));
+  return std::llround(1e9 * (kPairLimit));
 }
 
 }  // namespace

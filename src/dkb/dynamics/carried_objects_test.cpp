@@ -66,6 +66,17 @@ class CarriedObjectsTest : public ::testing::Test {
     EXPECT_NEAR(box.x + box.w, truth.x + truth.w, tolerance);
     EXPECT_NEAR(box.y + box.h, truth.y + truth.h, tolerance);
   }
+  // An answer tells of somebody beside the person of image 4, whom it overlooks: both have their masks.
+  void expect_both_when_another_is_seen() {
+    GreyImage another(320, 240);
+    const Box beside{250, 60, 40, 60};
+    for (int y = 60; y < 120; ++y)
+      for (int x = 250; x < 290; ++x) another(x, y) = 255;
+    receive(4, {{{"person", beside, 1}}, another});
+    ASSERT_EQ(carried.boxes().size(), 2U);
+    EXPECT_EQ(shares(carried.mask(), 4).first, 1);
+    EXPECT_EQ(carried.mask()(270, 90), 255);
+  }
   // The share of the person's pixels that a mask marks, and of the others.
   static std::pair<double, double> shares(const GreyImage& mask, FrameIndex index) {
     const GreyImage truth = mask_of(index);
@@ -215,14 +226,7 @@ TEST_F(CarriedObjectsTest, WhatIsOverlookedOnceOrTwiceDoesNotVanish) {
 TEST_F(CarriedObjectsTest, WhoeverIsOverlookedWhereOthersHaveMasksKeepsHis) {
   see(4);
   receive(4, {{{"person", person(4), 1}}, mask_of(4)});
-  GreyImage another(320, 240);
-  const Box beside{250, 60, 40, 60};
-  for (int y = 60; y < 120; ++y)
-    for (int x = 250; x < 290; ++x) another(x, y) = 255;
-  receive(4, {{{"person", beside, 1}}, another});
-  ASSERT_EQ(carried.boxes().size(), 2U);
-  EXPECT_EQ(shares(carried.mask(), 4).first, 1);
-  EXPECT_EQ(carried.mask()(270, 90), 255);
+  expect_both_when_another_is_seen();
 }
 
 TEST_F(CarriedObjectsTest, ABoxThatIsSeenAgainIsNotKeptTwice) {
@@ -238,14 +242,7 @@ TEST_F(CarriedObjectsTest, WhoeverIsOverlookedTwiceKeepsHisMask) {
   receive(4, {{{"person", person(4), 1}}, mask_of(4)});
   receive(4, {});
   EXPECT_EQ(shares(carried.mask(), 4).first, 1);
-  GreyImage another(320, 240);
-  const Box beside{250, 60, 40, 60};
-  for (int y = 60; y < 120; ++y)
-    for (int x = 250; x < 290; ++x) another(x, y) = 255;
-  receive(4, {{{"person", beside, 1}}, another});
-  ASSERT_EQ(carried.boxes().size(), 2U);
-  EXPECT_EQ(shares(carried.mask(), 4).first, 1);
-  EXPECT_EQ(carried.mask()(270, 90), 255);
+  expect_both_when_another_is_seen();
 }
 
 TEST_F(CarriedObjectsTest, BoxesOfAnswersWithAndWithoutMasksStandSideBySide) {

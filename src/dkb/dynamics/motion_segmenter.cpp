@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dkb/features/vectorised.h"
+#include "dkb/geometry/motion_model.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -110,10 +111,10 @@ void MotionSegmenter::move_views(const Rigid3& new_from_old, double after) {
 // Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time. The
 // interval since the colour image last committed, as a share of that to this depth image, while motion is even.
 std::optional<double> MotionSegmenter::colour_share() const {
-  constexpr double kMaxGap = 0.2;  // [s] over which motion is taken to be even
   if (!last_) return std::nullopt;
   const double interval = image_time_ - last_->time, to_depth = current_->time - last_->time;
-  if (!(interval > 0) || interval > kMaxGap || to_depth < interval / 4 || to_depth > 2 * interval) return std::nullopt;
+  if (!(interval > 0) || interval > kEvenMotion || to_depth < interval / 4 || to_depth > 2 * interval)
+    return std::nullopt;
   return interval / to_depth;
 }
 
@@ -142,7 +143,6 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   }
   find_pose(step_covariance);
   if (!is_placed(step_covariance)) {
-    chosen_.clear();
     clear(current_->score, rays_.all_cells());
     clear(still_, rays_.all_cells());
     return;

@@ -13,6 +13,7 @@ inline constexpr double kAccelerationSd = 2.0;         // [m/s^2]
 inline constexpr double kAngularAccelerationSd = 6.0;  // [rad/s^2]
 inline constexpr double kSpeedSd = 0.2;                // [m/s]
 inline constexpr double kAngularSpeedSd = 0.3;         // [rad/s]
+inline constexpr double kEvenMotion = 0.2;             // [s] over which its motion is taken to be even
 
 // [translation, rotation] of the same variance in each axis.
 inline Matrix6d axis_covariance(double position_sd, double rotation_sd) {

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "dkb/geometry/decompositions.h"
+#include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/image/image.h"
 #include "dkb/image/pixel_views.h"
@@ -36,9 +37,8 @@ void check_view(const ImageView& view, bool is_depth, const Camera& camera) {
 
 // A depth image is carried to the colour image by the motion between them.
 void check_depth_stamp(int64_t stamp_ns, int64_t depth_stamp_ns) {
-  constexpr double kMaxGap = 0.2;  // [s] over which motion is taken to be even (dynamics, dense)
   const double gap = seconds_from_ns(depth_stamp_ns) - seconds_from_ns(stamp_ns);
-  if (std::abs(gap) <= kMaxGap) return;
+  if (std::abs(gap) <= kEvenMotion) return;
   throw InputError("depth image: its stamp (depth_stamp_ns) is " + stamp_text(depth_stamp_ns) +
                    " s, that of the colour image " + stamp_text(stamp_ns) +
                    " s; they may be 0.2 s apart: give both in nanoseconds of one clock, or leave depth_stamp_ns out");

@@ -168,19 +168,18 @@ class StampedPairs {
       return nearer(std::abs(c - other.depth)) || nearer(std::abs(other.colour - d));
     };
     if (!pairs_.empty() && d <= pairs_.back().depth) return false;
-    return d >= c - kLimit && d <= c + kLimit && std::none_of(pairs_.begin(), pairs_.end(), taken_apart);
+    return d >= c - kPairLimit && d <= c + kPairLimit && std::none_of(pairs_.begin(), pairs_.end(), taken_apart);
   }
   void add(int64_t colour_ns, int64_t depth_ns) {
     pairs_.push_back({seconds_from_ns(colour_ns), seconds_from_ns(depth_ns)});
     // What is farther away than twice the limit shares no image in reach with those to come.
-    while (pairs_.front().colour < pairs_.back().colour - 3 * kLimit) pairs_.pop_front();
+    while (pairs_.front().colour < pairs_.back().colour - 3 * kPairLimit) pairs_.pop_front();
   }
 
  private:
   struct Pair {
     double colour, depth;  // [s]
   };
-  static constexpr double kLimit = kPairDifference + kStampRounding;
   std::deque<Pair> pairs_;
 };
 

@@ -13,8 +13,7 @@ namespace {
 
 // The very comparisons of associate(), with their rounding.
 bool in_reach(double colour_time, double depth_time) {
-  constexpr double kLimit = kPairDifference + kStampRounding;
-  return depth_time >= colour_time - kLimit && depth_time <= colour_time + kLimit;
+  return depth_time >= colour_time - kPairLimit && depth_time <= colour_time + kPairLimit;
 }
 
 StampPairing::Kind other(StampPairing::Kind kind) {

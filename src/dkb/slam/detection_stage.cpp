@@ -58,6 +58,7 @@ std::string DetectorFailures::ended(const std::string& wrong) {
 Detections asked(Detector& detector, const Frame& frame, int width, int height, DetectorFailures& failures,
                  std::string& warning) {
   Detections found;
+  if (failures.given_up()) return found;
   try {
     found = detector.detect(detector_input(frame));
   } catch (const DetectorEnded& e) {
@@ -86,10 +87,8 @@ DetectionStage::Answer DetectionStage::detect(const Task& task) {
   const Stopwatch watch;
   Answer answer;
   answer.due = {task.index, task.frame.stamp_ns(), {}};
-  if (!failures_.given_up()) {
-    answer.due.detections = asked(detector_, task.frame, width_, height_, failures_, answer.warning);
-    if (!answer.warning.empty()) answer.warning = "the detector" + answer.warning;
-  }
+  answer.due.detections = asked(detector_, task.frame, width_, height_, failures_, answer.warning);
+  if (!answer.warning.empty()) answer.warning = "the detector" + answer.warning;
   answer.failing = failures_.failing(), answer.given_up = failures_.given_up();
   answer.never_started = failures_.never_started;
   answer.ms = watch.ms();

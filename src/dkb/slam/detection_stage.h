@@ -104,8 +104,8 @@ class DetectionStage {
   DueStage<Task, Answer> stage_;  // last: its thread uses the above
 };
 
-// What the detector says of a frame, as far as it fits the image; nothing when it fails. `warning` is what to tell
-// people after the detector's name, or nothing.
+// What the detector says of a frame, as far as it fits the image; nothing when it fails or is given up. `warning`
+// becomes what to tell people after the detector's name, if anything.
 Detections asked(Detector& detector, const Frame& frame, int width, int height, DetectorFailures& failures,
                  std::string& warning);
 

@@ -82,7 +82,6 @@ class Pipeline {
   Expectation expect(const Frame& frame) const;
   void look_for_movers(const Scene& scene, const Expectation& expected);
   TrackedFrame track(const Scene& scene, const UsableFeatures& usable);
-  void compare_prior(const MotionPrior& prior, const PosePrediction& before, const TrackedFrame& tracked);
   void retract_late(const std::vector<LateMask>& masks);
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
   KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
@@ -121,8 +120,7 @@ class Pipeline {
   Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
   int frames_without_map_ = 0;  // of those that only localise
-  bool prior_warned_ = false;
-  double crowded_share_ = 0;  // of its features that movers took
+  double crowded_share_ = 0;    // of its features that movers took
   MoverMask last_mask_;
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {

@@ -225,21 +225,13 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .may_start_map = may_make_keyframes()});
   if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;
-  if (before && frame.prior()) compare_prior(*frame.prior(), *before, tracked);
+  if (before && frame.prior() && !tracked.starts_map) {  // one that does stands where the prior says
+    std::string doubt = priors_.add(*frame.prior(), {before->cam_from_world * tracked.cam_from_world.inverse(), false,
+                                                     before->covariance + tracked.covariance});
+    if (!doubt.empty()) note(Event::Kind::warning, std::move(doubt));
+  }
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
   return tracked;
-}
-
-// A map that starts anew stands where the prior says.
-void Pipeline::compare_prior(const MotionPrior& prior, const PosePrediction& before, const TrackedFrame& tracked) {
-  if (tracked.starts_map) return;
-  priors_.add(
-      prior, {before.cam_from_world * tracked.cam_from_world.inverse(), false, before.covariance + tracked.covariance});
-  if (prior_warned_ || !priors_.contradicts_images()) return;
-  prior_warned_ = true;
-  note(Event::Kind::warning,
-       "the motion priors contradict the images far beyond their covariance, and count for less: are they motions of "
-       "the camera (x right, y down, z forward), and as exact as they say?");
 }
 
 void Pipeline::follow_motion(const Scene& scene) {

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "dkb/geometry/decompositions.h"
@@ -28,8 +29,8 @@ class PriorCalibration {
     frame.set_prior(prior);
     return frame;
   }
-  // A prior as calibrated() left it, and the same step by the images.
-  void add(const MotionPrior& prior, const MotionPrior& seen) {
+  // A prior as calibrated() left it, and the same step by the images. What to tell people, once, or nothing.
+  std::string add(const MotionPrior& prior, const MotionPrior& seen) {
     Vector6d off = tangent_from_rigid3(prior.previous_from_current.inverse() * seen.previous_from_current);
     Matrix6d sum = prior.covariance / scale() + seen.covariance;
     if (prior.rotation_only) {
@@ -38,12 +39,15 @@ class PriorCalibration {
       sum.bottomLeftCorner<3, 3>().setZero();
     }
     const double squared = off.dot(solve_symmetric(sum, off));
-    if (!std::isfinite(squared)) return;
+    if (!std::isfinite(squared)) return "";
     ratios_.push_back(squared / (prior.rotation_only ? kChi2ThreeDofMedian : kChi2SixDofMedian));
     if (ratios_.size() > kRemembered) ratios_.pop_front();
     std::vector<double> ratios(ratios_.begin(), ratios_.end());
     const auto n = static_cast<double>(ratios.size());
     variance_ = (n * upper_median(ratios) + kUsual) / (n + kUsual);
+    if (!contradicts_images() || std::exchange(told_, true)) return "";
+    return "the motion priors contradict the images far beyond their covariance, and count for less: are they motions "
+           "of the camera (x right, y down, z forward), and as exact as they say?";
   }
   // Half of the steps are off by what not one in a hundred may be.
   bool contradicts_images() const {
@@ -58,6 +62,7 @@ class PriorCalibration {
 
   std::deque<double> ratios_;  // squared errors over their median
   double variance_ = 1;        // of errors, in units of that claimed
+  bool told_ = false;
 };
 
 }  // namespace dkb

@@ -73,7 +73,6 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
                                            std::vector<Detection>& unmasked) {
   MoverMask given;
   for (size_t i = 0; i < prompt_.size(); ++i) {
-    if (prompt_failures_[i].given_up()) continue;
     std::string warning;
     Detections found = asked(*prompt_[i], frame, camera_.width, camera_.height, prompt_failures_[i], warning);
     if (!warning.empty()) warnings_.push_back("detector " + prompt_[i]->kind() + warning);
