@@ -225,9 +225,11 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .may_start_map = may_make_keyframes()});
   if (start_) push_start(&tracked);
   if (!tracked.tracked()) return tracked;
-  if (before && frame.prior() && !tracked.starts_map) {  // one that does stands where the prior says
-    std::string doubt = priors_.add(*frame.prior(), {before->cam_from_world * tracked.cam_from_world.inverse(), false,
-                                                     before->covariance + tracked.covariance});
+  if (before && !tracked.starts_map) {  // one that does stands where the prior says
+    const auto& seen = tracked.by_observations;
+    std::string doubt =
+        priors_.add({before->cam_from_world * (seen ? seen->cam_from_world : tracked.cam_from_world).inverse(), false,
+                     before->covariance + (seen ? inverse(seen->information) : tracked.covariance)});
     if (!doubt.empty()) note(Event::Kind::warning, std::move(doubt));
   }
   if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));

@@ -26,20 +26,21 @@ Rigid3 noise(Random& random, double sd) {
   return rigid3_from_tangent(off);
 }
 
-// What a prior that claims kClaimed is scaled by after `steps` of it, of which `wrong(i)` is the error.
+// After `steps` of a prior that claims `claimed`, of which `wrong(i)` is the error.
 template <class Wrong>
-PriorCalibration after(int steps, const Wrong& wrong, bool rotation_only = false) {
+PriorCalibration after(int steps, const Wrong& wrong, bool rotation_only = false, double claimed = kClaimed) {
   Random random(7);
   PriorCalibration calibration;
   for (int i = 0; i < steps; ++i) {
-    const MotionPrior told{kStep * wrong(i, random), rotation_only, kClaimed * kClaimed * Matrix6d::Identity()};
+    const MotionPrior told{kStep * wrong(i, random), rotation_only, claimed * claimed * Matrix6d::Identity()};
     const MotionPrior seen{kStep * noise(random, kSeen), false, kSeen * kSeen * Matrix6d::Identity()};
-    calibration.add(*calibration.calibrated(frame_with(told)).prior(), seen);
+    calibration.calibrated(frame_with(told));
+    calibration.add(seen);
   }
   return calibration;
 }
 
-double scale_of(const PriorCalibration& calibration) {
+double scale_of(PriorCalibration calibration) {
   const MotionPrior prior{{}, false, Matrix6d::Identity()};
   return calibration.calibrated(frame_with(prior)).prior()->covariance(4, 4);
 }
@@ -47,18 +48,27 @@ double scale_of(const PriorCalibration& calibration) {
 TEST(PriorCalibration, LeavesAPriorThatKeepsItsWordAsItIs) {
   const auto honest = after(300, [](int, Random& r) { return noise(r, kClaimed); });
   EXPECT_NEAR(scale_of(honest), 1, 0.15);
-  EXPECT_FALSE(honest.contradicts_images());
-  EXPECT_EQ(scale_of(after(300, [](int, Random& r) { return noise(r, 0.1 * kClaimed); })), 1) << "never a smaller one";
+  EXPECT_FALSE(honest.contradict_images());
+  EXPECT_NEAR(scale_of(after(300, [](int, Random& r) { return noise(r, 0.1 * kClaimed); })), 1, 1e-9)
+      << "never a smaller one";
 }
 
 TEST(PriorCalibration, LearnsHowFarAPriorIsOff) {
   const auto proud = after(300, [](int, Random& r) { return noise(r, 3 * kClaimed); });
-  // Of sums of both variances, (9 * 4 + .25) / (4 + .25), with 20 steps beside these that are as they should be.
-  const double expected = (300 * 36.25 / 4.25 + 20) / 320;
-  EXPECT_NEAR(scale_of(proud), expected, 1);
+  EXPECT_NEAR(scale_of(proud), (300 * 9 + 20) / 320.0, 1) << "with 20 steps beside these that are as they should be";
   const auto turns = after(
       300, [](int, Random& r) { return noise(r, 3 * kClaimed); }, true);
-  EXPECT_NEAR(scale_of(turns), expected, 1.5) << "of three numbers rather than six";
+  EXPECT_NEAR(scale_of(turns), (300 * 9 + 20) / 320.0, 1.5) << "of three numbers rather than six";
+}
+
+// Where a prior claims to be far more exact than the images are, these must not stand in for its own error.
+TEST(PriorCalibration, LearnsHowFarAPriorIsOffThatClaimsToBeExact) {
+  constexpr double kReal = 4 * kSeen, kFactor = 40 * 40;
+  const auto proud = after(
+      300, [](int, Random& r) { return noise(r, kReal); }, false, 0.1 * kSeen);
+  EXPECT_GT(scale_of(proud), 0.7 * kFactor);
+  EXPECT_LT(scale_of(proud), 1.4 * kFactor);
+  EXPECT_FALSE(proud.say_nothing()) << "it is off by 2 mm in 3 cm";
 }
 
 TEST(PriorCalibration, TellsMotionsOfTheBaseFromThoseOfTheCamera) {
@@ -68,15 +78,23 @@ TEST(PriorCalibration, TellsMotionsOfTheBaseFromThoseOfTheCamera) {
   const Rigid3 cam_from_base(Eigen::Quaterniond(axes), Eigen::Vector3d::Zero());
   const Rigid3 of_base = cam_from_base.inverse() * kStep * cam_from_base;
   const auto wrong = [&](int, Random&) { return kStep.inverse() * of_base; };
-  EXPECT_FALSE(after(10, wrong).contradicts_images()) << "so few may be the images' fault";
-  EXPECT_TRUE(after(40, wrong).contradicts_images());
-  EXPECT_GT(scale_of(after(40, wrong)), 50);
+  EXPECT_FALSE(after(10, wrong).contradict_images()) << "so few may be the images' fault";
+  PriorCalibration calibration = after(40, wrong);
+  EXPECT_TRUE(calibration.contradict_images());
+  EXPECT_FALSE(calibration.calibrated(frame_with({})).prior()) << "that the camera stands still fits better";
+  // Somebody mends the axes.
+  const MotionPrior right{kStep, false, kClaimed * kClaimed * Matrix6d::Identity()};
+  for (int i = 0; i < 100; ++i) {
+    calibration.calibrated(frame_with(right));
+    calibration.add({kStep, false, kSeen * kSeen * Matrix6d::Identity()});
+  }
+  EXPECT_TRUE(calibration.calibrated(frame_with(right)).prior());
 }
 
 TEST(PriorCalibration, BearsStepsThatSlip) {
   const auto slips = after(300, [](int i, Random& r) { return noise(r, i % 4 == 0 ? 100 * kClaimed : kClaimed); });
   EXPECT_LT(scale_of(slips), 2);
-  EXPECT_FALSE(slips.contradicts_images());
+  EXPECT_FALSE(slips.contradict_images());
 }
 
 TEST(PriorCalibration, ForgetsWhatIsLongAgo) {

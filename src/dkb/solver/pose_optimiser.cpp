@@ -103,7 +103,7 @@ class PoseProblem {
     Vector6d gradient;     // half the derivative of the cost
     double cost;
   };
-  Normal normal_at(const Rigid3& pose, bool robust) {
+  Normal normal_at(const Rigid3& pose, bool robust, bool with_prior = true) {
     set_pose(pose);
     input_.observations.inv_depth_sigma = array(kUsedInvDepthSigma);
     input_.limits = {robust, options_.chi2_pixel, options_.chi2_depth};
@@ -116,7 +116,7 @@ class PoseProblem {
     }
     for (int i = 0; i < 6; ++i) n.gradient[i] = *h++;
     n.cost = *h;
-    if (prior_ != nullptr) {
+    if (prior_ != nullptr && with_prior) {
       // Between this camera and one at the prior's pose no motion was "measured".
       const auto r = solver::relative_pose_residual(pose, prior_->cam_from_world, Rigid3());
       n.information += r.jacobian_a.transpose() * prior_->information * r.jacobian_a;
@@ -251,6 +251,11 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   estimate.ok = true;
   estimate.cam_from_world = pose;
   estimate.covariance = axes * values.cwiseInverse().asDiagonal() * axes.transpose();
+  if (prior == nullptr) return estimate;
+  const PoseProblem::Normal seen = problem.normal_at(pose, false, false);
+  const Vector6d away = -solve_symmetric(seen.information, seen.gradient);
+  if (away.allFinite() && spectrum(seen.information).values[0] > 1e-12 * values[5])
+    estimate.by_observations = {solver::perturbed(pose, away), seen.information};
   return estimate;
 }
 

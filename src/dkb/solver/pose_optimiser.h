@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,6 +60,8 @@ struct PoseEstimate {
   // Of the right perturbation of world_from_cam, [translation m, rotation rad], camera axes, from the inliers (and the
   // prior) with the sigmas as given. Zero where not ok.
   Matrix6d covariance = Matrix6d::Zero();
+  // Where a prior stands beside the observations, what they say alone; nothing if they leave a direction open.
+  std::optional<PosePrior> by_observations;
   std::vector<uint8_t> inlier;  // per observation
   int inliers = 0;
   int iterations = 0;  // over all rounds

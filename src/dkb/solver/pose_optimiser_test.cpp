@@ -181,6 +181,11 @@ TEST(PoseOptimiser, APriorActsAsAMeasurement) {
   d << moved.translation, vector_from_rotation(moved.rotation);
   EXPECT_LT((d - 0.5 * offset).norm(), 0.1 * offset.norm());
   EXPECT_LT((2 * half.covariance - free.covariance).norm(), 0.1 * free.covariance.norm());
+  // What the observations say is known without the prior all the same.
+  ASSERT_TRUE(half.by_observations);
+  EXPECT_LT(distance(half.by_observations->cam_from_world, truth), 0.15 * offset.norm());
+  EXPECT_LT((half.by_observations->information * free.covariance - Matrix6d::Identity()).norm(), 0.2);
+  EXPECT_FALSE(free.by_observations);
   // Overwhelming information: the prior itself.
   prior.information = 1e12 * Matrix6d::Identity();
   const PoseEstimate held = optimise_pose(world.problem.camera, truth, observations, wide, &prior);

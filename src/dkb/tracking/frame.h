@@ -9,6 +9,7 @@
 #include "dkb/features/image_appearance.h"
 #include "dkb/geometry/rigid3.h"
 #include "dkb/map/ids.h"
+#include "dkb/solver/pose_optimiser.h"
 #include "dkb_slam/frame.h"
 
 namespace dkb {
@@ -32,7 +33,7 @@ struct PosePrediction {
   Rigid3 cam_from_world;
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
 
-  // It may weigh in a pose by the images: told by the camera itself, and not where the map shows another place.
+  // It may weigh in a pose by the images: not where the map shows another place.
   bool weighs = false;
 
   // Whether a pose by the images may be the same one.
@@ -64,6 +65,7 @@ struct TrackedFrame {
   Rigid3 seen_cam_from_cam;  // the camera that saw the features, from this one; identity unless it is predicted
   Rigid3 cam_from_world;     // by the map as tracking knew it at the time
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
+  std::optional<PosePrior> by_observations;    // the pose without what was predicted, where that weighed in it
   int inliers = 0;                             // among `points`
 
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }

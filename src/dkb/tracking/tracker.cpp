@@ -107,7 +107,7 @@ void Tracker::reset_motion() {
   place_evidence_.clear();
   // A map whose first keyframe mapping has not answered for yet is a map.
   state_ = state_ != TrackingState::initialising || map_.view().keyframe_count() > 0 ? TrackingState::lost
-                                                                                      : TrackingState::initialising;
+                                                                                     : TrackingState::initialising;
 }
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const {
@@ -280,6 +280,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
+  frame.by_observations = pose.by_observations;
   frame.inliers = static_cast<int>(inliers);
   return true;
 }
@@ -343,6 +344,7 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   frame.features = std::move(features);
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
+  frame.by_observations = pose.by_observations;
   return true;
 }
 

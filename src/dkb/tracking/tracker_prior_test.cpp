@@ -25,7 +25,8 @@ class ExpectedCamera : public TrackerTest {
     return step;
   }
   // The next frame shows `shown` of the scene's points; something tells the step.
-  TrackedFrame see(double i, size_t shown, const MotionPrior& step, const Eigen::Vector2f& moved = {0, 0}) {
+  TrackedFrame see(double i, size_t shown, const MotionPrior& step, const Eigen::Vector2f& moved = {0, 0},
+                   const MotionPrior* prior = nullptr) {
     ++index;
     ViewOptions options;
     options.seed = static_cast<uint64_t>(index);
@@ -38,7 +39,8 @@ class ExpectedCamera : public TrackerTest {
     RgbdFeatures features = subset(*view.features, some);
     move(features, moved, 10);
     const FakeFeatures fake(std::make_shared<const RgbdFeatures>(std::move(features)));
-    return tracker.track({.index = index, .timestamp = index * kFrameTime, .features = fake, .step = &step});
+    return tracker.track(
+        {.index = index, .timestamp = index * kFrameTime, .features = fake, .prior = prior, .step = &step});
   }
 };
 
@@ -59,6 +61,37 @@ TEST_F(ExpectedCamera, IsNotTakenAlongByPointsThatContradictIt) {
 
 TEST_F(ExpectedCamera, GoesOnWithoutTheImagesWhereTooFewPointsAreInView) {
   EXPECT_EQ(see(4, 7, step_to(4)).state, TrackingState::predicted);
+}
+
+// Wheels and the velocity so far tell the same step: each counts by its covariance.
+TEST_F(ExpectedCamera, StepsBetweenWheelsAndItsVelocity) {
+  const double now = (index + 1) * kFrameTime;
+  const MotionPrior by_velocity = *tracker.expected_step(now, nullptr);
+  const auto off = [&](const MotionPrior& step) {
+    return tangent_from_rigid3(by_velocity.previous_from_current.inverse() * step.previous_from_current);
+  };
+  MotionPrior wheels = by_velocity;
+  wheels.previous_from_current.translation += Eigen::Vector3d(0.03, 0, 0);
+  const Vector6d apart = off(wheels);
+  const MotionPrior half = *tracker.expected_step(now, &wheels);
+  EXPECT_LT((off(half) - 0.5 * apart).norm(), 0.01 * apart.norm());
+  EXPECT_LT((2 * half.covariance - by_velocity.covariance).norm(), 0.01 * by_velocity.covariance.norm());
+  wheels.covariance = 1e-6 * by_velocity.covariance;
+  EXPECT_LT((off(*tracker.expected_step(now, &wheels)) - apart).norm(), 1e-5);
+  wheels.covariance = 1e6 * by_velocity.covariance;
+  EXPECT_LT(off(*tracker.expected_step(now, &wheels)).norm(), 1e-5);
+}
+
+// A step that something beside the camera tells weighs in a pose as one by the camera's own depth does.
+TEST_F(ExpectedCamera, LeansOnWheelsByTheirCovariance) {
+  MotionPrior wheels = step_to(4);  // 3 cm off
+  const TrackedFrame frame = see(4, 30, wheels, {0, 0}, &wheels);
+  ASSERT_TRUE(frame.by_observations);
+  const double by_images = distance_between(frame.by_observations->cam_from_world, on_path(4));
+  const double apart = distance_between(frame.by_observations->cam_from_world, frame.cam_from_world);
+  EXPECT_LT(by_images, 0.01);
+  EXPECT_GT(apart, 1e-5) << "toward the wheels";
+  EXPECT_LT(apart, 0.005) << "but not to them: they claim 2 cm";
 }
 
 // The second frame of a map, of a camera that stands: nobody knows yet how fast it moves, and most of the corners are
