@@ -46,6 +46,8 @@ std::vector<Comparison> compare(const Suite& suite, const std::vector<Cell>& cel
       if (!ours.any_run() && !theirs.any_run()) continue;
       c.left_out += suite.seeds - static_cast<int>(pairs.ours.size());
       if (pairs.ours.empty()) continue;
+      if (const double a = ours.scored(), b = theirs.scored(); a < kEven * b || b < kEven * a)
+        c.uneven.push_back({suite.sequences[s].name, a, b});
       const MedianInterval here = mean_ratio({pairs}, {.seed = kSeed});
       if (here.known && here.interval.high < 1) c.better.push_back(suite.sequences[s].name);
       if (here.known && here.interval.low > 1) c.worse.push_back(suite.sequences[s].name);
@@ -108,6 +110,16 @@ std::vector<SweepResult> sweep_results(const Suite& suite, const std::vector<Cel
 
 std::vector<double> Cell::ape() const {
   return values(ape_of);
+}
+
+double Cell::scored() const {
+  const std::vector<double> shares =
+      values([](const RunRecord& r) { return r.ape ? std::optional<double>(r.scored_share()) : std::nullopt; });
+  return shares.empty() ? 0 : median_of(shares);
+}
+
+bool Comparison::is_uneven(const std::string& sequence) const {
+  return std::any_of(uneven.begin(), uneven.end(), [&](const Uneven& u) { return u.sequence == sequence; });
 }
 
 Results results_of(const Suite& suite, const std::vector<RunRecord>& records) {
