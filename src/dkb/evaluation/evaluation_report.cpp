@@ -22,7 +22,7 @@ std::string table_row(const char* name, const char* unit, const ErrorStatistics&
 
 std::string why_no_rotation(const Evaluation& e) {
   if (std::isfinite(e.rotation_sd_deg))
-    return fmt::format("not determined: the positions tell how the paths are turned to +-{:.2g} deg only",
+    return fmt::format("not determined: the positions tell how the paths are turned to +- {:.2g} deg only",
                        e.rotation_sd_deg);
   return "not determined: a path lies on a line or in one place, which can be turned about itself";
 }

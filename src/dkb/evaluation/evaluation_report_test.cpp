@@ -83,7 +83,7 @@ TEST(EvaluationReport, ARotationKnownTooRoughlySaysHowRoughly) {
   Evaluation e = example();
   e.rotation_determined = false, e.rotation_sd_deg = 12.3;
   e.ape.rotation = {};
-  EXPECT_NE(evaluation_table(e).find("not determined: the positions tell how the paths are turned to +-12 deg only"),
+  EXPECT_NE(evaluation_table(e).find("not determined: the positions tell how the paths are turned to +- 12 deg only"),
             std::string::npos);
 }
 

@@ -16,6 +16,8 @@
 namespace dkb {
 namespace {
 
+constexpr double kBeyondDoubt = 5;  // [standard errors] those of few, and alike, errors are rough themselves
+
 double degrees_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return vector_from_rotation(a.conjugate() * b).norm() * 180.0 / std::numbers::pi;
 }
@@ -131,7 +133,7 @@ std::vector<Eigen::Vector3d> errors_after(const Similarity3& to_from_from, const
 // their variances: that much is not counted.
 std::optional<double> wrong_scale(const Similarity3& best, const std::vector<Eigen::Vector3d>& errors,
                                   const std::vector<Eigen::Vector3d>& from) {
-  constexpr double kLeast = 0.1, kBeyondDoubt = 5;
+  constexpr double kLeast = 0.1;
   if (!(best.scale > 0)) return {};
   double squares = 0;
   for (const Eigen::Vector3d& e : errors) squares += e.squaredNorm() / static_cast<double>(errors.size());
@@ -246,8 +248,8 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const Eval
     e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
   }
   add_statistics(&e.ape);
-  constexpr double kTruth = 0.5;  // [deg] motion capture knows no better (Sturm et al., IROS 2012, section IV)
-  e.rotation_determined = e.rotation_sd_deg <= std::max(kTruth, e.ape.rotation.rmse / 3);
+  constexpr double kRough = 2;  // [deg] whole sequences know it to 0.3 ... 1, clips of seconds to 5 ... 20
+  e.rotation_determined = e.rotation_sd_deg <= std::max(kRough, e.ape.rotation.rmse / kBeyondDoubt);
   if (!e.rotation_determined) e.ape.rotation_deg.clear(), add_statistics(&e.ape);
 
   e.rpe_pairs = relative_pairs(e);

@@ -57,8 +57,8 @@ struct Evaluation {
   // [deg] standard error of the alignment's rotation about the axis that positions tell least of; infinite where either
   // path lies on a line or in one place.
   double rotation_sd_deg = 0;
-  // False where the rotation error is within three of these: it may be the alignment's alone, and is left out. An error
-  // of the alignment that is below motion capture's own never counts.
+  // False where that is more than 2 degrees, and the rotation error within five of them: it may be the alignment's
+  // alone, and is left out.
   bool rotation_determined = true;
   // By how much the estimate is to be enlarged to fit the truth best, where that is told from 1 beyond doubt: most
   // often a wrong depth factor. Nothing with `with_scale`.

@@ -156,23 +156,23 @@ TEST(Evaluate, ScaleIsTakenOutOnlyWhenAsked) {
 }
 
 TEST(Evaluate, HandComputedErrors) {
-  // A square in the xy plane; the estimate's corners stand 0.1 m above and below it in turn, so that the best alignment
-  // is none, and its cameras are turned by 10 degrees about z.
+  // A square in the xy plane; the estimate's corners stand 0.05 m above and below it in turn, so that the best
+  // alignment is none, and its cameras are turned by 10 degrees about z.
   Trajectory truth, estimate;
   const Eigen::Vector3d corners[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   for (int i = 0; i < 4; ++i) {
     truth.push_back(pose(i, corners[i]));
-    estimate.push_back(pose(i, corners[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 0.1 : -0.1), {0, 0, 10 * kDegree}));
+    estimate.push_back(pose(i, corners[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 0.05 : -0.05), {0, 0, 10 * kDegree}));
   }
   const Evaluation e = evaluate(truth, estimate);
-  EXPECT_NEAR(e.ape.translation.rmse, 0.1, 1e-12);
-  EXPECT_NEAR(e.ape.translation.min, 0.1, 1e-12);
+  EXPECT_NEAR(e.ape.translation.rmse, 0.05, 1e-12);
+  EXPECT_NEAR(e.ape.translation.min, 0.05, 1e-12);
   EXPECT_NEAR(e.ape.rotation.rmse, 10, 1e-9);
   EXPECT_NEAR(e.ape.rotation.max, 10, 1e-9);
-  // A step (1, 0, 0) is seen as (cos 10, -sin 10, +-0.2) by cameras that are turned: the error is
-  // sqrt((1 - cos 10)^2 + sin^2 10 + 0.04) = sqrt(2 - 2 cos 10 + 0.04) for each of the three steps.
+  // A step (1, 0, 0) is seen as (cos 10, -sin 10, +-0.1) by cameras that are turned: the error is
+  // sqrt((1 - cos 10)^2 + sin^2 10 + 0.01) = sqrt(2 - 2 cos 10 + 0.01) for each of the three steps.
   EXPECT_EQ(e.rpe.translation.count, 3u);
-  EXPECT_NEAR(e.rpe.translation.rmse, std::sqrt(2 - 2 * std::cos(10 * kDegree) + 0.04), 1e-12);
+  EXPECT_NEAR(e.rpe.translation.rmse, std::sqrt(2 - 2 * std::cos(10 * kDegree) + 0.01), 1e-12);
   EXPECT_NEAR(e.rpe.rotation.max, 0, 1e-9);
 }
 
