@@ -55,13 +55,6 @@ bool any_run(const Results& r, size_t sequence) {
                      [&](const Cell& c) { return c.sequence == sequence && c.any_run(); });
 }
 
-// Whether a report has a row or a column for it: what nobody asked for is not missing.
-bool shows(const Results& r, size_t variant) {
-  const auto& chosen = r.chosen_variants;
-  return chosen.empty() || std::find(chosen.begin(), chosen.end(), r.suite->variants[variant].name) != chosen.end() ||
-         std::any_of(r.cells.begin(), r.cells.end(),
-                     [&](const Cell& c) { return c.variant == variant && c.any_run(); });
-}
 double most_scored(const Results& r, size_t sequence) {
   double most = 0;
   for (const Cell& c : r.cells)
@@ -112,14 +105,14 @@ Section overview(const Results& r) {
   TextTable table;
   table.header = {"sequence"};
   for (size_t v = 0; v < r.suite->variants.size(); ++v)
-    if (shows(r, v)) table.header.push_back(r.suite->variants[v].name);
+    if (r.shows(v)) table.header.push_back(r.suite->variants[v].name);
   const bool published = !r.suite->published.ape_m.empty();
   if (published) table.header.push_back("published for other systems");
   for (size_t s = 0; s < r.suite->sequences.size(); ++s) {
     if (!any_run(r, s)) continue;
     std::vector<std::string> row = {r.suite->sequences[s].name};
     for (const Cell& c : r.cells)
-      if (c.sequence == s && shows(r, c.variant)) row.push_back(ape_cell(c, most_scored(r, s)));
+      if (c.sequence == s && r.shows(c.variant)) row.push_back(ape_cell(c, most_scored(r, s)));
     if (published) row.push_back(others(r, s));
     table.rows.push_back(row);
   }
@@ -144,7 +137,7 @@ Section comparison(const Results& r) {
   for (const Comparison& c : r.comparisons) {
     const auto variant = std::find_if(r.suite->variants.begin(), r.suite->variants.end(),
                                       [&](const SuiteVariant& v) { return v.name == c.variant; });
-    if (!shows(r, static_cast<size_t>(variant - r.suite->variants.begin()))) continue;
+    if (!r.shows(static_cast<size_t>(variant - r.suite->variants.begin()))) continue;
     const auto ratio = [](double x) { return fmt::format("{:.3f}", x); };
     const auto marked = [&](std::vector<std::string> sequences) {
       for (std::string& s : sequences) s += c.is_uneven(s) ? "*" : "";
@@ -183,10 +176,7 @@ Section details(const Results& r) {
     const auto of = [&](auto&& get) {
       return c.values([&](const RunRecord& run) { return std::optional<double>(get(run)); });
     };
-    const auto rotation = c.values([](const RunRecord& run) {
-      const bool known = run.ape && run.ape->rotation_deg.count > 0;
-      return known ? std::optional<double>(run.ape->rotation_deg.rmse) : std::nullopt;
-    });
+    const auto rotation = c.figures(&RunRecord::ape, &Scores::rotation_deg, &ErrorStatistics::rmse);
     const auto online = c.values(
         [](const RunRecord& run) { return run.online_m ? std::optional<double>(run.online_m->rmse) : std::nullopt; });
     const auto lost = of([](const RunRecord& run) { return 100 - 100 * run.tracked_share(); });
@@ -233,23 +223,16 @@ Section errors(const Results& r) {
                     "scored [%]"};
     for (const Cell& c : r.cells) {
       if (c.sequence != s || c.ape().empty()) continue;
-      const auto figure = [&](std::optional<Scores> RunRecord::*kind, ErrorStatistics Scores::*part,
-                              double ErrorStatistics::*of) {
-        return c.values([&](const RunRecord& run) {
-          const bool known = run.*kind && ((*(run.*kind)).*part).count > 0;
-          return known ? std::optional<double>((*(run.*kind)).*part.*of) : std::nullopt;
-        });
-      };
       const auto in_metres = [](const std::vector<double>& values) {
         return values.empty() ? kNone : metres(median_of(values));
       };
       std::vector<std::string> row = {variant_of(r, c).name};
       for (const auto of : {&ErrorStatistics::rmse, &ErrorStatistics::mean, &ErrorStatistics::median,
                             &ErrorStatistics::std, &ErrorStatistics::max})
-        row.push_back(in_metres(figure(&RunRecord::ape, &Scores::translation_m, of)));
-      row.push_back(number(figure(&RunRecord::ape, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
-      row.push_back(in_metres(figure(&RunRecord::rpe, &Scores::translation_m, &ErrorStatistics::rmse)));
-      row.push_back(number(figure(&RunRecord::rpe, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
+        row.push_back(in_metres(c.figures(&RunRecord::ape, &Scores::translation_m, of)));
+      row.push_back(number(c.figures(&RunRecord::ape, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
+      row.push_back(in_metres(c.figures(&RunRecord::rpe, &Scores::translation_m, &ErrorStatistics::rmse)));
+      row.push_back(number(c.figures(&RunRecord::rpe, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
       row.push_back(fmt::format("{:.1f}", 100 * c.scored()));
       table.rows.push_back(row);
     }
@@ -276,7 +259,7 @@ Section failures(const Results& r) {
         (chosen.empty() || std::find(chosen.begin(), chosen.end(), r.suite->sequences[s].name) != chosen.end()))
       missing.rows.push_back({"sequence " + r.suite->sequences[s].name, "all", r.suite->sequences[s].get});
   for (size_t v = 0; v < r.suite->variants.size(); ++v)
-    if (shows(r, v) &&
+    if (r.shows(v) &&
         std::none_of(r.cells.begin(), r.cells.end(), [&](const Cell& c) { return c.variant == v && c.any_run(); }))
       missing.rows.push_back({"variant " + r.suite->variants[v].name, "all", r.suite->variants[v].get});
   if (!missing.rows.empty()) section.tables.push_back(missing);

@@ -27,6 +27,9 @@ struct Cell {
       if (const std::optional<double> value = get(r)) all.push_back(*value);
     return all;
   }
+  // The same of an error, of the runs where it was measured.
+  std::vector<double> figures(std::optional<Scores> RunRecord::*kind, ErrorStatistics Scores::*part,
+                              double ErrorStatistics::*figure) const;
   std::vector<double> ape() const;  // [m] translation rmse
   double scored() const;            // median share of the pairs offered that the APE is of; 0 without any
 };
@@ -70,6 +73,8 @@ struct Results {
   std::vector<Comparison> comparisons;
   std::vector<SweepResult> sweep;
   std::vector<std::string> chosen_sequences, chosen_variants;  // none = all
+  // Whether a report has a row, a column and a bar for it: what nobody asked for is not missing.
+  bool shows(size_t variant) const;
 };
 // Statistics of `records`, which must be of the suite's runs.
 Results results_of(const Suite& suite, const std::vector<RunRecord>& records);

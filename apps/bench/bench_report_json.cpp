@@ -34,6 +34,12 @@ std::string results_json(const Results& r, const ReportOptions& options) {
     const std::vector<double> ape = c.ape();
     cell["ape_m"] = interval_json(median_interval(ape));
     cell["ape_m"]["worst"] = ape.empty() ? Json() : Json(*std::max_element(ape.begin(), ape.end()));
+    const auto median = [](const std::vector<double>& values) {
+      return values.empty() ? Json() : Json(median_of(values));
+    };
+    cell["ape_std_m"] = median(c.figures(&RunRecord::ape, &Scores::translation_m, &ErrorStatistics::std));
+    cell["rpe_m"] = median(c.figures(&RunRecord::rpe, &Scores::translation_m, &ErrorStatistics::rmse));
+    cell["rpe_deg"] = median(c.figures(&RunRecord::rpe, &Scores::rotation_deg, &ErrorStatistics::rmse));
     cell["scored_share"] = ape.empty() ? Json() : Json(c.scored());
     cell["runs"] = Json::array();
     for (const auto* runs : {&c.finished, &c.failed})
@@ -51,6 +57,7 @@ std::string results_json(const Results& r, const ReportOptions& options) {
                 {"sequences", c.sequences},
                 {"runs_left_out", c.left_out}};
     row["ratio"] = interval_json(c.ratio);
+    if (c.sequences == 0) row["ratio"]["median"] = nullptr;
     row["better"] = c.better;
     row["worse"] = c.worse;
     row["uneven"] = Json::array();

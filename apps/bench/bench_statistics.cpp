@@ -108,6 +108,15 @@ std::vector<SweepResult> sweep_results(const Suite& suite, const std::vector<Cel
 
 }  // namespace
 
+std::vector<double> Cell::figures(std::optional<Scores> RunRecord::*kind, ErrorStatistics Scores::*part,
+                                  double ErrorStatistics::*figure) const {
+  return values([&](const RunRecord& run) {
+    const std::optional<Scores>& scores = run.*kind;
+    const bool known = scores && ((*scores).*part).count > 0;
+    return known ? std::optional<double>((*scores).*part.*figure) : std::nullopt;
+  });
+}
+
 std::vector<double> Cell::ape() const {
   return values(ape_of);
 }
@@ -116,6 +125,12 @@ double Cell::scored() const {
   const std::vector<double> shares =
       values([](const RunRecord& r) { return r.ape ? std::optional<double>(r.scored_share()) : std::nullopt; });
   return shares.empty() ? 0 : median_of(shares);
+}
+
+bool Results::shows(size_t variant) const {
+  const auto& chosen = chosen_variants;
+  return chosen.empty() || std::find(chosen.begin(), chosen.end(), suite->variants[variant].name) != chosen.end() ||
+         std::any_of(cells.begin(), cells.end(), [&](const Cell& c) { return c.variant == variant && c.any_run(); });
 }
 
 bool Comparison::is_uneven(const std::string& sequence) const {
