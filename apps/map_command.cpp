@@ -48,9 +48,7 @@ void print_info(const std::string& path) {
     extent.extend(map.point(id)->position);
   }
   const Eigen::Vector3d size = extent.isEmpty() ? Eigen::Vector3d::Zero().eval() : extent.sizes().eval();
-  const auto removed = map.removed_points();
-  const auto fused =
-      std::count_if(removed.begin(), removed.end(), [](const RemovedPoint& r) { return r.replaced_by != kNoPoint; });
+  const size_t fused = map.removed_points().size();  // a file keeps no others
   const CameraModel& c = file.context.camera;
   tell(stdout, "file: {}\n", path);
   tell(stdout, "checksums: right\n");
@@ -61,7 +59,6 @@ void print_info(const std::string& path) {
   tell(stdout, "features: {}\n", features);
   tell(stdout, "points: {}\n", map.point_count());
   tell(stdout, "observations: {}\n", observations);
-  tell(stdout, "removed_points: {}\n", removed.size());
   tell(stdout, "fused_points: {}\n", fused);
   tell(stdout, "first_stamp_s: {:.6f}\n", first_stamp);
   tell(stdout, "last_stamp_s: {:.6f}\n", last_stamp);

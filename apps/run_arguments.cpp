@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which options of a run contradict each other.
+// Which options of a run contradict each other, and what they leave out.
 #include <algorithm>
 
 #include "dkb/dataset/detector_choice.h"
@@ -45,6 +45,12 @@ void check_arguments(const RunArguments& args, const Options& options) {
     throw InputError("--cv-orb: reads the images again, which a camera does not give twice; leave it out");
   if (!args.viewer.on && args.viewer.exit) throw InputError("--viewer-exit: there is no page; add --viewer");
   if (!args.viewer.on && args.viewer.has_host) throw InputError("--viewer-host: there is no page; add --viewer");
+}
+
+bool takes_all_images(const RunArguments& args) {
+  const SourceOptions whole;
+  return args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
+         args.reading.end == whole.end && !args.reading.max_frames;
 }
 
 }  // namespace dkb

@@ -68,6 +68,8 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_flag("--final-ba", args->final_ba, "Adjust the whole map once more at the end");
   command->add_flag("--dense", args->dense, "Also write the dense map of the still world and its occupancy grid");
   command->add_flag("--dump-features", args->dump_features, "Write features.csv");
+  command->add_flag("--dump-boxes", args->dump_boxes,
+                    "Write detections.txt: the boxes that were used, as --detector file reads them");
   command->add_flag("--debug-log", args->debug_log,
                     "Write debug.log: each frame's state, and why it became a keyframe or did not");
   add_viewer_options(*command, args->viewer);

@@ -14,6 +14,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/map/point_cloud.h"
 #include "dkb/util/files.h"
+#include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
@@ -55,9 +56,18 @@ void write_by_map(const std::filesystem::path& folder, const std::string& name, 
   for (const auto& there : stale) std::filesystem::remove(folder / there);
 }
 
+// [1/s] of frames with these stamps; 0 where they do not tell.
+double frame_rate(const std::vector<std::string>& stamps) {
+  if (stamps.size() < 2) return 0;
+  const auto first = parse_stamp_ns(stamps.front()), last = parse_stamp_ns(stamps.back());
+  if (!first || !last || *last <= *first) return 0;
+  return 1e9 * static_cast<double>(stamps.size() - 1) / static_cast<double>(*last - *first);
+}
+
 std::string stats_json(const Statistics& s, const RunFacts& facts) {
   nlohmann::ordered_json j;
   j["frames"] = facts.offered;
+  j["interrupted"] = facts.interrupted;
   j["tracked"] = s.tracked;
   j["predicted"] = s.predicted;
   j["lost"] = s.lost;
@@ -85,16 +95,23 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
   }
   j["keyframe_tests"] = s.keyframe_tests;
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.points_retracted}};
-  j["detector"] = {
-      {"kind", s.detector}, {"rate_hz", s.detector_rate_hz}, {"latency_frames", s.detector_latency_frames}};
-  if (!s.detector_inference.empty()) j["detector"]["inference"] = s.detector_inference;
+  // Boxes of a file, masks and motion tell of every frame.
+  const bool prompt = s.detector != "none" && s.detector_latency_frames == 0 && s.detector_rate_hz == 0;
+  j["detector"] = {{"kind", s.detector},
+                   {"rate_hz", prompt ? frame_rate(facts.stamps) : s.detector_rate_hz},
+                   {"latency_frames", s.detector_latency_frames}};
+  if (!s.detector_inference.empty()) {
+    j["detector"]["inference"] = s.detector_inference;
+    j["detector"]["model"] = facts.model;
+  }
   if (s.detector_failed) j["detector"]["failed"] = true;
   if (facts.dropped) j["realtime"] = {{"dropped", *facts.dropped}, {"degraded_s", s.degraded_s}};
   j["mapping"] = {{"points_created", s.points_created},
                   {"points_culled", s.points_culled},
                   {"points_fused", s.points_fused},
                   {"keyframes_culled", s.keyframes_culled}};
-  return j.dump(2) + "\n";
+  j["run"] = nlohmann::ordered_json::parse(facts.run_json);
+  return j.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
@@ -133,6 +150,7 @@ void write_outputs(const std::filesystem::path& folder, const Slam& slam, const 
   write_movers(folder / "movers.csv", facts.movers);
   if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
   if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
+  if (!facts.detections.empty()) write_file_atomically(folder / "detections.txt", facts.detections);
 }
 
 void write_statistics(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
@@ -143,9 +161,10 @@ void remove_earlier_outputs(const std::filesystem::path& folder, const RunFacts&
   if (facts.writes_map) written.insert({"map.dkb", "map.ply"});
   if (!facts.features_csv.empty()) written.insert("features.csv");
   if (!facts.debug_log.empty()) written.insert("debug.log");
+  if (!facts.detections.empty()) written.insert("detections.txt");
   std::error_code ignored;
   for (const char* name : {"map.dkb", "map.ply", "dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs",
-                           "features.csv", "debug.log", "cv_orb.json"})
+                           "features.csv", "detections.txt", "debug.log", "cv_orb.json"})
     if (!written.contains(name)) std::filesystem::remove(folder / name, ignored);
 }
 

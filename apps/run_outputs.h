@@ -22,6 +22,10 @@ struct RunFacts {
   std::string config_yaml;
   std::string features_csv;  // empty = not asked for
   std::string debug_log;     // likewise
+  std::string detections;    // likewise
+  std::string run_json;      // what was run
+  std::string model;         // file name of the network, should there be one
+  bool interrupted = false;
   MoverRows movers;
   StageTimes times;  // of stages that the system does not have
   bool writes_map = true;

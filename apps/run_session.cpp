@@ -18,10 +18,13 @@
 #include "bench/bench_cv_orb.h"
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
+#include "dkb/dataset/image_codecs.h"
+#include "dkb/dataset/movers_file.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/detection/boxes_file.h"
 #include "dkb/detection/mask_folder.h"
+#include "dkb/evaluation/evaluation_report.h"
 #include "dkb/map/map_file.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
@@ -30,6 +33,7 @@
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
+#include "run_provenance.h"
 #include "terminal.h"
 
 namespace dkb {
@@ -61,6 +65,13 @@ fs::path default_output(const fs::path& source) {
 void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
   for (const FeatureReport& f : result.features)
     csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
+}
+
+// A row as boxes files have it.
+void append_boxes(std::string& text, const std::string& stamp, const FrameResult& result) {
+  for (const Detection& d : result.detections)
+    text += fmt::format("{} {} {:.2f} {:.2f} {:.2f} {:.2f} {:.3f}\n", stamp, written_class(d.class_name), d.box.x,
+                        d.box.y, d.box.w, d.box.h, d.score);
 }
 
 void append_frame(std::string& log, const std::string& stamp, const FrameResult& result) {
@@ -123,13 +134,6 @@ std::optional<double> cv_orb_of(const RunArguments& args, const Source& source, 
     return measure_cv_orb(folder->pairs(), folder->camera());
   const std::unique_ptr<Source> again = open_source(args, false);
   return measure_cv_orb(*again, static_cast<size_t>(pairs));
-}
-
-// Of the images of a part, boxes and masks may show nobody.
-bool takes_all_images(const RunArguments& args) {
-  const SourceOptions whole;
-  return args.reading.skip_pairs == whole.skip_pairs && args.reading.start == whole.start &&
-         args.reading.end == whole.end && !args.reading.max_frames;
 }
 
 DetectorChoice detector_choice(const RunArguments& args, const Options& options, const ReaderSource* source) {
@@ -248,6 +252,7 @@ RunSession::RunSession(const RunArguments& args)
   if (!args.quiet) tell(stdout, "{}, results in {}\n", recording_->description(), out_.string());
 
   facts_.writes_map = !args.localize;
+  if (args.dump_boxes) facts_.detections = "# rgb_timestamp class x y w h score\n";
   if (args.dump_features) facts_.features_csv = "timestamp,x,y,state\n";
   log_.emplace(recording_->size());
   if (args.realtime && !live_) paced_.emplace(*recording_);
@@ -312,7 +317,9 @@ void RunSession::track() {
     } else {
       facts_.stamps.push_back(next.stamp);
       had_prior_ = had_prior_ || next.frame.prior();
-      if (boxes_ && boxes_->at(next.frame.stamp_ns()) != nullptr) boxes_.reset();
+      if (const TimedBoxes* boxes = boxes_ ? boxes_->at(next.frame.stamp_ns()) : nullptr)
+        boxed_.insert(boxes->timestamp);
+      warn_of_darkness(next.frame);
       without_mask_ += masks_ && !masks_->has(next.frame.stamp_ns());
       show(next, slam_->process(next.frame));
     }
@@ -338,6 +345,7 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   log_->frame(next.frame, result);
   std::vector<Event> events = take_events();
   if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
+  if (args_.dump_boxes) append_boxes(facts_.detections, next.stamp, result);
   if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
   progress_->frame(next.index + 1, &result);
   if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
@@ -345,8 +353,7 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
 }
 
 void RunSession::write(double seconds) {
-  if (!interrupted_.empty())
-    facts_.offered = std::max(facts_.offered, static_cast<int>(recording_->size().value_or(0)));
+  facts_.interrupted = !interrupted_.empty();
   if (paced_ || live_) {
     facts_.dropped = static_cast<int>(source_->counts().dropped);
     facts_.skipped += *facts_.dropped;
@@ -355,6 +362,8 @@ void RunSession::write(double seconds) {
   if (live_) facts_.offered = static_cast<int>(facts_.stamps.size()) + facts_.skipped;
   facts_.wall_s = seconds;
   facts_.config_yaml = options_.to_yaml();
+  facts_.run_json = run_json(args_, options_, recording_->camera());
+  facts_.model = model_of(args_.detection).filename().string();
   if (reader_ != nullptr) facts_.times = reader_->times();
   std::set<std::string> written;           // of what not every run writes
   if (slam_->statistics().tracked == 0) {  // an earlier map is better than none
@@ -392,7 +401,10 @@ void RunSession::write(double seconds) {
   remove_earlier_outputs(out_, facts_, written);
   if (!truth.note.empty() && !reported.trajectory.empty())
     warnings_.warn("ground truth", truth.note + "; the run is not judged by it");
+  if (truth.hidden > 0) warnings_.warn("hidden truth", "groundtruth.txt: " + hidden_text(truth.hidden));
   if (truth.evaluation) ape_ = truth.evaluation->ape.translation;
+  if (truth.evaluation && truth.evaluation->wrong_scale)
+    warnings_.warn("scale", "groundtruth.txt: " + scale_text(*truth.evaluation->wrong_scale));
   if (no_dense_map) std::rethrow_exception(no_dense_map);
 }
 
@@ -404,11 +416,6 @@ void RunSession::write_dense(std::set<std::string>& written) {
   if (!args_.quiet) tell(stdout, "{}\n", line);
   written.insert("dense.ply");
   if (map.grid) written.insert({"occupancy.pgm", "occupancy.yaml"});
-}
-
-void RunSession::warn_of_viewer() {
-  if (!viewer_) return;
-  for (const std::string& line : viewer_->take_warnings()) warnings_.warn(line, line);
 }
 
 int RunSession::tell_the_end() {
@@ -436,33 +443,6 @@ int RunSession::tell_the_end() {
          "units of the camera's depth_factor ({} per metre; float images are in metres)?{}\n",
          options_.tracking.initial_points, opened_.camera().depth_factor, live_ ? "" : depths_of(args_));
   return 1;
-}
-
-// No frame is lost in silence.
-void RunSession::warn_of_dropped(size_t next_index) {
-  const std::string why = "the machine is too slow for this pace";
-  for (const int64_t dropped = source_->counts().dropped; dropped_ < dropped; ++dropped_)
-    warnings_.warn("frame dropped, " + why, fmt::format("frame {}: one before it was dropped, {}", next_index, why));
-}
-
-// Files of another recording would do nothing in silence.
-void RunSession::warn_of_unused() {
-  if (boxes_ && !facts_.stamps.empty())
-    warnings_.warn("--boxes",
-                   args_.detection.boxes.string() + ": no box has the stamp of a frame; are they of this run?");
-  if (without_mask_ > 0)
-    warnings_.warn("--masks",
-                   without_mask_ == facts_.stamps.size()
-                       ? args_.detection.masks.string() + ": no mask has the stamp of a frame; are they of this run?"
-                       : fmt::format("{}: {} of {} frames have no mask", args_.detection.masks.string(), without_mask_,
-                                     facts_.stamps.size()));
-  if (!args_.prior_file.empty() && !had_prior_ && facts_.stamps.size() > 1)
-    warnings_.warn("--prior-file",
-                   args_.prior_file + ": tells of no frame's motion; are its times those of the images?");
-}
-
-void RunSession::warn_of_source() {
-  for (const std::string& line : recording_->take_warnings()) warnings_.warn(line, line);
 }
 
 }  // namespace dkb

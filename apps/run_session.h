@@ -45,14 +45,17 @@ struct RunArguments {
   ViewerArguments viewer;
   bool localize = false;
   bool live = false;  // by the command `live`
-  bool realtime = false, dense = false, final_ba = false, dump_features = false, debug_log = false, cv_orb = false,
-       quiet = false;
+  bool realtime = false, dense = false, final_ba = false, dump_features = false, dump_boxes = false, debug_log = false,
+       cv_orb = false, quiet = false;
 };
 
 // Refuses options that contradict each other. Throws InputError.
 void check_arguments(const RunArguments& args, const Options& options);
 // Throws InputError for an option that is for a detector which was not chosen.
 void check_detector(const DetectorChoice& choice, bool has_model);
+
+// Whether no option leaves out a part: of the images of a part, boxes and masks may show nobody.
+bool takes_all_images(const RunArguments& args);
 
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {
@@ -74,6 +77,8 @@ class RunSession {
   void warn_of_source();
   void warn_of_viewer();
   void warn_of_unused();
+  void warn_of_stray_boxes();
+  void warn_of_darkness(const Frame& frame);
   void warn_of_dropped(size_t next_index);
 
   RunArguments args_;
@@ -94,10 +99,12 @@ class RunSession {
 
   RunFacts facts_;
   std::optional<report::RunLog> log_;
-  std::shared_ptr<const FileDetector> boxes_;  // while no frame had one of its boxes
+  std::shared_ptr<const FileDetector> boxes_;  // where there are any
+  std::set<double> boxed_;                     // stamps [s] of them that a frame had
   std::shared_ptr<const MaskFolder> masks_;    // where there are any
   size_t without_mask_ = 0;                    // frames that none of them belongs to
   bool had_prior_ = false;
+  int brightest_ = 0;  // grey of the first frames
   LiveReport camera_;
   std::optional<Progress> progress_;
   std::exception_ptr failure_;

@@ -62,13 +62,21 @@ TEST_F(Bench, ReportsEveryRunAndDoesNotRepeatIt) {
       EXPECT_EQ(run["frames"], 6);
       EXPECT_EQ(run["tracked"], 6);
       EXPECT_LT(run["ape"]["translation_m"]["rmse"], 0.05);
+      EXPECT_GT(run["ape"]["translation_m"]["std"], 0);
+      EXPECT_EQ(run["rpe"]["translation_m"]["count"], 5) << "over one frame";
+      EXPECT_EQ(run["scored"], 6);
+      EXPECT_EQ(run["maps"], 1);
       EXPECT_GT(run["map_bytes"], 1000);
       EXPECT_GT(run["machine"]["tracking_ms"], 0);
     }
+    EXPECT_EQ(cell["scored_share"], 1);
+    EXPECT_GT(cell["rpe_m"], 0);
+    EXPECT_GT(cell["ape_std_m"], 0);
     EXPECT_NE(cell["runs"][0]["ape"], cell["runs"][1]["ape"]) << "seed 2 leaves out the first pair";
   }
   const std::string markdown = read_text(temp_.path() / "out" / "results.md");
-  for (const char* says : {"| short | ORB | 2 | 6 |", "## Against ORB", "## Times and memory"})
+  for (const char* says : {"| short | ORB | 2 | 6 |", "## Against ORB", "## Times and memory", "## Errors by sequence",
+                           "| short | APE RMSE [m] |"})
     EXPECT_NE(markdown.find(says), std::string::npos) << says;
   EXPECT_NE(read_text(temp_.path() / "out" / "report.html").find("<svg"), std::string::npos);
   for (const char* plot : {"ape.svg", "short-bars.svg", "short-paths.svg"})
@@ -169,6 +177,37 @@ TEST_F(Bench, MergedShardsEqualTheWhole) {
     EXPECT_EQ(read_text(temp_ / "whole" / name), read_text(temp_ / "merged" / name)) << name;
   for (const auto& plot : fs::directory_iterator(temp_ / "whole" / "plots"))
     EXPECT_EQ(read_text(plot.path()), read_text(temp_ / "merged" / "plots" / plot.path().filename().string()));
+}
+
+TEST_F(Bench, ATruthWithHiddenMarkersIsScored) {
+  const fs::path folder = temp_ / "data";
+  copy_sequence(folder, 6, false);
+  write_text(folder / "groundtruth.txt", read_text(folder / "groundtruth.txt") + "1e9 nan nan nan nan nan nan nan\n");
+  const Finished run = bench(
+      {suite("seeds: 1\nsequences:\n  short: {path: " + folder.string() + "}\nvariants:\n  plain: {detector: none}\n")
+           .string(),
+       "--out", out()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(results()["cells"][0]["runs"][0]["scored"], 6);
+  EXPECT_TRUE(fs::exists(temp_.path() / "out" / "plots" / "short-paths.svg"));
+}
+
+TEST_F(Bench, WhatNobodyChoseIsNotMissing) {
+  const std::string text = "seeds: 1\nmax_frames: 4\nsequences:\n  short: {path: " + sequence().string() +
+                           "}\nvariants:\n  a:\n  b: {get: set it}\n  c: {get: set it}\n";
+  const auto report = [&](const std::string& variant) {
+    const Finished run = bench({suite(text).string(), "--out", out(), "--variant", variant});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return read_text(temp_.path() / "out" / "results.md");
+  };
+  const std::string one = report("a");
+  EXPECT_EQ(one.find("variant b"), std::string::npos) << one;
+  EXPECT_EQ(one.find("not run"), one.find("not run\n")) << "but for the title of that section";
+  EXPECT_NE(one.find("1 of 3 variants"), std::string::npos) << one;
+  EXPECT_EQ(read_text(temp_.path() / "out" / "plots" / "ape.svg").find(">b<"), std::string::npos);
+  const std::string two = report("b");
+  EXPECT_NE(two.find("2 of 3 variants"), std::string::npos) << "what was chosen in a folder adds up";
+  EXPECT_NE(two.find("| short | a |"), std::string::npos);
 }
 
 TEST_F(Bench, DrawsSimulatedSequencesAndNamesWhatIsMissing) {

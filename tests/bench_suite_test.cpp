@@ -267,6 +267,25 @@ TEST(BenchReport, ComparesRunsOfTheSameSeedWithTheReference) {
   EXPECT_NEAR(results.comparisons[2].ratio.median, 0.012 / 0.022, 1e-12);
 }
 
+// A system that loses track after a fifth of the frames is scored on these alone.
+TEST(BenchReport, MarksRatiosOfFramesThatTheOtherDidNotScore) {
+  const Suite suite = parse(kSuite);
+  std::vector<RunRecord> all = records();
+  for (RunRecord& r : all) {
+    r.ape->translation_m.count = r.sequence == "room" && r.variant == "w=1.0" ? 4 : 19;
+    if (r.variant == "default" && r.seed == 1) r.ape->translation_m.count = 2;  // one run of two or three
+  }
+  const Results results = results_of(suite, all);
+  EXPECT_DOUBLE_EQ(results.cells[0].scored(), 0.95);
+  ASSERT_EQ(results.comparisons.size(), 4u);
+  const Comparison& c = results.comparisons[2];
+  ASSERT_EQ(c.uneven.size(), 1u);
+  EXPECT_EQ(c.uneven[0].sequence, "room");
+  EXPECT_DOUBLE_EQ(c.uneven[0].ours, 0.2);
+  EXPECT_DOUBLE_EQ(c.uneven[0].reference, 0.95);
+  EXPECT_TRUE(results.comparisons[3].uneven.empty());
+}
+
 TEST(BenchReport, SaysThatASweepWithoutEffectIsNoise) {
   const Suite suite = parse(kSuite);
   const Results results = results_of(suite, records());
@@ -281,6 +300,11 @@ TEST(BenchReport, RecordsSurviveWritingAndReading) {
   RunRecord r = records()[4];
   r.machine.cv_orb_ms = 4.5;
   r.online_m = ErrorStatistics();
+  r.rpe = Scores();
+  r.rpe->rotation_deg.rmse = 0.25;
+  r.maps = 3;
+  EXPECT_EQ(parse_record(record_json(r), "r").rpe->rotation_deg.rmse, 0.25);
+  EXPECT_EQ(parse_record(record_json(r), "r").maps, 3);
   const std::string text = record_json(r);
   EXPECT_EQ(record_json(parse_record(text, "r")), text);
   Random random(7);

@@ -189,6 +189,104 @@ TEST(RunCommand, OfAPartMasksMayShowNobody) {
   EXPECT_NE(whole.finished.err.find("masks: 39 of 40 frames have no mask"), std::string::npos) << whole.finished.err;
 }
 
+TEST(RunCommand, BoxesWithoutAnImageAreCounted) {
+  const TempFolder temp;
+  const auto rows = rows_of(sequence() / "rgb.txt");
+  const auto warned = [&](const std::function<std::string(size_t)>& stamp, const std::vector<std::string>& more) {
+    std::string text;
+    for (size_t i = 0; i < rows.size(); i += 2) text += stamp(i) + " person 10 10 50 50\n";
+    write_text(temp / "boxes.txt", text);
+    std::vector<std::string> options = {"--detector", "file", "--boxes", temp / "boxes.txt"};
+    options.insert(options.end(), more.begin(), more.end());
+    const SlamRun run(sequence(), temp / "out", options);
+    EXPECT_EQ(run.finished.exit_code, 0) << run.finished.err;
+    return run.finished.err;
+  };
+  const auto whole = [&](size_t i) { return rows[i][0]; };
+  EXPECT_EQ(warned(whole, {"--quiet"}), "") << "images without people need no line";
+  EXPECT_EQ(warned(whole, {"--quiet", "--start", "0.4", "--max-frames", "12"}), "") << "the others are of other frames";
+  // Stamps with two decimals: of 33.3 ms apart, those at 0 and 0.2 s, 0.4 s ... are exact.
+  const auto rounded = [&](size_t i) { return rows[i][0].substr(0, rows[i][0].find('.') + 3); };
+  EXPECT_NE(warned(rounded, {"--quiet"}).find(" of 20 stamps belong to no image (within 2 ms)"), std::string::npos);
+}
+
+TEST(RunCommand, TheBoxesThatWereUsedServeAgain) {
+  const TempFolder temp;
+  const std::string stamp = rows_of(sequence() / "rgb.txt")[3][0];
+  write_text(temp / "boxes.txt", stamp + " person 10 20 50 60.5 0.75\n");
+  const SlamRun run(sequence(), temp / "out",
+                    {"--detector", "file", "--boxes", temp / "boxes.txt", "--dump-boxes", "--max-frames", "6"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(read_text(run.out / "detections.txt"),
+            "# rgb_timestamp class x y w h score\n" + stamp + " person 10.00 20.00 50.00 60.50 0.750\n");
+  const SlamRun again(sequence(), temp / "again",
+                      {"--detector", "file", "--boxes", run.out / "detections.txt", "--max-frames", "6"});
+  EXPECT_EQ(read_text(run.out / "trajectory.txt"), read_text(again.out / "trajectory.txt"));
+  const SlamRun without(sequence(), temp / "out", {"--max-frames", "6"});
+  EXPECT_FALSE(fs::exists(run.out / "detections.txt")) << "one of an earlier run";
+}
+
+TEST(RunCommand, StatisticsTellWhatWasRun) {
+  const TempFolder temp;
+  const std::string stamp = rows_of(sequence() / "rgb.txt")[3][0];
+  write_text(temp / "boxes.txt", stamp + " person 10 20 50 60\n");
+  const SlamRun run(
+      sequence(), temp / "out",
+      {"--detector", "file", "--boxes", temp / "boxes.txt", "--skip-pairs", "1", "--end", "0.5", "--seed", "7"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_EQ(run.stats.at("interrupted"), false);
+  const auto& made = run.stats.at("run");
+  EXPECT_EQ(made.at("program").get<std::string>().find(run_program({"--version"}).out.substr(9, 5)), 0u) << made;
+  EXPECT_EQ(made.at("arguments")[0], "run");
+  EXPECT_NE(std::find(made.at("arguments").begin(), made.at("arguments").end(), "--skip-pairs"),
+            made.at("arguments").end());
+  EXPECT_EQ(made.at("source"), sequence().string());
+  EXPECT_EQ(made.at("camera").at("width"), 640);
+  EXPECT_EQ(made.at("seed"), 7);
+  EXPECT_EQ(made.at("skip_pairs"), 1);
+  EXPECT_EQ(made.at("end"), 0.5);
+  EXPECT_TRUE(made.at("max_frames").is_null());
+  EXPECT_NEAR(run.stats.at("detector").at("rate_hz").get<double>(), 30, 0.5) << "a file answers every frame";
+  const SlamRun none(sequence(), temp / "out", {"--detector", "none", "--max-frames", "6"});
+  EXPECT_EQ(none.stats.at("detector").at("rate_hz"), 0);
+}
+
+TEST(RunCommand, GreyOfTwelveBitsIsWarnedOf) {
+  const TempFolder temp;
+  const auto warned = [&](int factor) {
+    const fs::path folder = temp / std::to_string(factor);
+    copy_sequence(folder, 6, true);
+    for (const auto& row : rows_of(folder / "associations.txt")) {
+      const GreyImage grey = read_grey(folder / row[1]);
+      Image<uint16_t> wide(grey.width(), grey.height());
+      for (size_t i = 0; i < grey.size(); ++i) wide.data()[i] = static_cast<uint16_t>(factor * grey.data()[i]);
+      fs::remove(folder / row[1]);
+      write_image_file(folder / row[1], encode_png(wide));
+    }
+    return SlamRun(folder, temp / "out", {"--quiet"}).finished.err;
+  };
+  EXPECT_NE(warned(16).find("use the lower 12 alone"), std::string::npos) << "12 bits";
+  EXPECT_EQ(warned(256).find("use the lower"), std::string::npos);
+}
+
+TEST(RunCommand, AWrongDepthFactorAndHiddenMarkersAreToldBesideTheError) {
+  const TempFolder temp;
+  const fs::path folder = temp / "sequence";
+  copy_sequence(folder, 30, false);
+  std::string truth = read_text(folder / "groundtruth.txt");
+  truth.insert(truth.find('\n') + 1, "1.0 nan nan nan nan nan nan nan\n");
+  write_text(folder / "groundtruth.txt", truth);
+  std::string camera = read_text(folder / "camera.yaml");
+  camera.replace(camera.find("depth_factor: 5000"), 18, "depth_factor: 7000");
+  write_text(folder / "camera.yaml", camera);
+  const SlamRun run(folder, temp / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_NE(run.finished.err.find("groundtruth.txt: 1 rows with nan are left out"), std::string::npos)
+      << run.finished.err;
+  EXPECT_NE(run.finished.err.find("times too small for the truth; is the depth factor right?"), std::string::npos)
+      << run.finished.err;
+}
+
 TEST(RunCommand, ShowsProgressUnlessQuiet) {
   const TempFolder temp;
   const Finished loud = run_program(
@@ -342,6 +440,8 @@ TEST(RunCommand, AnInterruptWritesWhatThereIs) {
   EXPECT_EQ(finished.exit_code, 130) << finished.err;
   const auto stats = nlohmann::json::parse(read_text(out / "stats.json"));
   EXPECT_GE(stats.at("tracked"), 1);
+  EXPECT_EQ(stats.at("interrupted"), true);
+  EXPECT_LE(stats.at("frames"), 12) << "those that were offered: the pipe, and what was decoded beside it";
   EXPECT_EQ(rows_of(out / "trajectory.txt").size(), stats.at("tracked").get<size_t>());
   for (const char* name : {"trajectory_online.txt", "keyframes.txt", "map.dkb", "map.ply", "config.yaml"})
     EXPECT_TRUE(fs::exists(out / name)) << name;

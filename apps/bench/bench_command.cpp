@@ -72,8 +72,14 @@ int merge(const BenchArguments& args) {
   const fs::path into = args.out.empty() ? from : fs::path(args.out);
   if (into == from && parts.front() != from)
     throw InputError(args.merge + ": holds several results folders; name one for the whole with --out");
-  const ResultsFolder whole = ResultsFolder::open(into, first.text(), first.suite());
-  for (const fs::path& part : parts) merge_into(whole, ResultsFolder::read(part));
+  for (const fs::path& part : parts) {
+    const ResultsFolder from_part = ResultsFolder::read(part);
+    SuiteText text = first.text();
+    text.sequences = from_part.text().sequences;
+    text.variants = from_part.text().variants;
+    merge_into(ResultsFolder::open(into, text, first.suite()), from_part);
+  }
+  const ResultsFolder whole = ResultsFolder::read(into);
   size_t there = 0;
   const std::vector<Job> jobs = jobs_of(whole.suite());
   for (const Job& job : jobs) there += whole.record(job).has_value();
@@ -88,6 +94,8 @@ int measure(const BenchArguments& args) {
   SuiteText text = read_suite(args.suite);
   text.seeds = args.seeds;
   text.max_frames = args.max_frames;
+  text.sequences = args.sequences;
+  text.variants = args.variants;
   const Suite suite = parse_suite(text);
   const auto sequences = chosen(args.sequences, suite.sequences, "sequence");
   const auto variants = chosen(args.variants, suite.variants, "variant");

@@ -51,6 +51,7 @@ class Plotter {
       const std::string& name = suite.variants[v].name;
       if (!suite.plotted.empty() && std::find(suite.plotted.begin(), suite.plotted.end(), name) == suite.plotted.end())
         continue;
+      if (!results.shows(v)) continue;
       variants_.push_back(v);
       names_.push_back(name);
     }
@@ -97,7 +98,8 @@ class Plotter {
   std::string paths_plot(size_t s) const {
     std::error_code ignored;
     if (!fs::exists(folder_.truth_path(s), ignored)) return "";
-    const Trajectory truth = read_trajectory(folder_.truth_path(s));
+    size_t hidden = 0;
+    const Trajectory truth = read_trajectory(folder_.truth_path(s), &hidden);
     std::vector<ComparedPath> paths;
     for (size_t k = 0; k < variants_.size(); ++k) {
       const RunRecord* run = middle_run(cell(s, variants_[k]));

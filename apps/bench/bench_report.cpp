@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "bench/bench_plots.h"
@@ -17,7 +16,6 @@
 namespace dkb::bench {
 namespace {
 
-using Json = nlohmann::ordered_json;
 const std::string kNone = "n/a";
 
 // A section of the report, written alike as Markdown and as HTML.
@@ -57,13 +55,22 @@ bool any_run(const Results& r, size_t sequence) {
                      [&](const Cell& c) { return c.sequence == sequence && c.any_run(); });
 }
 
-std::string ape_cell(const Cell& c) {
+double most_scored(const Results& r, size_t sequence) {
+  double most = 0;
+  for (const Cell& c : r.cells)
+    if (c.sequence == sequence) most = std::max(most, c.scored());
+  return most;
+}
+
+// `most`: the largest share that any variant scored.
+std::string ape_cell(const Cell& c, double most) {
   if (!c.any_run()) return "not run";
   const std::vector<double> ape = c.ape();
   std::string text;
   if (!ape.empty()) {
     const MedianInterval m = median_interval(ape);
     text = metres(m.median) + (m.known ? " " + interval_text(m, metres) : "");
+    if (c.scored() < kEven * most) text += fmt::format(", of {:.0f}%", 100 * c.scored());
   } else if (!c.finished.empty()) {
     text = "no truth";
   }
@@ -92,17 +99,20 @@ Section overview(const Results& r) {
   section.paragraphs.push_back(
       "Translation error after SE(3) alignment, RMSE in metres: median over the runs and, in brackets, the 95% "
       "bootstrap "
-      "interval of that median (with five runs it reaches from the smallest to the largest).");
+      "interval of that median (with five runs it reaches from the smallest to the largest). \"of 20%\": so many of "
+      "the "
+      "frames are scored, fewer than 95% of those of another variant; such errors do not compare.");
   TextTable table;
   table.header = {"sequence"};
-  for (const SuiteVariant& v : r.suite->variants) table.header.push_back(v.name);
+  for (size_t v = 0; v < r.suite->variants.size(); ++v)
+    if (r.shows(v)) table.header.push_back(r.suite->variants[v].name);
   const bool published = !r.suite->published.ape_m.empty();
   if (published) table.header.push_back("published for other systems");
   for (size_t s = 0; s < r.suite->sequences.size(); ++s) {
     if (!any_run(r, s)) continue;
     std::vector<std::string> row = {r.suite->sequences[s].name};
     for (const Cell& c : r.cells)
-      if (c.sequence == s) row.push_back(ape_cell(c));
+      if (c.sequence == s && r.shows(c.variant)) row.push_back(ape_cell(c, most_scored(r, s)));
     if (published) row.push_back(others(r, s));
     table.rows.push_back(row);
   }
@@ -118,14 +128,28 @@ Section comparison(const Results& r) {
       "Geometric mean over the sequences of the ratio of median APEs, below 1 = better than " + r.suite->reference +
       ", with its 95% bootstrap interval (runs of the same seed are drawn together). A sequence counts as better or "
       "worse when the interval of its own ratio leaves out 1. Runs left out failed, or the reference's did: look at "
-      "their rows, and at the tracked share, before believing a ratio.");
+      "their rows before believing a ratio. *: on one of its sequences, named with the scored shares of both, one of "
+      "the "
+      "two scored fewer than 95% of the frames of the other, most often the easy ones; such a ratio tells little.");
   TextTable table;
-  table.header = {"variant", "sequences", "runs left out", "ratio of APEs", "95% interval", "better on", "worse on"};
+  table.header = {"variant",      "sequences", "runs left out", "ratio of APEs",
+                  "95% interval", "better on", "worse on",      "unevenly scored"};
   for (const Comparison& c : r.comparisons) {
+    const auto variant = std::find_if(r.suite->variants.begin(), r.suite->variants.end(),
+                                      [&](const SuiteVariant& v) { return v.name == c.variant; });
+    if (!r.shows(static_cast<size_t>(variant - r.suite->variants.begin()))) continue;
     const auto ratio = [](double x) { return fmt::format("{:.3f}", x); };
+    const auto marked = [&](std::vector<std::string> sequences) {
+      for (std::string& s : sequences) s += c.is_uneven(s) ? "*" : "";
+      return joined(sequences);
+    };
+    std::vector<std::string> uneven;
+    for (const Comparison::Uneven& u : c.uneven)
+      uneven.push_back(fmt::format("{} ({:.0f}%, {:.0f}%)", u.sequence, 100 * u.ours, 100 * u.reference));
     table.rows.push_back({c.variant, std::to_string(c.sequences), std::to_string(c.left_out),
-                          c.sequences > 0 ? ratio(c.ratio.median) : kNone,
-                          c.ratio.known ? interval_text(c.ratio, ratio) : kNone, joined(c.better), joined(c.worse)});
+                          c.sequences > 0 ? ratio(c.ratio.median) + (uneven.empty() ? "" : "*") : kNone,
+                          c.ratio.known ? interval_text(c.ratio, ratio) : kNone, marked(c.better), marked(c.worse),
+                          joined(uneven)});
   }
   section.tables.push_back(table);
   return section;
@@ -135,13 +159,16 @@ Section details(const Results& r) {
   Section section{"Accuracy, tracking and map", {}, {}, {}};
   section.paragraphs.push_back(
       "Median over the runs that finished; worst is the largest APE, and the smallest tracked share. Online: poses as "
-      "they were known when each was published. Map: points, and the size of map.dkb. Published numbers are of whole "
+      "they were known when each was published. Scored: pairs that the APE is of, of those offered; frames of maps "
+      "that were "
+      "never joined to the first count as tracked alone. Map: points, and the size of map.dkb. Published numbers are "
+      "of whole "
       "sequences: look at the pairs before comparing.");
   TextTable table;
   table.text_columns = 2;
-  table.header = {"sequence",     "variant",   "runs",       "pairs",      "APE [m]",
-                  "95% interval", "worst",     "APE [deg]",  "online [m]", "tracked [%]",
-                  "worst [%]",    "keyframes", "map points", "map [kB]",   "published [m]"};
+  table.header = {"sequence", "variant",   "runs",       "pairs",       "APE [m]",      "95% interval",
+                  "worst",    "APE [deg]", "online [m]", "tracked [%]", "worst [%]",    "scored [%]",
+                  "maps",     "keyframes", "map points", "map [kB]",    "published [m]"};
   for (const Cell& c : r.cells) {
     if (!c.any_run()) continue;
     const std::vector<double> ape = c.ape();
@@ -149,10 +176,7 @@ Section details(const Results& r) {
     const auto of = [&](auto&& get) {
       return c.values([&](const RunRecord& run) { return std::optional<double>(get(run)); });
     };
-    const auto rotation = c.values([](const RunRecord& run) {
-      const bool known = run.ape && run.ape->rotation_deg.count > 0;
-      return known ? std::optional<double>(run.ape->rotation_deg.rmse) : std::nullopt;
-    });
+    const auto rotation = c.figures(&RunRecord::ape, &Scores::rotation_deg, &ErrorStatistics::rmse);
     const auto online = c.values(
         [](const RunRecord& run) { return run.online_m ? std::optional<double>(run.online_m->rmse) : std::nullopt; });
     const auto lost = of([](const RunRecord& run) { return 100 - 100 * run.tracked_share(); });
@@ -165,12 +189,55 @@ Section details(const Results& r) {
          number(rotation, 3), online.empty() ? kNone : metres(median_of(online)),
          lost.empty() ? kNone : fmt::format("{:.1f}", 100 - median_of(lost)),
          lost.empty() ? kNone : fmt::format("{:.1f}", 100 - worst(lost)),
+         ape.empty() ? kNone : fmt::format("{:.1f}", 100 * c.scored()),
+         lost.empty()
+             ? kNone
+             : fmt::format("{:.0f}", worst(of([](const RunRecord& run) { return static_cast<double>(run.maps); }))),
          number(of([](const RunRecord& run) { return static_cast<double>(run.keyframes); }), 0),
          number(of([](const RunRecord& run) { return static_cast<double>(run.map_points); }), 0),
          number(of([](const RunRecord& run) { return 1e-3 * static_cast<double>(run.map_bytes); }), 0),
          c.published ? fmt::format("{:.4f}", *c.published) : ""});
   }
   section.tables.push_back(table);
+  return section;
+}
+
+// What papers print of each sequence.
+Section errors(const Results& r) {
+  Section section{"Errors by sequence", {}, {}, {}};
+  section.paragraphs.push_back(
+      "Medians over the runs. APE after SE(3) alignment: RMSE, mean, median, standard deviation (S.D.) and largest, "
+      "and "
+      "RMSE of the rotation. RPE over one frame, RMSE. Scored: pairs that these are of, of those offered.");
+  for (size_t s = 0; s < r.suite->sequences.size(); ++s) {
+    TextTable table;
+    table.header = {r.suite->sequences[s].name,
+                    "APE RMSE [m]",
+                    "mean [m]",
+                    "median [m]",
+                    "S.D. [m]",
+                    "largest [m]",
+                    "APE [deg]",
+                    "RPE [m/frame]",
+                    "RPE [deg/frame]",
+                    "scored [%]"};
+    for (const Cell& c : r.cells) {
+      if (c.sequence != s || c.ape().empty()) continue;
+      const auto in_metres = [](const std::vector<double>& values) {
+        return values.empty() ? kNone : metres(median_of(values));
+      };
+      std::vector<std::string> row = {variant_of(r, c).name};
+      for (const auto of : {&ErrorStatistics::rmse, &ErrorStatistics::mean, &ErrorStatistics::median,
+                            &ErrorStatistics::std, &ErrorStatistics::max})
+        row.push_back(in_metres(c.figures(&RunRecord::ape, &Scores::translation_m, of)));
+      row.push_back(number(c.figures(&RunRecord::ape, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
+      row.push_back(in_metres(c.figures(&RunRecord::rpe, &Scores::translation_m, &ErrorStatistics::rmse)));
+      row.push_back(number(c.figures(&RunRecord::rpe, &Scores::rotation_deg, &ErrorStatistics::rmse), 3));
+      row.push_back(fmt::format("{:.1f}", 100 * c.scored()));
+      table.rows.push_back(row);
+    }
+    if (!table.rows.empty()) section.tables.push_back(table);
+  }
   return section;
 }
 
@@ -186,11 +253,14 @@ Section failures(const Results& r) {
   TextTable missing;
   missing.text_columns = 3;
   missing.header = {"what", "runs missing", "how to get it"};
+  const auto& chosen = r.chosen_sequences;
   for (size_t s = 0; s < r.suite->sequences.size(); ++s)
-    if (!any_run(r, s))
+    if (!any_run(r, s) &&
+        (chosen.empty() || std::find(chosen.begin(), chosen.end(), r.suite->sequences[s].name) != chosen.end()))
       missing.rows.push_back({"sequence " + r.suite->sequences[s].name, "all", r.suite->sequences[s].get});
   for (size_t v = 0; v < r.suite->variants.size(); ++v)
-    if (std::none_of(r.cells.begin(), r.cells.end(), [&](const Cell& c) { return c.variant == v && c.any_run(); }))
+    if (r.shows(v) &&
+        std::none_of(r.cells.begin(), r.cells.end(), [&](const Cell& c) { return c.variant == v && c.any_run(); }))
       missing.rows.push_back({"variant " + r.suite->variants[v].name, "all", r.suite->variants[v].get});
   if (!missing.rows.empty()) section.tables.push_back(missing);
   if (section.tables.empty()) section.paragraphs.push_back("None.");
@@ -306,64 +376,8 @@ std::string html(const std::string& title, const std::vector<std::string>& head,
   return out + "</body>\n</html>\n";
 }
 
-Json interval_json(const MedianInterval& m) {
-  Json j;
-  j["median"] = std::isfinite(m.median) ? Json(m.median) : Json();
-  j["interval_95"] = m.known ? Json({m.interval.low, m.interval.high}) : Json();
-  return j;
-}
-
-std::string json(const Results& r, const ReportOptions& options) {
-  Json j;
-  j["suite"] = r.suite->name;
-  j["hash"] = suite_hash(*r.suite);
-  j["seeds"] = r.suite->seeds;
-  j["cells"] = Json::array();
-  for (const Cell& c : r.cells) {
-    Json cell;
-    cell["sequence"] = sequence_of(r, c).name;
-    cell["variant"] = variant_of(r, c).name;
-    cell["not_run"] = c.not_run;
-    cell["published_ape_m"] = c.published ? Json(*c.published) : Json();
-    const std::vector<double> ape = c.ape();
-    cell["ape_m"] = interval_json(median_interval(ape));
-    cell["ape_m"]["worst"] = ape.empty() ? Json() : Json(worst(ape));
-    cell["runs"] = Json::array();
-    for (const auto* runs : {&c.finished, &c.failed})
-      for (const RunRecord& run : *runs) {
-        Json record = Json::parse(record_json(run));
-        if (!options.times) record.erase("machine");
-        cell["runs"].push_back(record);
-      }
-    j["cells"].push_back(cell);
-  }
-  j["comparisons"] = Json::array();
-  for (const Comparison& c : r.comparisons) {
-    Json row = {{"variant", c.variant},
-                {"reference", r.suite->reference},
-                {"sequences", c.sequences},
-                {"runs_left_out", c.left_out}};
-    row["ratio"] = interval_json(c.ratio);
-    row["better"] = c.better;
-    row["worse"] = c.worse;
-    j["comparisons"].push_back(row);
-  }
-  if (r.suite->sweep) {
-    j["sweep"] = {{"setting", r.suite->sweep->setting}, {"values", r.suite->sweep->values}};
-    j["sweep"]["sequences"] = Json::array();
-    for (const SweepResult& s : r.sweep) {
-      Json row = {{"sequence", s.sequence},
-                  {"runs", s.runs},
-                  {"best", r.suite->sweep->values[s.best]},
-                  {"p_value", s.p_value},
-                  {"exceeds_noise", s.exceeds_noise}};
-      row["ape_m"] = Json::array();
-      for (const MedianInterval& m : s.ape) row["ape_m"].push_back(interval_json(m));
-      j["sweep"]["sequences"].push_back(row);
-    }
-    j["sweep"]["sentences"] = sweep_sentences(r);
-  }
-  return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+std::string chosen_of(const std::vector<std::string>& chosen, size_t all) {
+  return chosen.empty() ? std::to_string(all) : fmt::format("{} of {}", chosen.size(), all);
 }
 
 }  // namespace
@@ -373,7 +387,9 @@ Report make_report(const ResultsFolder& folder, const ReportOptions& options) {
   std::vector<RunRecord> records;
   for (const Job& job : jobs_of(suite))
     if (auto record = folder.record(job)) records.push_back(std::move(*record));
-  const Results results = results_of(suite, records);
+  Results results = results_of(suite, records);
+  results.chosen_sequences = folder.text().sequences;
+  results.chosen_variants = folder.text().variants;
 
   Report report;
   report.plots = make_plots(folder, results);
@@ -381,6 +397,7 @@ Report make_report(const ResultsFolder& folder, const ReportOptions& options) {
   if (!results.comparisons.empty()) sections.push_back(comparison(results));
   if (suite.sweep) sections.push_back(sensitivity(results));
   sections.push_back(details(results));
+  if (Section scores = errors(results); !scores.tables.empty()) sections.push_back(std::move(scores));
   sections.push_back(failures(results));
   if (options.times) sections.push_back(times(results));
   Section figures{
@@ -399,11 +416,12 @@ Report make_report(const ResultsFolder& folder, const ReportOptions& options) {
   head.push_back(
       fmt::format("Suite {} ({}): {} sequences x {} variants x {} runs. Run s has seed s and leaves out the "
                   "first s - 1 pairs, so that runs differ in earnest.{}",
-                  suite.name, suite_hash(suite), suite.sequences.size(), suite.variants.size(), suite.seeds,
+                  suite.name, suite_hash(suite), chosen_of(results.chosen_sequences, suite.sequences.size()),
+                  chosen_of(results.chosen_variants, suite.variants.size()), suite.seeds,
                   suite.max_frames > 0 ? fmt::format(" At most {} pairs each.", suite.max_frames) : ""));
   report.markdown = markdown(title, head, sections, report.plots);
   report.html = html(title, head, sections, report.plots);
-  report.json = json(results, options);
+  report.json = results_json(results, options);
   return report;
 }
 

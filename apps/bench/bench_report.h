@@ -27,8 +27,16 @@ struct Cell {
       if (const std::optional<double> value = get(r)) all.push_back(*value);
     return all;
   }
+  // The same of an error, of the runs where it was measured.
+  std::vector<double> figures(std::optional<Scores> RunRecord::*kind, ErrorStatistics Scores::*part,
+                              double ErrorStatistics::*figure) const;
   std::vector<double> ape() const;  // [m] translation rmse
+  double scored() const;            // median share of the pairs offered that the APE is of; 0 without any
 };
+
+// Frames that one of two lost are its hardest. At three times the RMSE, a twentieth of the frames would raise it by
+// sqrt(0.95 + 0.05 * 9) - 1 = 18%, which is as much as ratios are asked to tell.
+constexpr double kEven = 0.95;
 
 // A variant against the suite's reference, over the sequences on which both have the same runs.
 struct Comparison {
@@ -37,6 +45,13 @@ struct Comparison {
   int left_out = 0;                        // runs on them that failed or that the reference has no partner for
   MedianInterval ratio;                    // geometric mean over sequences of the ratio of median APEs
   std::vector<std::string> better, worse;  // sequences where the interval of the ratio leaves out 1
+  // Sequences where one scored less than kEven of the frames of the other, with both shares.
+  struct Uneven {
+    std::string sequence;
+    double ours = 0, reference = 0;
+  };
+  std::vector<Uneven> uneven;
+  bool is_uneven(const std::string& sequence) const;
 };
 
 // What the sweep says of one sequence.
@@ -57,6 +72,9 @@ struct Results {
   std::vector<Cell> cells;  // sequences x variants
   std::vector<Comparison> comparisons;
   std::vector<SweepResult> sweep;
+  std::vector<std::string> chosen_sequences, chosen_variants;  // none = all
+  // Whether a report has a row, a column and a bar for it: what nobody asked for is not missing.
+  bool shows(size_t variant) const;
 };
 // Statistics of `records`, which must be of the suite's runs.
 Results results_of(const Suite& suite, const std::vector<RunRecord>& records);
@@ -71,6 +89,8 @@ struct Report {
   std::string markdown, html, json;
   std::map<std::string, std::string> plots;  // SVG by file name
 };
+// results.json.
+std::string results_json(const Results& results, const ReportOptions& options);
 // `folder` gives the trajectories for the plots.
 Report make_report(const ResultsFolder& folder, const ReportOptions& options);
 

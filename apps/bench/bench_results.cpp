@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "dkb/util/errors.h"
@@ -19,8 +20,17 @@ Json to_json(const ErrorStatistics& s) {
   return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.std},
           {"min", s.min},   {"max", s.max},   {"count", s.count}};
 }
+Json to_json(const std::optional<Scores>& s) {
+  if (!s) return nullptr;
+  return {{"translation_m", to_json(s->translation_m)}, {"rotation_deg", to_json(s->rotation_deg)}};
+}
 ErrorStatistics statistics_from(const Json& j) {
   return {j.at("rmse"), j.at("mean"), j.at("median"), j.at("std"), j.at("min"), j.at("max"), j.at("count")};
+}
+
+std::optional<Scores> scores_from(const Json& j) {
+  if (j.is_null()) return {};
+  return Scores{statistics_from(j.at("translation_m")), statistics_from(j.at("rotation_deg"))};
 }
 
 // Calls `read`; whatever the JSON lacks becomes one line that names the file.
@@ -31,6 +41,15 @@ auto guarded(const std::string& name, const char* what, const Read& read) {
   } catch (const nlohmann::json::exception&) {
     throw InputError(name + ": is not " + what + "; remove it, or choose another folder");
   }
+}
+
+// No choice is all.
+std::vector<std::string> chosen_by_either(std::vector<std::string> a, const std::vector<std::string>& b) {
+  if (a.empty() || b.empty()) return {};
+  a.insert(a.end(), b.begin(), b.end());
+  std::sort(a.begin(), a.end());
+  a.erase(std::unique(a.begin(), a.end()), a.end());
+  return a;
 }
 
 // Nothing there, or an empty folder. Another shard that starts at the same time may just be writing its suite.json.
@@ -65,9 +84,10 @@ std::string record_json(const RunRecord& r) {
   j["keyframes"] = r.keyframes;
   j["map_points"] = r.map_points;
   j["map_bytes"] = r.map_bytes;
-  j["ape"] = nullptr;
-  if (r.ape)
-    j["ape"] = {{"translation_m", to_json(r.ape->translation_m)}, {"rotation_deg", to_json(r.ape->rotation_deg)}};
+  j["maps"] = r.maps;
+  j["scored"] = r.ape ? r.ape->translation_m.count : 0;
+  j["ape"] = to_json(r.ape);
+  j["rpe"] = to_json(r.rpe);
   j["online_m"] = nullptr;
   if (r.online_m) j["online_m"] = to_json(*r.online_m);
   const MachineFacts& m = r.machine;
@@ -101,8 +121,9 @@ RunRecord parse_record(const std::string& text, const std::string& name) {
     r.keyframes = j.at("keyframes");
     r.map_points = j.at("map_points");
     r.map_bytes = j.at("map_bytes");
-    if (const Json& ape = j.at("ape"); !ape.is_null())
-      r.ape = Scores{statistics_from(ape.at("translation_m")), statistics_from(ape.at("rotation_deg"))};
+    r.maps = j.value("maps", int64_t{1});  // records of 0.2.0 lack it, and the relative error
+    r.ape = scores_from(j.at("ape"));
+    if (j.contains("rpe")) r.rpe = scores_from(j.at("rpe"));
     if (const Json& online = j.at("online_m"); !online.is_null()) r.online_m = statistics_from(online);
     const Json& m = j.at("machine");
     if (!m.at("cv_orb_ms").is_null()) r.machine.cv_orb_ms = m.at("cv_orb_ms").get<double>();
@@ -131,14 +152,19 @@ ResultsFolder ResultsFolder::read(const fs::path& path) {
   const SuiteText text = guarded(name, "what a bench writes", [&] {
     const Json j = Json::parse(read_file(name));
     if (j.at("format") != kFormat) throw InputError(name + ": was written by another version of dkb-slam");
-    return SuiteText{j.at("file"), j.at("text"), j.at("published"), j.at("seeds"), j.at("max_frames")};
+    SuiteText read{j.at("file"), j.at("text"), j.at("published"), j.at("seeds"), j.at("max_frames")};
+    if (j.contains("sequences")) j.at("sequences").get_to(read.sequences);
+    if (j.contains("variants")) j.at("variants").get_to(read.variants);
+    return read;
   });
   return {path, text, parse_suite(text)};
 }
 
-ResultsFolder ResultsFolder::open(const fs::path& path, const SuiteText& text, const Suite& suite) {
+ResultsFolder ResultsFolder::open(const fs::path& path, SuiteText text, const Suite& suite) {
   if (is_one(path)) {
     const ResultsFolder there = read(path);
+    text.sequences = chosen_by_either(text.sequences, there.text().sequences);
+    text.variants = chosen_by_either(text.variants, there.text().variants);
     if (suite_hash(there.suite()) != suite_hash(suite))
       throw InputError(
           fmt::format("{}: holds results of another suite ({} {}, this is {} {}); choose another folder "
@@ -158,6 +184,8 @@ ResultsFolder ResultsFolder::open(const fs::path& path, const SuiteText& text, c
   j["published"] = text.published;
   j["seeds"] = text.seeds;
   j["max_frames"] = text.max_frames;
+  j["sequences"] = text.sequences;
+  j["variants"] = text.variants;
   write_file_atomically(path / "suite.json", j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   return {path, text, suite};
 }

@@ -32,12 +32,18 @@ struct RunRecord {
   int seed = 1;
   std::string failure;  // empty: the run went well; else its last line or the signal that ended it
   int64_t frames = 0, tracked = 0, lost = 0, skipped = 0, keyframes = 0, map_points = 0, map_bytes = 0;
+  int64_t maps = 1;                         // that were never joined; trajectory.txt has the frames of the first
   std::optional<Scores> ape;                // of trajectory.txt; nothing without ground truth
+  std::optional<Scores> rpe;                // likewise, over one frame
   std::optional<ErrorStatistics> online_m;  // translation of trajectory_online.txt
   MachineFacts machine;
 
   bool ok() const { return failure.empty(); }
   double tracked_share() const { return frames > 0 ? static_cast<double>(tracked) / static_cast<double>(frames) : 0; }
+  // Of the pairs offered, those that `ape` is of: frames of other maps are not, nor are those without a true pose.
+  double scored_share() const {
+    return frames > 0 && ape ? static_cast<double>(ape->translation_m.count) / static_cast<double>(frames) : 0;
+  }
 };
 
 std::string record_json(const RunRecord& record);
@@ -53,8 +59,9 @@ RunRecord parse_record(const std::string& text, const std::string& name);  // th
 // several benches may work in one folder.
 class ResultsFolder {
  public:
-  // Makes it, or goes on with it. Throws InputError when it holds results of another suite, or other files.
-  static ResultsFolder open(const std::filesystem::path& path, const SuiteText& text, const Suite& suite);
+  // Makes it, or goes on with it; what was chosen adds up. Throws InputError when it holds results of another suite, or
+  // other files.
+  static ResultsFolder open(const std::filesystem::path& path, SuiteText text, const Suite& suite);
   // One that exists. Throws InputError when it is none.
   static ResultsFolder read(const std::filesystem::path& path);
   static bool is_one(const std::filesystem::path& path);

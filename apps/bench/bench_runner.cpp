@@ -186,6 +186,7 @@ void read_stats(const fs::path& out, RunRecord* r) {
   r->skipped = stats.at("skipped");
   r->keyframes = stats.at("keyframes");
   r->map_points = stats.at("map_points");
+  r->maps = stats.at("maps");
   r->map_bytes = static_cast<int64_t>(fs::file_size(out / "map.dkb"));
   MachineFacts& m = r->machine;
   m.tracking_ms = stage_ms(stats, "tracking", "mean_ms");
@@ -202,9 +203,11 @@ void read_stats(const fs::path& out, RunRecord* r) {
 void read_errors(const fs::path& out, const fs::path& truth_file, RunRecord* r) {
   std::error_code ignored;
   if (!fs::exists(truth_file, ignored)) return;
-  const Trajectory truth = read_trajectory(truth_file);
+  size_t hidden = 0;
+  const Trajectory truth = read_trajectory(truth_file, &hidden);
   const Evaluation final = evaluate(truth, read_trajectory(out / "trajectory.txt"));
   r->ape = Scores{final.ape.translation, final.ape.rotation};
+  r->rpe = Scores{final.rpe.translation, final.rpe.rotation};
   r->online_m = evaluate(truth, read_trajectory(out / "trajectory_online.txt")).ape.translation;
 }
 

@@ -46,6 +46,8 @@ std::vector<Comparison> compare(const Suite& suite, const std::vector<Cell>& cel
       if (!ours.any_run() && !theirs.any_run()) continue;
       c.left_out += suite.seeds - static_cast<int>(pairs.ours.size());
       if (pairs.ours.empty()) continue;
+      if (const double a = ours.scored(), b = theirs.scored(); a < kEven * b || b < kEven * a)
+        c.uneven.push_back({suite.sequences[s].name, a, b});
       const MedianInterval here = mean_ratio({pairs}, {.seed = kSeed});
       if (here.known && here.interval.high < 1) c.better.push_back(suite.sequences[s].name);
       if (here.known && here.interval.low > 1) c.worse.push_back(suite.sequences[s].name);
@@ -106,8 +108,33 @@ std::vector<SweepResult> sweep_results(const Suite& suite, const std::vector<Cel
 
 }  // namespace
 
+std::vector<double> Cell::figures(std::optional<Scores> RunRecord::*kind, ErrorStatistics Scores::*part,
+                                  double ErrorStatistics::*figure) const {
+  return values([&](const RunRecord& run) {
+    const std::optional<Scores>& scores = run.*kind;
+    const bool known = scores && ((*scores).*part).count > 0;
+    return known ? std::optional<double>((*scores).*part.*figure) : std::nullopt;
+  });
+}
+
 std::vector<double> Cell::ape() const {
   return values(ape_of);
+}
+
+double Cell::scored() const {
+  const std::vector<double> shares =
+      values([](const RunRecord& r) { return r.ape ? std::optional<double>(r.scored_share()) : std::nullopt; });
+  return shares.empty() ? 0 : median_of(shares);
+}
+
+bool Results::shows(size_t variant) const {
+  const auto& chosen = chosen_variants;
+  return chosen.empty() || std::find(chosen.begin(), chosen.end(), suite->variants[variant].name) != chosen.end() ||
+         std::any_of(cells.begin(), cells.end(), [&](const Cell& c) { return c.variant == variant && c.any_run(); });
+}
+
+bool Comparison::is_uneven(const std::string& sequence) const {
+  return std::any_of(uneven.begin(), uneven.end(), [&](const Uneven& u) { return u.sequence == sequence; });
 }
 
 Results results_of(const Suite& suite, const std::vector<RunRecord>& records) {

@@ -79,6 +79,8 @@ struct SuiteText {
   std::string published;   // of the table that it names, empty if it names none
   int seeds = 0;           // 0 = as the suite says
   int64_t max_frames = 0;  // likewise
+  // Those that were chosen, of all benches in one folder; none = all.
+  std::vector<std::string> sequences = {}, variants = {};
 };
 
 // Throws InputError with file:line: not YAML; a key that is unknown (with the nearest one), repeated or of a wrong

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/text_table.h"
 
-#include "dkb/util/one_line.h"
 #include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb {
 namespace {

@@ -9,6 +9,7 @@
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "terminal.h"
 
 namespace dkb {
 namespace fs = std::filesystem;
@@ -22,7 +23,9 @@ struct EvalArguments {
 Evaluation evaluate_files(const EvalArguments& arguments) {
   EvaluationOptions options = arguments.options;
   options.rpe_delta = parse_rpe_delta(arguments.rpe_delta);
-  const Trajectory truth = read_poses(arguments.truth);
+  size_t hidden = 0;
+  const Trajectory truth = read_poses(arguments.truth, &hidden);
+  if (hidden > 0) tell(stderr, "warning: {}: {}\n", arguments.truth, hidden_text(hidden));
   return evaluate(truth, read_poses(arguments.estimate), options, arguments.estimate);
 }
 
@@ -34,6 +37,7 @@ void run_eval(const EvalArguments& arguments) {
   if (!arguments.plot.empty()) {
     write_file_atomically(arguments.plot, evaluation_svg(evaluation, fs::path(arguments.estimate).filename().string()));
   }
+  for (const std::string& warning : evaluation_warnings(evaluation)) tell(stderr, "warning: {}\n", warning);
   std::fputs(evaluation_table(evaluation).c_str(), stdout);
 }
 
@@ -41,8 +45,8 @@ void run_eval(const EvalArguments& arguments) {
 
 void register_eval(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<EvalArguments>();
-  CLI::App* command =
-      app.add_subcommand("eval", "Score a trajectory against the truth: APE and RPE, as evo defines them");
+  CLI::App* command = app.add_subcommand(
+      "eval", "Score a trajectory against the truth: APE and RPE as evo's, of stamps within 0.02 s (evo: 0.01 s)");
   command->add_option("GROUNDTRUTH", arguments->truth, "true trajectory (TUM format)")->required();
   command->add_option("ESTIMATE", arguments->estimate, "estimated trajectory (TUM format)")->required();
   command->add_option("--max-diff", arguments->options.max_difference, "[s] between matched stamps")
@@ -50,6 +54,10 @@ void register_eval(CLI::App& app, int& exit_code) {
   command
       ->add_option("--rpe-delta", arguments->rpe_delta,
                    "N{f|m|s}: stretch of the relative error in frames, metres or seconds")
+      ->capture_default_str();
+  command->add_flag("--rpe-all-pairs", arguments->options.rpe_all_pairs,
+                    "such a stretch from every pose on, as papers quote them (default: stretches that do not overlap)");
+  command->add_option("--time-offset", arguments->options.time_offset, "[s] added to the stamps of the estimate")
       ->capture_default_str();
   command->add_flag("--scale", arguments->options.with_scale, "align by a similarity (monocular estimates)");
   command->add_option("--json", arguments->json, "write the figures to this file");

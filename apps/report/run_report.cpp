@@ -45,7 +45,7 @@ std::vector<ChangedSetting> changed_settings(const std::string& effective, const
 Truth evaluated_by_truth(const std::string& source, const Trajectory& trajectory) {
   Truth truth;
   try {
-    auto poses = truth_beside(source);
+    auto poses = truth_beside(source, &truth.hidden);
     if (!poses) return truth;
     truth.poses = std::move(*poses);
     if (!trajectory.empty()) truth.evaluation = evaluate(truth.poses, trajectory, {}, "trajectory.txt");

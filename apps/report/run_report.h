@@ -42,6 +42,7 @@ struct Truth {
   Trajectory poses;
   std::optional<Evaluation> evaluation;  // of the trajectory, as `eval` makes it
   std::string note;                      // why there is none
+  size_t hidden = 0;                     // rows with nan, left out
 };
 // By truth_beside(source); without one all is empty. A file that cannot be used is a note and no error.
 Truth evaluated_by_truth(const std::string& source, const Trajectory& trajectory);

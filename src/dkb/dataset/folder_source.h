@@ -21,6 +21,7 @@ class FolderSource final : public ReaderSource {
   std::vector<int64_t> stamps_ns() const override;
 
   const std::vector<DatasetPair>& pairs() const { return layout_.dataset.pairs; }
+  size_t unpaired() const { return static_cast<size_t>(layout_.dataset.unpaired); }  // images without a partner
 
  private:
   FolderLayout layout_;

@@ -13,7 +13,8 @@
 namespace dkb {
 namespace {
 
-const std::string kHeader = "timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h\n";
+const std::string kHeader = "timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h\n";  // of 0.2.0
+const std::string kWritten = "timestamp,id,class,x,y,z,vx,vy,vz,position_sd,box_x,box_y,box_w,box_h,velocity_sd\n";
 const std::string kRow = "1.50,7,person,1,2,3,0.5,-0.5,0,0.04,10,20,30.5,40\n";
 
 MoverRow example() {
@@ -27,13 +28,25 @@ std::string error_of(const std::string& text) {
 }
 
 TEST(MoversFile, RowsAreWrittenWithTheStampAsRead) {
-  EXPECT_EQ(movers_to_csv({example()}),
-            kHeader + "1.50,7,person,1.0000,2.0000,3.0000,0.5000,-0.5000,0.0000,0.0400,10.00,20.00,30.50,40.00\n");
-  EXPECT_EQ(movers_to_csv({}), kHeader);
+  EXPECT_EQ(
+      movers_to_csv({example()}),
+      kWritten + "1.50,7,person,1.0000,2.0000,3.0000,0.5000,-0.5000,0.0000,0.0400,10.00,20.00,30.50,40.00,0.0000\n");
+  EXPECT_EQ(movers_to_csv({}), kWritten);
 }
 
 TEST(MoversFile, RowsAreReadWithTheirUnits) {
   EXPECT_EQ(parse_movers(kHeader + kRow, "m.csv"), (MoverRows{example()}));
+}
+
+TEST(MoversFile, TheVelocityHasAStandardDeviation) {
+  MoverRow row = example();
+  row.mover.covariance.diagonal().tail<3>() << 0.04, 0.01, 0.04;  // mean 0.03
+  const std::string text = movers_to_csv({row});
+  EXPECT_EQ(text.substr(text.rfind(',')), ",0.1732\n");
+  EXPECT_NEAR(parse_movers(text, "m.csv")[0].mover.covariance(5, 5), 0.03, 1e-5);
+  EXPECT_EQ(error_of(kWritten + kRow).find("m.csv:2: 14 of 15 columns"), 0u);
+  EXPECT_EQ(error_of(kWritten + "1.50,7,person,1,2,3,0.5,-0.5,0,0.04,10,20,30.5,40,-1\n").find("m.csv:2: velocity_sd"),
+            0u);
 }
 
 TEST(MoversFile, ByteOrderMarksCarriageReturnsAndEmptyLinesAreTolerated) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "dkb/util/errors.h"
@@ -13,25 +14,44 @@
 #include "dkb_slam/slam.h"
 
 namespace dkb {
+namespace {
 
-Trajectory read_trajectory(const std::filesystem::path& path) {
-  return parse_trajectory(read_file(path), path.string());
+bool is_nan(std::string_view number) {
+  const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
+  if (!number.empty() && number[0] == '-') number.remove_prefix(1);
+  return std::ranges::equal(number, std::string_view("nan"), same);
 }
 
-std::optional<Trajectory> truth_beside(const std::filesystem::path& recording) {
+}  // namespace
+
+Trajectory read_trajectory(const std::filesystem::path& path, size_t* hidden) {
+  return parse_trajectory(read_file(path), path.string(), hidden);
+}
+
+std::string hidden_text(size_t rows) {
+  return fmt::format("{} rows with nan are left out", rows);
+}
+
+std::optional<Trajectory> truth_beside(const std::filesystem::path& recording, size_t* hidden) {
   const std::filesystem::path file = recording / "groundtruth.txt";
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
-  return read_trajectory(file);
+  return read_trajectory(file, hidden);
 }
 
-Trajectory parse_trajectory(const std::string& text, const std::string& name) {
+Trajectory parse_trajectory(const std::string& text, const std::string& name, size_t* hidden) {
   Trajectory trajectory;
   for_each_row(text, name, [&](const std::string& place, const std::vector<std::string_view>& columns) {
+    if (columns.size() < 8 && std::ranges::any_of(columns, [](auto c) { return c.find(',') != c.npos; }))
+      throw InputError(place + ": commas separate the columns; spaces must: `timestamp tx ty tz qx qy qz qw`");
     if (columns.size() < 8)
       throw InputError(place + ": " + std::to_string(columns.size()) +
                        " of 8 columns; a row must be `timestamp tx ty tz qx qy qz qw`");
     static constexpr const char* kNames[] = {"timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+    if (hidden != nullptr && std::any_of(columns.begin() + 1, columns.begin() + 8, is_nan)) {
+      ++*hidden;
+      return;
+    }
     double v[8];
     for (size_t i = 0; i < 8; ++i) v[i] = read_number(columns[i], place, kNames[i]);
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);

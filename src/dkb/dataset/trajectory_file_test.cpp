@@ -69,16 +69,35 @@ TEST(TrajectoryFile, NineDecimalsAreWrittenAsTheyWereRead) {
   EXPECT_EQ(trajectory_to_text(parse_trajectory(text, "t.txt")), text);
 }
 
+TEST(TrajectoryFile, RowsOfHiddenMarkersAreLeftOutOfATruthAlone) {
+  const std::string text = "1 0 0 0 0 0 0 1\n2 nan nan nan 0 0 0 1\n3 0 0 0 -NaN 0 0 nan\n4 1 0 0 0 0 0 1\n";
+  size_t hidden = 0;
+  const Trajectory truth = parse_trajectory(text, "t.txt", &hidden);
+  EXPECT_EQ(hidden, 2u);
+  ASSERT_EQ(truth.size(), 2u);
+  EXPECT_EQ(truth[1].timestamp, 4);
+  EXPECT_EQ(error(text), "t.txt:2: tx \"nan\" is not a finite number");
+  EXPECT_THROW(parse_trajectory("1 inf 0 0 0 0 0 1\n", "t.txt", &hidden), InputError);
+  EXPECT_THROW(parse_trajectory("nan 0 0 0 0 0 0 1\n", "t.txt", &hidden), InputError) << "a stamp is never hidden";
+}
+
+TEST(TrajectoryFile, CommasBetweenColumnsAreNamed) {
+  const std::string commas = "t.txt:1: commas separate the columns; spaces must: `timestamp tx ty tz qx qy qz qw`";
+  EXPECT_EQ(error("1.5,0,0,0,0,0,0,1\n"), commas);
+  EXPECT_EQ(error("1.5, 0, 0\n"), commas);
+}
+
 TEST(TrajectoryFile, OfTheTruthLiesInTheRecordingsFolder) {
+  size_t hidden = 0;
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_truth");
-  EXPECT_FALSE(truth_beside(folder));
+  EXPECT_FALSE(truth_beside(folder, &hidden));
   std::filesystem::create_directory(folder);
-  EXPECT_FALSE(truth_beside(folder));
+  EXPECT_FALSE(truth_beside(folder, &hidden));
   std::ofstream(folder / "groundtruth.txt") << "1 0 0 0 0 0 0 1\n";
-  EXPECT_EQ(truth_beside(folder).value().size(), 1u);
+  EXPECT_EQ(truth_beside(folder, &hidden).value().size(), 1u);
   std::ofstream(folder / "groundtruth.txt") << "nothing\n";
-  EXPECT_THROW(truth_beside(folder), InputError);
+  EXPECT_THROW(truth_beside(folder, &hidden), InputError);
   std::filesystem::remove_all(folder);
 }
 

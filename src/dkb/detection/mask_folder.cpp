@@ -72,7 +72,7 @@ std::vector<Detection> mover_boxes(const GreyImage& mask, int min_pixels, int ce
   std::vector<Detection> boxes;
   const auto c = static_cast<float>(cell);
   for (const Box& b : region_boxes(mask, min_pixels))
-    boxes.push_back({"mover", {c * b.x, c * b.y, c * b.w, c * b.h}, 1});
+    boxes.push_back({kUnnamedRegion, {c * b.x, c * b.y, c * b.w, c * b.h}, 1});
   return boxes;
 }
 

@@ -12,6 +12,9 @@
 
 namespace dkb {
 
+// The class of a mask's region: nobody has named what is in it.
+inline constexpr const char* kUnnamedRegion = "mover";
+
 // Masks from any segmenter: FOLDER/STAMP.png, where STAMP is the colour image's stamp [s] and above 0 = mover. An image
 // gets the mask of the nearest stamp within 2 ms, or none. A mask comes with one box of class "mover" per connected
 // region (8-neighbourhood) of at least `min_region` pixels, largest first.

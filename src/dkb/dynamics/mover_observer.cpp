@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "dkb/detection/mask_folder.h"
 #include "dkb/features/vectorised.h"
 #include "dkb/util/disjoint_sets.h"
 #include "dkb/util/errors.h"
@@ -343,20 +344,43 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
   return result;
 }
 
+// Whether the middle of a cell is in the mask.
+bool MoverObserver::is_masked(const MoverMask& mask, int x, int y) const {
+  if (mask.cell == kCell && mask.cells.width() == rays_.width() && mask.cells.height() == rays_.height())
+    return mask.cells(x, y) != 0;
+  const float middle = 0.5f * static_cast<float>(kCell);
+  return mask.at(static_cast<float>(x * kCell) + middle, static_cast<float>(y * kCell) + middle);
+}
+
 void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
   depth_.assign(rays_.all_cells().count, 0.0f);
-  const float middle = 0.5f * static_cast<float>(kCell);
-  const bool same_cells =
-      mask.cell == kCell && mask.cells.width() == rays_.width() && mask.cells.height() == rays_.height();
   for_each_cell({0, 0, rays_.width(), rays_.height()}, [&](size_t i, int x, int y) {
-    if (same_cells ? mask.cells(x, y) != 0
-                   : mask.at(static_cast<float>(x * kCell) + middle, static_cast<float>(y * kCell) + middle))
-      depth_[i] = depth_near(depth, x, y);
+    if (is_masked(mask, x, y)) depth_[i] = depth_near(depth, x, y);
   });
 }
 
+// The boxes without those of a mask's regions that are in boxes with a name: a mask beside boxes tells of the same
+// people twice. What of such a region is in no box is found as a region.
+std::vector<Detection> MoverObserver::named_once(std::span<const Detection> boxes, const MoverMask& mask) const {
+  std::vector<char> named(depth_.size(), 0);
+  for (const Detection& d : boxes)
+    if (d.class_name != kUnnamedRegion) for_each_cell(cells_in(d.box, 0), [&](size_t i, int, int) { named[i] = 1; });
+  std::vector<Detection> kept;
+  for (const Detection& d : boxes) {
+    size_t all = 0, theirs = 0;
+    if (d.class_name == kUnnamedRegion)
+      for_each_cell(cells_in(d.box, 0), [&](size_t i, int x, int y) {
+        if (!is_masked(mask, x, y)) return;
+        ++all;
+        theirs += named[i] != 0;
+      });
+    if (2 * theirs <= all) kept.push_back(d);
+  }
+  return kept;
+}
+
 std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, const MoverMask& mask,
-                                                     std::span<const Detection> boxes, const Rigid3& world_from_cam,
+                                                     std::span<const Detection> all_boxes, const Rigid3& world_from_cam,
                                                      std::span<const ExpectedMover> expected) {
   if (depth.width() != camera_.width || depth.height() != camera_.height)
     throw InputError("depth image is " + std::to_string(depth.width()) + " x " + std::to_string(depth.height()) +
@@ -366,6 +390,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   world_from_cam_ = world_from_cam;
   take_masked_depth(depth, mask);
   footprints_ = footprints(expected);
+  const std::vector<Detection> boxes = named_once(all_boxes, mask);
   std::vector<MoverObservation> observations = observe_boxes(boxes);
   for (const Region& r : find_regions(boxes)) {
     const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };

@@ -43,7 +43,8 @@ class MoverObserver {
   explicit MoverObserver(const CameraModel& camera);
 
   // `depth` has the camera's size (else InputError); `boxes` are in pixels of the same image. Objects in boxes come
-  // first, in the order of the boxes; regions of too few cells with depth are left out.
+  // first, in the order of the boxes; regions of too few cells with depth are left out. A box of an unnamed region that
+  // lies mostly in boxes with a name is no object of its own.
   std::vector<MoverObservation> observe(const DepthImage& depth, const MoverMask& mask,
                                         std::span<const Detection> boxes, const Rigid3& world_from_cam,
                                         std::span<const ExpectedMover> expected = {});
@@ -67,7 +68,9 @@ class MoverObserver {
   std::array<std::vector<float>, 3> sample(std::span<const uint32_t> cells) const;
   MoverObservation measure(std::span<const uint32_t> cells) const;
   MoverSurface surface_of(std::span<const uint32_t> cells) const;
+  bool is_masked(const MoverMask& mask, int x, int y) const;
   void take_masked_depth(const DepthImage& depth, const MoverMask& mask);
+  std::vector<Detection> named_once(std::span<const Detection> boxes, const MoverMask& mask) const;
   float main_layer(const std::vector<float>& depths) const;
   std::vector<float> box_depths(std::span<const Detection> boxes, const std::vector<CellBounds>& ranges) const;
   std::vector<MoverObservation> observe_boxes(std::span<const Detection> boxes) const;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/detection/mask_folder.h"
 #include "dkb/dynamics/mover_test_scene.h"
 #include "dkb/util/errors.h"
 
@@ -89,6 +90,33 @@ TEST(MoverObserver, ABoxInsideAnotherGetsWhatTheOtherDoesNotExplain) {
   ASSERT_EQ(found.size(), 2u);
   EXPECT_NEAR(found[0].position_in_world.z(), 1.5, 1e-6);
   EXPECT_NEAR(found[1].position_in_world.z(), 2.5, 1e-6);
+}
+
+// A mask beside boxes: each of its regions comes with a box of its own.
+TEST(MoverObserver, ARegionInABoxWithANameIsNoSecondObject) {
+  MoverTestScene scene;
+  scene.add(100, 40, 160, 200, 2);
+  scene.add(200, 40, 260, 200, 3, false);
+  const Detection of_the_named{kUnnamedRegion, {98, 40, 64, 164}, 1},
+      of_the_other{kUnnamedRegion, {200, 40, 60, 160}, 1};
+  scene.boxes.push_back(of_the_named);
+  scene.boxes.push_back(of_the_other);
+  const auto found = observe(scene);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].class_name, "person");
+  EXPECT_EQ(found[1].class_name, kUnnamedRegion);
+  EXPECT_NEAR(found[1].position_in_world.z(), 3, 1e-6);
+}
+
+TEST(MoverObserver, OneRegionOfTwoPeopleIsInTheBoxesOfBoth) {
+  MoverTestScene scene;
+  scene.add(100, 40, 140, 200, 2);
+  scene.add(130, 80, 180, 230, 3);
+  scene.boxes.push_back({kUnnamedRegion, {100, 40, 80, 190}, 1});
+  const auto found = observe(scene);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].class_name, "person");
+  EXPECT_EQ(found[1].class_name, "person");
 }
 
 TEST(MoverObserver, WithoutBoxesRegionsOfOneDepthAreTheObjects) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "dkb/evaluation/trajectory_error.h"
 
@@ -10,10 +11,16 @@ namespace dkb {
 // The evaluation as a table for people (a few lines, one of which begins with APE).
 std::string evaluation_table(const Evaluation& evaluation);
 
+// What the figures hide, a line each: a scale that is wrong, a relative error of few pairs.
+std::vector<std::string> evaluation_warnings(const Evaluation& evaluation);
+// The first of these.
+std::string scale_text(double wrong_scale);
+
 // The evaluation as JSON: matched, estimated, scale, ape.translation_m.{rmse, mean, median, std, min, max},
-// ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs. Numbers of an empty
-// set are null. ape.rotation_determined is false, and ape.rotation_deg null, where positions do not determine the
-// alignment's rotation.
+// ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs, rpe.all_pairs. Numbers
+// of an empty set are null. ape.rotation_determined is false, and ape.rotation_deg null, where positions do not
+// determine the alignment's rotation; ape.rotation_sd_deg is its standard error, of no line. wrong_scale is there only
+// where the estimate's scale is.
 std::string evaluation_json(const Evaluation& evaluation);
 
 // Both paths in their two widest projections, and the APE over time, as one SVG picture without outside references.

@@ -65,6 +65,28 @@ TEST(EvaluationReport, ARotationErrorThatIsNotDeterminedIsToldSo) {
   EXPECT_TRUE(nlohmann::json::parse(evaluation_json(example()))["ape"]["rotation_determined"]);
 }
 
+TEST(EvaluationReport, WhatFiguresHideIsToldInALineEach) {
+  EXPECT_TRUE(evaluation_warnings(example()).empty());
+  const auto few = evaluation_warnings(example("5f"));
+  ASSERT_EQ(few.size(), 1u);
+  EXPECT_EQ(few[0], "RPE 5f: 5 pairs of poses tell little; take a shorter stretch, or all pairs with --rpe-all-pairs");
+  Evaluation e = example();
+  e.wrong_scale = 5;
+  ASSERT_EQ(evaluation_warnings(e).size(), 1u);
+  EXPECT_EQ(evaluation_warnings(e)[0], "the estimate is 5 times too small for the truth; is the depth factor right?");
+  EXPECT_EQ(scale_text(0.001), "the estimate is 1000 times too large for the truth; is the depth factor right?");
+  EXPECT_EQ(nlohmann::json::parse(evaluation_json(e))["wrong_scale"], 5);
+  EXPECT_FALSE(nlohmann::json::parse(evaluation_json(example())).contains("wrong_scale"));
+}
+
+TEST(EvaluationReport, ARotationKnownTooRoughlySaysHowRoughly) {
+  Evaluation e = example();
+  e.rotation_determined = false, e.rotation_sd_deg = 12.3;
+  e.ape.rotation = {};
+  EXPECT_NE(evaluation_table(e).find("not determined: the positions tell how the paths are turned to +- 12 deg only"),
+            std::string::npos);
+}
+
 TEST(EvaluationReport, TicksEndAlsoWhereDoublesAreTooCoarse) {
   EXPECT_EQ(svg::ticks({-0.1, 0.45}, 0.2), (std::vector<double>{0, 0.2, 0.4}));
   EXPECT_LE(svg::ticks({1e17, 1e17 + 64}, 1).size(), 20u);

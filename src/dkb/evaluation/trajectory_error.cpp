@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 
 #include "dkb/geometry/decompositions.h"
 #include "dkb/util/errors.h"
@@ -15,25 +16,49 @@
 namespace dkb {
 namespace {
 
+constexpr double kBeyondDoubt = 5;  // [standard errors] those of few, and alike, errors are rough themselves
+
 double degrees_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return vector_from_rotation(a.conjugate() * b).norm() * 180.0 / std::numbers::pi;
 }
 
-// Index of the stamp nearest to `t`, the first of equally near ones. `trajectory` is sorted and not empty.
-size_t nearest_stamp(const Trajectory& trajectory, double t) {
-  const auto before = [](const StampedPose& pose, double stamp) { return pose.timestamp < stamp; };
-  const auto first_of = [&](double stamp) {
-    return static_cast<size_t>(std::lower_bound(trajectory.begin(), trajectory.end(), stamp, before) -
-                               trajectory.begin());
+// Of the numbers begin ... end - 1, whose values at(i) do not fall, the one nearest to `value`, the first of equally
+// near ones. begin < end.
+template <class At>
+size_t nearest(size_t begin, size_t end, double value, const At& at) {
+  const auto first_of = [&](double bound) {
+    const auto all = std::views::iota(begin, end);
+    return begin + static_cast<size_t>(std::ranges::lower_bound(all, bound, {}, at) - all.begin());
   };
-  const size_t above = first_of(t);
-  if (above == 0) return 0;
-  const size_t below = first_of(trajectory[above - 1].timestamp);
-  if (above == trajectory.size()) return below;
-  return std::abs(trajectory[above].timestamp - t) < std::abs(trajectory[below].timestamp - t) ? above : below;
+  const size_t above = first_of(value);
+  if (above == begin) return begin;
+  const size_t below = first_of(at(above - 1));
+  if (above == end) return below;
+  return std::abs(at(above) - value) < std::abs(at(below) - value) ? above : below;
+}
+
+// From every pose to the later one that is nearest to delta away.
+std::vector<std::pair<size_t, size_t>> all_relative_pairs(const Evaluation& e) {
+  constexpr double kTolerance = 0.1;  // of delta, as evo's
+  const RpeDelta& delta = e.options.rpe_delta;
+  const size_t n = e.estimate.size();
+  std::vector<double> along(n, 0);  // in the unit of delta
+  for (size_t i = 1; i < n; ++i)
+    along[i] = delta.unit == DeltaUnit::frames ? static_cast<double>(i)
+               : delta.unit == DeltaUnit::seconds
+                   ? e.timestamps[i] - e.timestamps[0]
+                   : along[i - 1] + (e.estimate[i].translation - e.estimate[i - 1].translation).norm();
+  const double tolerance = delta.unit == DeltaUnit::frames ? 0 : kTolerance * delta.value;
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (size_t i = 0; i + 1 < n; ++i) {
+    const size_t j = nearest(i + 1, n, along[i] + delta.value, [&](size_t k) { return along[k]; });
+    if (std::abs(along[j] - along[i] - delta.value) <= tolerance) pairs.emplace_back(i, j);
+  }
+  return pairs;
 }
 
 std::vector<std::pair<size_t, size_t>> relative_pairs(const Evaluation& e) {
+  if (e.options.rpe_all_pairs) return all_relative_pairs(e);
   const RpeDelta& delta = e.options.rpe_delta;
   const size_t n = e.estimate.size();
   std::vector<size_t> cuts;
@@ -57,24 +82,65 @@ std::vector<std::pair<size_t, size_t>> relative_pairs(const Evaluation& e) {
   return pairs;
 }
 
-// Standard deviations of points along their two widest directions, [m].
-Eigen::Vector2d spreads(const std::vector<Eigen::Vector3d>& points) {
+// Standard deviations of points along their three main directions, the widest first, [m].
+Eigen::Vector3d spreads(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
   const Eigen::Vector3d variances = spectrum(Eigen::Matrix3d(scatter / static_cast<double>(points.size()))).values;
-  return variances.tail<2>().reverse().cwiseMax(0).cwiseSqrt();
+  return variances.reverse().cwiseMax(0).cwiseSqrt();
 }
 
-// Whether positions determine the rotation that aligns them: both paths leave a line by more than files round, a share
-// of its length and, for the truth, which is in metres, a length.
-bool determines_rotation(const std::vector<Eigen::Vector3d>& estimate, const std::vector<Eigen::Vector3d>& truth) {
+// Whether paths leave a line by more than files round: a share of its length and, for the truth, which is in metres, a
+// length. What is on a line can be turned about it.
+bool leave_a_line(const std::vector<Eigen::Vector3d>& estimate, const std::vector<Eigen::Vector3d>& truth) {
   constexpr double kLeastShare = 1e-4, kLeast = 1e-4;  // [m]
-  const Eigen::Vector2d e = spreads(estimate), t = spreads(truth);
+  const Eigen::Vector3d e = spreads(estimate), t = spreads(truth);
   // Means of positions far from the origin are rounded, which looks like an offset across.
   const double far = 1e-12 * std::max(estimate.front().norm(), truth.front().norm());
   return t[1] > std::max({kLeast, far, kLeastShare * t[0]}) && e[1] > std::max(far, kLeastShare * e[0]);
+}
+
+// [m] Standard error of a mean of the errors' coordinates. Errors of neighbours are alike, so that n of them count for
+// n (1 - r) / (1 + r), by the correlation r of neighbours (first-order autoregression).
+double standard_error(const std::vector<Eigen::Vector3d>& errors) {
+  double squares = 0, products = 0;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    squares += errors[i].squaredNorm();
+    if (i > 0) products += errors[i].dot(errors[i - 1]);
+  }
+  if (!(squares > 0)) return 0;
+  const double n = static_cast<double>(errors.size()), r = std::clamp(products / squares, 0.0, 1.0);
+  const double independent = std::max(1.0, n * (1 - r) / (1 + r));
+  return std::sqrt(squares / (3 * n) / independent);
+}
+
+// [deg] Standard error of the rotation that aligns positions, about their longest line: how far it turns the others.
+double rotation_sd(const std::vector<Eigen::Vector3d>& errors, const std::vector<Eigen::Vector3d>& truth) {
+  return standard_error(errors) / spreads(truth).tail<2>().norm() * 180 / std::numbers::pi;
+}
+
+std::vector<Eigen::Vector3d> errors_after(const Similarity3& to_from_from, const std::vector<Eigen::Vector3d>& from,
+                                          const std::vector<Eigen::Vector3d>& to) {
+  std::vector<Eigen::Vector3d> errors;
+  for (size_t i = 0; i < from.size(); ++i) errors.push_back(to_from_from * from[i] - to[i]);
+  return errors;
+}
+
+// The scale that fits best, where it is another than 1 by a tenth, which no camera's calibration is off by, and by five
+// standard errors. Errors of the estimate make its path longer, and the scale that fits best smaller, by the ratio of
+// their variances: that much is not counted.
+std::optional<double> wrong_scale(const Similarity3& best, const std::vector<Eigen::Vector3d>& errors,
+                                  const std::vector<Eigen::Vector3d>& from) {
+  constexpr double kLeast = 0.1;
+  if (!(best.scale > 0)) return {};
+  double squares = 0;
+  for (const Eigen::Vector3d& e : errors) squares += e.squaredNorm() / static_cast<double>(errors.size());
+  const double spread = best.scale * spreads(from).norm();
+  const double off = std::abs(std::log(best.scale)) - squares / (spread * spread);
+  if (!(off > kLeast) || off * spread < kBeyondDoubt * standard_error(errors)) return {};
+  return best.scale;
 }
 
 void add_statistics(PoseErrors* errors) {
@@ -109,6 +175,7 @@ std::string to_string(const RpeDelta& delta) {
 
 void EvaluationOptions::check() const {
   require_option(std::isfinite(max_difference) && max_difference >= 0, "max-diff", max_difference, "at least 0 s");
+  require_option(std::isfinite(time_offset), "time-offset", time_offset, "a number of seconds");
   rpe_delta.check();
 }
 
@@ -137,16 +204,18 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
   const Trajectory &shorter = walk_a ? a : b, &longer = walk_a ? b : a;
   std::vector<std::pair<size_t, size_t>> matches;
   for (size_t i = 0; i < shorter.size() && !longer.empty(); ++i) {
-    const size_t j = nearest_stamp(longer, shorter[i].timestamp);
+    const size_t j = nearest(0, longer.size(), shorter[i].timestamp, [&](size_t k) { return longer[k].timestamp; });
     if (std::abs(longer[j].timestamp - shorter[i].timestamp) > max_difference) continue;
     matches.emplace_back(walk_a ? i : j, walk_a ? j : i);
   }
   return matches;
 }
 
-Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options,
+Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const EvaluationOptions& options,
                     const std::string& name) {
   options.check();
+  Trajectory estimate = given;
+  for (StampedPose& pose : estimate) pose.timestamp += options.time_offset;
   Evaluation e;
   e.options = options;
   e.truth_poses = truth.size(), e.estimated_poses = estimate.size();
@@ -165,16 +234,23 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
   }
 
   e.truth_from_estimate = align_umeyama(from, to, options.with_scale);
-  e.rotation_determined = determines_rotation(from, to);
+  // A wrong scale is an error of its own, and leaves the rotation as it is.
+  const Similarity3 best = align_umeyama(from, to, true);
+  const std::vector<Eigen::Vector3d> errors = errors_after(best, from, to);
+  if (!options.with_scale) e.wrong_scale = wrong_scale(best, errors, from);
+  e.rotation_sd_deg = leave_a_line(from, to) ? rotation_sd(errors, to) : INFINITY;
   const Similarity3& s = e.truth_from_estimate;
   for (const auto& [i, j] : matches) {
     const Rigid3 &t = truth[i].world_from_cam, &x = estimate[j].world_from_cam;
     e.truth.push_back(t);
     e.estimate.emplace_back((s.motion.rotation * x.rotation).normalized(), s * x.translation);
     e.ape.translation_m.push_back((e.estimate.back().translation - t.translation).norm());
-    if (e.rotation_determined) e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
+    e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
   }
   add_statistics(&e.ape);
+  constexpr double kRough = 2;  // [deg] whole sequences know it to 0.3 ... 1, clips of seconds to 5 ... 20
+  e.rotation_determined = e.rotation_sd_deg <= std::max(kRough, e.ape.rotation.rmse / kBeyondDoubt);
+  if (!e.rotation_determined) e.ape.rotation_deg.clear(), add_statistics(&e.ape);
 
   e.rpe_pairs = relative_pairs(e);
   for (const auto& [i, j] : e.rpe_pairs) {
@@ -188,14 +264,14 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const E
   return e;
 }
 
-Trajectory read_poses(const std::filesystem::path& path) {
+Trajectory read_poses(const std::filesystem::path& path, size_t* hidden) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
     const bool sequence = std::filesystem::exists(path / "groundtruth.txt", error);
     throw InputError(path.string() + ": is a folder; give the trajectory in it, as " +
                      (path / (sequence ? "groundtruth.txt" : "trajectory.txt")).string());
   }
-  Trajectory trajectory = read_trajectory(path);
+  Trajectory trajectory = read_trajectory(path, hidden);
   if (trajectory.empty()) throw InputError(path.string() + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
   return trajectory;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,7 +12,8 @@
 
 namespace dkb {
 
-// Errors of a trajectory against the truth, defined as the tool evo defines them (docs of evo_ape and evo_rpe).
+// Errors of a trajectory against the truth, defined as the tool evo defines them (docs of evo_ape and evo_rpe). The
+// one difference is max_difference, which is 0.01 s there.
 
 enum class DeltaUnit { frames, metres, seconds };
 
@@ -26,9 +28,11 @@ std::string to_string(const RpeDelta& delta);
 
 struct EvaluationOptions {
   double max_difference = 0.02;  // [s] between matched stamps, >= 0
+  double time_offset = 0;        // [s] added to the stamps of the estimate
   RpeDelta rpe_delta;
-  bool with_scale = false;  // align by a similarity instead of a rigid motion
-  void check() const;       // throws InvalidOption
+  bool rpe_all_pairs = false;  // from every pose on, in the place of stretches that do not overlap
+  bool with_scale = false;     // align by a similarity instead of a rigid motion
+  void check() const;          // throws InvalidOption
 };
 
 struct ErrorStatistics {
@@ -50,9 +54,15 @@ struct Evaluation {
   std::vector<double> timestamps;               // [s] of the matched estimates
   std::vector<Rigid3> truth, estimate;          // matched, world_from_cam, the estimate aligned to the truth
   Similarity3 truth_from_estimate;              // the alignment
-  // False where either path lies on a line or in one place: any turn about that aligns as well, and a rotation error
-  // (ape.rotation_deg, which is empty) would be one of the turn that happened to be taken.
+  // [deg] standard error of the alignment's rotation about the axis that positions tell least of; infinite where either
+  // path lies on a line or in one place.
+  double rotation_sd_deg = 0;
+  // False where that is more than 2 degrees, and the rotation error within five of them: it may be the alignment's
+  // alone, and is left out.
   bool rotation_determined = true;
+  // By how much the estimate is to be enlarged to fit the truth best, where that is told from 1 beyond doubt: most
+  // often a wrong depth factor. Nothing with `with_scale`.
+  std::optional<double> wrong_scale;
   PoseErrors ape;                                    // per matched pose
   PoseErrors rpe;                                    // per pair of poses
   std::vector<std::pair<size_t, size_t>> rpe_pairs;  // indices of matched poses
@@ -68,11 +78,13 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
 //   frames   poses 0, n, 2n, ...
 //   metres   cut where the path of the estimate since the last cut reaches delta; the first cut is the first such place
 //   seconds  cut at the first pose and wherever delta has passed since the last cut
+// With `rpe_all_pairs` over the stretches from every pose to the later one that is nearest to delta away, if within a
+// tenth of it: as evo takes all pairs, and nearly as the TUM benchmark's evaluate_rpe does.
 // Deterministic. Throws InputError when fewer than 2 poses match; `name`, the estimate's, opens its message.
 Evaluation evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options = {},
                     const std::string& name = {});
 
 // A trajectory file to be evaluated: read_trajectory(), and InputError when it holds no pose.
-Trajectory read_poses(const std::filesystem::path& path);
+Trajectory read_poses(const std::filesystem::path& path, size_t* hidden = nullptr);
 
 }  // namespace dkb

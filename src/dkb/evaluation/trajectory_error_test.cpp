@@ -156,23 +156,23 @@ TEST(Evaluate, ScaleIsTakenOutOnlyWhenAsked) {
 }
 
 TEST(Evaluate, HandComputedErrors) {
-  // A square in the xy plane; the estimate's corners stand 0.1 m above and below it in turn, so that the best alignment
-  // is none, and its cameras are turned by 10 degrees about z.
+  // A square in the xy plane; the estimate's corners stand 0.05 m above and below it in turn, so that the best
+  // alignment is none, and its cameras are turned by 10 degrees about z.
   Trajectory truth, estimate;
   const Eigen::Vector3d corners[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   for (int i = 0; i < 4; ++i) {
     truth.push_back(pose(i, corners[i]));
-    estimate.push_back(pose(i, corners[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 0.1 : -0.1), {0, 0, 10 * kDegree}));
+    estimate.push_back(pose(i, corners[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 0.05 : -0.05), {0, 0, 10 * kDegree}));
   }
   const Evaluation e = evaluate(truth, estimate);
-  EXPECT_NEAR(e.ape.translation.rmse, 0.1, 1e-12);
-  EXPECT_NEAR(e.ape.translation.min, 0.1, 1e-12);
+  EXPECT_NEAR(e.ape.translation.rmse, 0.05, 1e-12);
+  EXPECT_NEAR(e.ape.translation.min, 0.05, 1e-12);
   EXPECT_NEAR(e.ape.rotation.rmse, 10, 1e-9);
   EXPECT_NEAR(e.ape.rotation.max, 10, 1e-9);
-  // A step (1, 0, 0) is seen as (cos 10, -sin 10, +-0.2) by cameras that are turned: the error is
-  // sqrt((1 - cos 10)^2 + sin^2 10 + 0.04) = sqrt(2 - 2 cos 10 + 0.04) for each of the three steps.
+  // A step (1, 0, 0) is seen as (cos 10, -sin 10, +-0.1) by cameras that are turned: the error is
+  // sqrt((1 - cos 10)^2 + sin^2 10 + 0.01) = sqrt(2 - 2 cos 10 + 0.01) for each of the three steps.
   EXPECT_EQ(e.rpe.translation.count, 3u);
-  EXPECT_NEAR(e.rpe.translation.rmse, std::sqrt(2 - 2 * std::cos(10 * kDegree) + 0.04), 1e-12);
+  EXPECT_NEAR(e.rpe.translation.rmse, std::sqrt(2 - 2 * std::cos(10 * kDegree) + 0.01), 1e-12);
   EXPECT_NEAR(e.rpe.rotation.max, 0, 1e-9);
 }
 
@@ -188,6 +188,78 @@ TEST(Evaluate, RelativeErrorsAreOverStretchesThatDoNotOverlap) {
   EXPECT_EQ(pairs("0.6m"), (Pairs{{3, 6}, {6, 9}}));
   EXPECT_TRUE(pairs("100m").empty());
   EXPECT_EQ(evaluate(t, t, {.rpe_delta = parse_rpe_delta("100f")}).rpe.translation.count, 0u);
+}
+
+TEST(Evaluate, AllPairsBeginAtEveryPose) {
+  Trajectory t;
+  for (int i = 0; i < 10; ++i) t.push_back(pose(1305031102.1 + 0.1 * i, {0.25 * i, 0.0, 0}));
+  const auto pairs = [&](const char* delta) {
+    return evaluate(t, t, {.rpe_delta = parse_rpe_delta(delta), .rpe_all_pairs = true}).rpe_pairs;
+  };
+  EXPECT_EQ(pairs("1f").size(), 9u);
+  EXPECT_EQ(pairs("7f"), (Pairs{{0, 7}, {1, 8}, {2, 9}}));
+  EXPECT_EQ(pairs("0.72s"), (Pairs{{0, 7}, {1, 8}, {2, 9}})) << "the nearest within a tenth";
+  EXPECT_EQ(pairs("1.8m"), (Pairs{{0, 7}, {1, 8}, {2, 9}}));
+  EXPECT_TRUE(pairs("0.15s").empty()) << "0.1 s and 0.2 s are farther than a tenth away";
+  EXPECT_TRUE(pairs("100m").empty());
+  // A gap: no pair reaches over it that is much longer than asked for.
+  t.erase(t.begin() + 3, t.begin() + 7);
+  EXPECT_EQ(pairs("0.2s"), (Pairs{{0, 2}, {3, 5}}));
+}
+
+TEST(Evaluate, AnOffsetIsAddedToTheEstimatesStamps) {
+  const Trajectory truth = random_walk(50, 4);
+  Trajectory estimate = truth;
+  for (StampedPose& p : estimate) p.timestamp -= 1000.25;
+  EXPECT_THROW(evaluate(truth, estimate), InputError);
+  const Evaluation e = evaluate(truth, estimate, {.time_offset = 1000.25, .rpe_delta = {}});
+  EXPECT_EQ(e.timestamps.size(), 50u);
+  EXPECT_NEAR(e.timestamps[0], truth[0].timestamp, 1e-9);
+  EXPECT_LT(e.ape.translation.max, 1e-9);
+  EXPECT_THROW(evaluate(truth, truth, {.time_offset = std::nan(""), .rpe_delta = {}}), InvalidOption);
+}
+
+// A walk whose errors are `sd` [m] and independent.
+Trajectory disturbed(Trajectory t, double sd) {
+  Random random(9);
+  for (StampedPose& p : t)
+    for (int k = 0; k < 3; ++k) p.world_from_cam.translation[k] += sd * random.normal();
+  return t;
+}
+
+TEST(Evaluate, AScaleThatIsWrongBeyondDoubtIsTold) {
+  const Trajectory truth = random_walk(200, 5);
+  const auto scaled = [&](double factor, double sd) {
+    Trajectory t = truth;
+    for (StampedPose& p : t) p.world_from_cam.translation *= factor;
+    return disturbed(t, sd);
+  };
+  ASSERT_TRUE(evaluate(truth, scaled(0.2, 0.01)).wrong_scale);
+  EXPECT_NEAR(*evaluate(truth, scaled(0.2, 0.01)).wrong_scale, 5, 0.1);
+  EXPECT_NEAR(evaluate(truth, scaled(1000, 1)).wrong_scale.value_or(0), 0.001, 1e-5);
+  EXPECT_FALSE(evaluate(truth, scaled(1.05, 0.01)).wrong_scale) << "a focal length may be off by so much";
+  EXPECT_FALSE(evaluate(truth, scaled(1, 0.3)).wrong_scale);
+  EXPECT_FALSE(evaluate(truth, scaled(0.2, 0.01), {.rpe_delta = {}, .with_scale = true}).wrong_scale);
+  // One that has nothing in common with the truth has no scale: it fits best when it is shrunk.
+  EXPECT_FALSE(evaluate(truth, random_walk(200, 6)).wrong_scale);
+}
+
+TEST(Evaluate, ARotationThatPositionsDoNotTellIsNoError) {
+  // A clip of a second that moves by 4 mm, with errors of 5 mm and cameras turned by 2 degrees about z.
+  Trajectory clip, turned;
+  for (int i = 0; i < 30; ++i) {
+    const double a = 0.2 * i;
+    clip.push_back(pose(0.03 * i, {0.004 * std::cos(a), 0.004 * std::sin(a), 0}));
+    turned.push_back(pose(0.03 * i, clip.back().world_from_cam.translation, {0, 0, 2 * kDegree}));
+  }
+  EXPECT_NEAR(evaluate(clip, turned).ape.rotation.rmse, 2, 1e-9) << "without errors of position it is told";
+  const Evaluation e = evaluate(clip, disturbed(turned, 0.005));
+  EXPECT_FALSE(e.rotation_determined);
+  EXPECT_EQ(e.ape.rotation.count, 0u);
+  // 5 mm a coordinate, over 30 poses, on a lever of 2.8 mm.
+  EXPECT_NEAR(e.rotation_sd_deg, 0.005 / std::sqrt(30) / 0.0028 / kDegree, 8);
+  // The same errors on a walk of some metres.
+  EXPECT_TRUE(evaluate(random_walk(200, 5), disturbed(random_walk(200, 5), 0.005)).rotation_sd_deg < 0.1);
 }
 
 TEST(Evaluate, TooFewMatchesAreAnInputError) {
