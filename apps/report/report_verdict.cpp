@@ -125,10 +125,11 @@ std::string verdict(const Context& c) {
                 "by a motion prior or depth alone: " + why_lost(c, TrackingState::predicted));
   if (c.truth.evaluation) {
     const PoseErrors& ape = c.truth.evaluation->ape;
-    out += tile(" good", "APE, rmse", fmt::format("<span id=\"ape\">{:.4f}</span> m", ape.translation.rmse),
-                fmt::format("{}median {:.4f} m, largest {:.4f} m · {} poses",
-                            c.truth.evaluation->rotation_determined ? fmt::format("{:.2f}° · ", ape.rotation.rmse) : "",
-                            ape.translation.median, ape.translation.max, ape.translation.count));
+    out +=
+        tile(" good", "APE, rmse", fmt::format("<span id=\"ape\">{:.4f}</span> m", ape.translation.rmse),
+             fmt::format("{}median {:.4f} m, largest {:.4f} m · {} poses",
+                         c.truth.evaluation->rotation_determined() ? fmt::format("{:.2f}° · ", ape.rotation.rmse) : "",
+                         ape.translation.median, ape.translation.max, ape.translation.count));
   }
   if (!c.log.rows().empty()) out += speed_tile(c);
   out += tile("", "Map", plural(s.keyframes, "keyframe", "keyframes"),

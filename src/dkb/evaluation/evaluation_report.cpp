@@ -20,13 +20,6 @@ std::string table_row(const char* name, const char* unit, const ErrorStatistics&
                      decimals);
 }
 
-std::string why_no_rotation(const Evaluation& e) {
-  if (std::isfinite(e.rotation_sd_deg))
-    return fmt::format("not determined: the positions tell how the paths are turned to +- {:.2g} deg only",
-                       e.rotation_sd_deg);
-  return "not determined: a path lies on a line or in one place, which can be turned about itself";
-}
-
 nlohmann::ordered_json statistics_json(const ErrorStatistics& s) {
   const auto value = [&](double x) { return s.count == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(x); };
   return {{"rmse", value(s.rmse)}, {"mean", value(s.mean)}, {"median", value(s.median)},
@@ -48,10 +41,15 @@ std::string evaluation_table(const Evaluation& e) {
   out += fmt::format("{:<21} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median", "std", "min",
                      "max");
   out += table_row("APE translation", "m", e.ape.translation, 6);
-  out += table_row("APE rotation", "deg", e.ape.rotation, 4, why_no_rotation(e).c_str());
+  out += table_row("APE rotation", "deg", e.ape.rotation, 4,
+                   "not determined: a path lies on a line or in one place, which can be turned about itself");
   const std::string rpe = "RPE " + to_string(e.options.rpe_delta);
   out += table_row((rpe + " transl.").c_str(), "m", e.rpe.translation, 6);
   out += table_row((rpe + " rotation").c_str(), "deg", e.rpe.rotation, 4);
+  // A short clip, or one that hardly moves.
+  if (e.rotation_determined() && e.rotation_sd_deg >= e.ape.rotation.rmse)
+    out += fmt::format("APE rotation may be the alignment's alone: the positions tell it to +- {:.2g} deg\n",
+                       e.rotation_sd_deg);
   if (!e.rpe_pairs.empty())
     out += fmt::format("{} of {} pairs of poses{}\n", rpe, e.rpe_pairs.size(),
                        e.options.rpe_all_pairs ? ", all that are so far apart" : "");
@@ -80,8 +78,8 @@ std::string evaluation_json(const Evaluation& e) {
   json["scale"] = e.truth_from_estimate.scale;
   if (e.wrong_scale) json["wrong_scale"] = *e.wrong_scale;
   json["ape"] = errors_json(e.ape);
-  json["ape"]["rotation_determined"] = e.rotation_determined;
-  if (std::isfinite(e.rotation_sd_deg)) json["ape"]["rotation_sd_deg"] = e.rotation_sd_deg;
+  json["ape"]["rotation_determined"] = e.rotation_determined();
+  if (e.rotation_determined()) json["ape"]["rotation_sd_deg"] = e.rotation_sd_deg;
   json["rpe"] = errors_json(e.rpe);
   json["rpe"]["delta"] = to_string(e.options.rpe_delta);
   json["rpe"]["pairs"] = e.rpe_pairs.size();

@@ -19,7 +19,7 @@ std::string scale_text(double wrong_scale);
 // The evaluation as JSON: matched, estimated, scale, ape.translation_m.{rmse, mean, median, std, min, max},
 // ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs, rpe.all_pairs. Numbers
 // of an empty set are null. ape.rotation_determined is false, and ape.rotation_deg null, where positions do not
-// determine the alignment's rotation; ape.rotation_sd_deg is its standard error, of no line. wrong_scale is there only
+// determine the alignment's rotation; ape.rotation_sd_deg is its standard error, elsewhere. wrong_scale is there only
 // where the estimate's scale is.
 std::string evaluation_json(const Evaluation& evaluation);
 

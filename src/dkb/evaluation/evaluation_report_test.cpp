@@ -81,10 +81,12 @@ TEST(EvaluationReport, WhatFiguresHideIsToldInALineEach) {
 
 TEST(EvaluationReport, ARotationKnownTooRoughlySaysHowRoughly) {
   Evaluation e = example();
-  e.rotation_determined = false, e.rotation_sd_deg = 12.3;
-  e.ape.rotation = {};
-  EXPECT_NE(evaluation_table(e).find("not determined: the positions tell how the paths are turned to +- 12 deg only"),
-            std::string::npos);
+  const std::string doubt = "APE rotation may be the alignment's alone: the positions tell it to +- 12 deg";
+  EXPECT_EQ(evaluation_table(e).find("alone"), std::string::npos);
+  e.rotation_sd_deg = 12.3;
+  EXPECT_NE(evaluation_table(e).find(doubt), std::string::npos);
+  e.ape.rotation.rmse = 20;
+  EXPECT_EQ(evaluation_table(e).find(doubt), std::string::npos);
 }
 
 TEST(EvaluationReport, TicksEndAlsoWhereDoublesAreTooCoarse) {

@@ -245,12 +245,9 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const Eval
     e.truth.push_back(t);
     e.estimate.emplace_back((s.motion.rotation * x.rotation).normalized(), s * x.translation);
     e.ape.translation_m.push_back((e.estimate.back().translation - t.translation).norm());
-    e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
+    if (e.rotation_determined()) e.ape.rotation_deg.push_back(degrees_between(t.rotation, e.estimate.back().rotation));
   }
   add_statistics(&e.ape);
-  constexpr double kRough = 2;  // [deg] whole sequences know it to 0.3 ... 1, clips of seconds to 5 ... 20
-  e.rotation_determined = e.rotation_sd_deg <= std::max(kRough, e.ape.rotation.rmse / kBeyondDoubt);
-  if (!e.rotation_determined) e.ape.rotation_deg.clear(), add_statistics(&e.ape);
 
   e.rpe_pairs = relative_pairs(e);
   for (const auto& [i, j] : e.rpe_pairs) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -57,9 +58,7 @@ struct Evaluation {
   // [deg] standard error of the alignment's rotation about the axis that positions tell least of; infinite where either
   // path lies on a line or in one place.
   double rotation_sd_deg = 0;
-  // False where that is more than 2 degrees, and the rotation error within five of them: it may be the alignment's
-  // alone, and is left out.
-  bool rotation_determined = true;
+  bool rotation_determined() const { return std::isfinite(rotation_sd_deg); }
   // By how much the estimate is to be enlarged to fit the truth best, where that is told from 1 beyond doubt: most
   // often a wrong depth factor. Nothing with `with_scale`.
   std::optional<double> wrong_scale;

@@ -76,7 +76,7 @@ std::string evaluation_svg(const Evaluation& e, const std::string& title) {
                               ? "no pair of poses is that far apart"
                               : fmt::format("{:.4f} m, {:.3f} deg rmse", e.rpe.translation.rmse, e.rpe.rotation.rmse);
   const std::string turned =
-      e.rotation_determined ? fmt::format("{:.3f} deg rmse", e.ape.rotation.rmse) : "rotation not determined";
+      e.rotation_determined() ? fmt::format("{:.3f} deg rmse", e.ape.rotation.rmse) : "rotation not determined";
   out += heading(title, fmt::format("APE {:.4f} m, {}; RPE ({}) {}; {} poses", e.ape.translation.rmse, turned,
                                     to_string(e.options.rpe_delta), rpe, e.timestamps.size()));
   double legend = 70;
