@@ -235,20 +235,24 @@ void LocalMapper::cull_keyframes(KeyframeId newest) {
   for (const Covisible& c : neighbours) {
     const Keyframe* k = map_.live_keyframe(c.keyframe);
     if (k == nullptr || k->parent == kNoKeyframe) continue;
-    int points = 0, redundant = 0;
-    for (size_t f = 0; f < k->points.size(); ++f) {
+    const auto points = std::count_if(k->points.begin(), k->points.end(), [](PointId p) { return p != kNoPoint; });
+    const double enough = options_.redundant_share * static_cast<double>(points);
+    std::ptrdiff_t redundant = 0, left = points;
+    for (size_t f = 0; f < k->points.size() && static_cast<double>(redundant + left) > enough; ++f) {
       const MapPoint* p = map_.point(k->points[f]);
       if (p == nullptr) continue;
-      ++points;
+      --left;
       if (static_cast<int>(p->observations.size()) <= kRedundantObservers) continue;
       const int octave = k->features->keypoints[f].octave;
       int as_fine = 0;
-      for (const Observation& o : p->observations)
+      for (size_t i = 0; i < p->observations.size() && as_fine < kRedundantObservers; ++i) {
+        const Observation& o = p->observations[i];
         as_fine += o.keyframe != c.keyframe &&
                    map_.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)].octave <= octave + 1;
+      }
       redundant += as_fine >= kRedundantObservers;
     }
-    if (points > 0 && redundant > options_.redundant_share * points) {
+    if (points > 0 && static_cast<double>(redundant) > enough) {
       map_.cull_keyframe(c.keyframe);
       ++report_.keyframes_culled;
     }
