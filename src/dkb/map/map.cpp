@@ -284,7 +284,7 @@ void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   // The best one stays, however little they share, and whoever has nobody else.
   const auto has_others = [&](const Covisible& c) {
     const std::vector<Covisible>& its = keyframe(c.keyframe)->covisible;
-    return its.size() != 1 || its[0].keyframe != id;
+    return std::any_of(its.begin(), its.end(), [id](const Covisible& other) { return other.keyframe != id; });
   };
   for (size_t i = found.size(); i-- > 1 && found[i].shared_points < min_shared_points;)
     if (has_others(found[i])) found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));

@@ -230,6 +230,13 @@ TEST(Map, TooWeakCovisibilityLeavesTheBestEdgeAndThoseOfKeyframesThatHaveNoOther
   EXPECT_EQ(broken_invariant(world.map), "");
 }
 
+TEST(Map, AKeyframeWithoutNeighboursTakesWhateverEdgeThereIs) {
+  ThreeKeyframes world;
+  world.map.update_covisibility(1, 4);  // 0 is its best; 2 has nobody yet, and shares one point with it
+  EXPECT_EQ(points_shared_with(1, world.map.keyframe(2)->covisible), 1);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
 TEST(Map, CulledKeyframesRideOnTheirParents) {
   ThreeKeyframes world;
   const Rigid3 before = world.map.cam_from_world(1);
