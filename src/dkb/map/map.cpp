@@ -321,16 +321,20 @@ KeyframeId Map::moved_on_from(KeyframeId id) const {
   return keyframe(next)->motion->previous == id ? next : kNoKeyframe;
 }
 
-// What told of the way to this keyframe and from it tells of the way past it.
-void Map::hand_on_motion(KeyframeId id) {
+// What told of the way to this keyframe and from it tells of the way past it. Where nothing tells of the way to it, the
+// way from it begins at its parent, on which it rides: as when a keyframe comes whose motion began at a culled one.
+void Map::hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent) {
   const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
   for (KeyframeId next = id + 1; next < keyframe_count(); ++next) {
     const Keyframe& k = *keyframe(next);
     if (k.culled || k.motion == nullptr || k.motion->previous != id) continue;
-    const std::shared_ptr<const KeyframeMotion> after = k.motion;
-    edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
-                                     KeyframeMotion{before->previous, joined(before->since, after->since)})
-                               : nullptr;
+    KeyframeMotion past{parent, k.motion->since};
+    if (before)
+      past = {before->previous, joined(before->since, past.since)};
+    else
+      past.since.previous_from_current = cam_from_parent.inverse() * past.since.previous_from_current;
+    // Where two maps were joined a parent may be the younger one.
+    edit(next).motion = past.previous < next ? std::make_shared<const KeyframeMotion>(past) : nullptr;
   }
 }
 
@@ -364,7 +368,7 @@ void Map::cull_keyframe(KeyframeId id) {
   for (const Covisible& c : keyframe(id)->covisible) drop_covisible(edit(c.keyframe).covisible, id);
   for (const auto& other : keyframes_)
     if (!other.value->culled && other.value->parent == id) edit(other.value->id).parent = parent;
-  hand_on_motion(id);
+  hand_on_motion(id, parent, cam_from_parent);
   Keyframe& me = edit(id);
   me.culled = true;
   me.cam_from_parent = cam_from_parent;

@@ -185,7 +185,7 @@ class Map {
   void add_live(MapPoint point);
   void add_gone(RemovedPoint point);
   void remove_point(PointId point, PointId replaced_by);
-  void hand_on_motion(KeyframeId id);
+  void hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent);
   void check_keyframes() const;
   void check_forwarding() const;
 
