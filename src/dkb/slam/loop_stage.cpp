@@ -15,7 +15,6 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
       search_(
           [this](const Task& task) {
             Result result;
-            result.generation = task.generation;
             if (task.generation == closed_generation_) return result;  // the map is about to move
             const Stopwatch watch;
             if (auto correction = closer_.process(*task.view, task.keyframe)) {
@@ -59,7 +58,7 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
   std::vector<std::shared_ptr<const MapCorrection>> corrections;
   while (auto found = search_.take_due(now, wait)) {
     times_.add("loop", found->ms);
-    if (!found->correction || found->generation != generation_) continue;
+    if (!found->correction) continue;
     ++generation_;
     adjustment_wanted_ = true;
     corrections.push_back(std::move(found->correction));

@@ -57,7 +57,7 @@ class LoopStage {
   };
   struct Result {
     std::shared_ptr<const MapCorrection> correction;  // none when nothing was found
-    int generation = 0;
+    int generation = 0;  // of an adjustment
     double ms = 0;
   };
 
