@@ -39,8 +39,9 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
   BaProblem graph;
   std::vector<int> node(static_cast<size_t>(map.keyframe_count()), -1);
   std::vector<KeyframeId> keyframes;
+  const std::vector<KeyframeId> root_of = map.root_of_each();
   for (KeyframeId k : map.live_keyframes()) {
-    if (map.root(k) != root) continue;
+    if (root_of[static_cast<size_t>(k)] != root) continue;
     node[static_cast<size_t>(k)] = static_cast<int>(keyframes.size());
     keyframes.push_back(k);
     graph.cam_from_world.push_back(map.keyframe(k)->cam_from_world);
@@ -123,9 +124,10 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vect
   const Keyframe& stays = *map.keyframe(correction.far_joint);
   correction.joint_covariance = carried(stays.cam_from_world.inverse(), stays.covariance) +
                                 carried(near_cam_from_world.inverse(), fit.covariance);
-  const KeyframeId moving = map.root(correction.near_joint);
+  const std::vector<KeyframeId> root_of = map.root_of_each();
+  const KeyframeId moving = root_of[static_cast<size_t>(correction.near_joint)];
   for (KeyframeId id : map.live_keyframes()) {
-    if (map.root(id) != moving) continue;
+    if (root_of[static_cast<size_t>(id)] != moving) continue;
     const Rigid3& before = map.keyframe(id)->cam_from_world;
     correction.poses.push_back({id, before, before * moved_from_world.inverse()});
   }

@@ -82,6 +82,21 @@ KeyframeId Map::root(KeyframeId id) const {
   return k->id;
 }
 
+std::vector<KeyframeId> Map::root_of_each() const {
+  std::vector<KeyframeId> roots(keyframes_.size(), kNoKeyframe);
+  std::vector<KeyframeId> path;
+  for (KeyframeId id = 0; id < keyframe_count(); ++id) {
+    path.clear();
+    KeyframeId at = id;
+    for (; roots[static_cast<size_t>(at)] == kNoKeyframe && keyframe(at)->parent != kNoKeyframe;
+         at = keyframe(at)->parent)
+      path.push_back(at);
+    if (roots[static_cast<size_t>(at)] == kNoKeyframe) roots[static_cast<size_t>(at)] = at;
+    for (KeyframeId k : path) roots[static_cast<size_t>(k)] = roots[static_cast<size_t>(at)];
+  }
+  return roots;
+}
+
 std::vector<KeyframeId> Map::roots() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)
@@ -92,8 +107,10 @@ std::vector<KeyframeId> Map::roots() const {
 std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
   std::vector<KeyframeId> newest;
   if (keyframe(id) == nullptr) return newest;
+  const std::vector<KeyframeId> root = root_of_each();
   for (KeyframeId k = keyframe_count(); k-- > 0 && static_cast<int>(newest.size()) < most;)
-    if (live_keyframe(k) != nullptr && root(k) == root(id)) newest.push_back(k);
+    if (live_keyframe(k) != nullptr && root[static_cast<size_t>(k)] == root[static_cast<size_t>(id)])
+      newest.push_back(k);
   std::reverse(newest.begin(), newest.end());
   return newest;
 }

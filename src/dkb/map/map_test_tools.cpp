@@ -113,6 +113,7 @@ std::string tree_broken(const Map& map) {
     int steps = 0;
     for (KeyframeId a = id; a != kNoKeyframe; a = map.keyframe(a)->parent)
       if (++steps > map.keyframe_count()) return "parents run in a circle";
+    if (map.root_of_each()[static_cast<size_t>(id)] != map.root(id)) return "roots are told in two ways";
     if (k.culled && (k.parent == kNoKeyframe || k.features || !k.points.empty() || !k.covisible.empty()))
       return "a culled keyframe is not empty, or has no parent";
     if (!k.culled && k.parent != kNoKeyframe && map.live_keyframe(k.parent) == nullptr)

@@ -16,9 +16,8 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
   both.append(second);
   const auto is_joined = [&](const Map& map) {
     const KeyframeId begin = first.keyframe_count();
-    for (KeyframeId id = begin; id < map.keyframe_count(); ++id)
-      if (map.root(id) < begin) return true;
-    return false;
+    const std::vector<KeyframeId> root_of = map.root_of_each();
+    return std::any_of(root_of.begin() + begin, root_of.end(), [begin](KeyframeId root) { return root < begin; });
   };
   LocalMapper mapper(optics, options.mapping, std::move(both));
   LoopOptions loop = options.loop_closing.loop;
