@@ -166,6 +166,35 @@ TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
   EXPECT_EQ(moved.cam_from_world(0).translation, world.map.cam_from_world(0).translation) << "the first one stays";
 }
 
+// How many pairs of keyframes share so many points without being covisible.
+int pairs_left_out(const Map& map, int min_shared_points) {
+  int left_out = 0;
+  for (KeyframeId id : map.live_keyframes())
+    for (const Covisible& c : map.observers_of(map.points_of({id})))
+      left_out += c.keyframe > id && c.shared_points >= min_shared_points &&
+                  points_shared_with(c.keyframe, map.keyframe(id)->covisible) == 0;
+  return left_out;
+}
+
+// What was fused at the seam is seen by keyframes beside those that found the loop, and by those made meanwhile.
+TEST(LoopCorrection, WhoeverSharesPointsAtTheSeamIsCovisibleAfterwards) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 6);
+  LoopCloser closer(world.optics(), {}, 1);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto correction = closer.process(*world.map.snapshot(), last);
+  ASSERT_TRUE(correction);
+  world.go(2);
+  ASSERT_EQ(pairs_left_out(world.map, 15), 0);
+  LocalMapper mapper = mapper_of(world, world.map);
+  const MapView view = mapper.apply(*correction);
+  EXPECT_EQ(pairs_left_out(*view, 15), 0);
+  for (KeyframeId k : {last + 1, last + 2})
+    EXPECT_TRUE(std::any_of(view->keyframe(k)->covisible.begin(), view->keyframe(k)->covisible.end(),
+                            [](const Covisible& c) { return c.keyframe < 12; }))
+        << "keyframe " << k;
+}
+
 TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst) {
   // Ten keyframes, half a metre apart, that share no point. The motion to the sixth is known to 10 cm, to others to 3
   // mm.

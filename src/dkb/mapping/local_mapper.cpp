@@ -93,8 +93,10 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
   for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), kSeamTolerance);
   for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), kSeamTolerance);
   near.insert(near.end(), far.begin(), far.end());
-  refresh(map_.points_of(near));
-  for (KeyframeId k : near) map_.update_covisibility(k, kMinSharedPoints);
+  const std::vector<PointId> seam = map_.points_of(near);
+  refresh(seam);
+  // Whoever sees a point of one side may share it with whoever sees it from the other.
+  for (const Covisible& c : map_.observers_of(seam)) map_.update_covisibility(c.keyframe, kMinSharedPoints);
   times_.add("map_correction", whole.ms());
   return map_.snapshot();
 }
