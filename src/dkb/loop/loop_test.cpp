@@ -76,7 +76,7 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   const KeyframeId last = world.map.keyframe_count() - 1;
   const auto whole = adjust_globally(world.map, world.optics(), {});
   EXPECT_EQ(whole.poses.size(), static_cast<size_t>(world.map.live_keyframe_count()));
-  const auto part = adjust_globally(world.map, world.optics(), {}, 60);
+  const auto part = adjust_globally(world.map, world.optics(), {}, kNoKeyframe, 60);
   EXPECT_EQ(part.poses.size(), whole.poses.size()) << "the others are told that they stay";
   std::vector<KeyframeId> moved;
   for (const MapCorrection::Pose& p : part.poses)
@@ -108,10 +108,46 @@ TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
   keyframes.back().motion =
       std::make_shared<const KeyframeMotion>(KeyframeMotion{0, {back, false, Matrix6d::Identity()}});
   const Map map = Map::restore(std::move(keyframes), std::move(points), {});
-  for (const MapCorrection::Pose& p : adjust_globally(map, world.optics(), {}, 60).poses)
+  size_t neighbours = map.keyframe(last)->covisible.size();
+  for (const Covisible& c : map.keyframe(last)->covisible) neighbours += map.keyframe(c.keyframe)->covisible.size();
+  for (const MapCorrection::Pose& p : adjust_globally(map, world.optics(), {}, kNoKeyframe, neighbours).poses)
     if (p.keyframe == last) {
       EXPECT_EQ(p.before.translation, p.after.translation);
     }
+}
+
+// Two parts of the way, in the dark between which a motion alone holds them together, and a map beside them.
+TEST(GlobalAdjustment, TakesWhatAMotionJoinsAndNoMapThatIsNotJoined) {
+  RoundTrip world;
+  world.go(12);
+  const KeyframeId last = 23, other = 24;
+  for (KeyframeId k = 12; k <= last; ++k) {
+    const Rigid3 truth = RoundTrip::truth_at(k + 15);
+    world.add(truth, truth);
+  }
+  for (KeyframeId k = other; k < other + 5; ++k) world.add(RoundTrip::truth_at(k), RoundTrip::truth_at(k), k == other);
+  std::vector<Keyframe> keyframes;
+  std::vector<MapPoint> points;
+  for (KeyframeId k = 0; k < world.map.keyframe_count(); ++k) keyframes.push_back(*world.map.keyframe(k));
+  for (PointId p : world.map.live_points()) points.push_back(*world.map.point(p));
+  const Rigid3 back = world.map.keyframe(11)->cam_from_world * world.map.keyframe(12)->cam_from_world.inverse();
+  keyframes[12].motion =
+      std::make_shared<const KeyframeMotion>(KeyframeMotion{11, {back, false, 1e-4 * Matrix6d::Identity()}});
+  const Map map = Map::restore(std::move(keyframes), std::move(points), {});
+  const auto moved = [&](KeyframeId around, size_t most_neighbours) {
+    std::vector<KeyframeId> ids;
+    for (const auto& p : adjust_globally(map, world.optics(), {}, around, most_neighbours).poses)
+      if (p.before.translation != p.after.translation) ids.push_back(p.keyframe);
+    return ids;
+  };
+  size_t neighbours = 0;
+  for (KeyframeId k = 0; k <= last; ++k) neighbours += map.keyframe(k)->covisible.size();
+  const std::vector<KeyframeId> both = moved(last, neighbours);
+  EXPECT_EQ(both.size(), static_cast<size_t>(last)) << "all but the first";
+  EXPECT_EQ(both.back(), last);
+  EXPECT_EQ(moved(last, kMostNeighbours), both);
+  EXPECT_EQ(moved(kNoKeyframe, kMostNeighbours).size(), both.size() + 4) << "each map";
+  EXPECT_EQ(moved(kNoKeyframe, neighbours - 10).back(), other + 4) << "the newest first";
 }
 
 // Thirty keyframes half a metre apart, each of which shares 20 points with the next. The way comes back beside keyframe

@@ -30,7 +30,8 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             const Stopwatch watch;
             Result result;
             result.generation = task.generation;
-            result.correction = std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba));
+            result.correction =
+                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, task.keyframe));
             result.ms = watch.ms();
             return result;
           },
@@ -49,7 +50,7 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
-    adjustment_.push({view, kNoKeyframe, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
+    adjustment_.push({view, adjust_around_, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
     adjustment_wanted_ = false;
   }
 }
@@ -61,6 +62,7 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
     if (!found->correction) continue;
     ++generation_;
     adjustment_wanted_ = true;
+    adjust_around_ = found->correction->near_side.front();
     corrections.push_back(std::move(found->correction));
   }
   while (auto adjusted = adjustment_.take_due(now, wait)) {

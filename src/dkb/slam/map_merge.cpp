@@ -24,14 +24,16 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
   loop.min_support = std::min(loop.min_support, second.live_keyframe_count() - 1);  // short maps have few witnesses
   LoopCloser closer(optics, loop, options.seed);
   // The second map's keyframes one by one, as if its camera had just come by.
+  KeyframeId seam = kNoKeyframe;
   for (KeyframeId id = first.keyframe_count(); id < mapper.map().keyframe_count(); ++id) {
     const auto correction = closer.process(mapper.map(), id);
     if (!correction) continue;
     ++(correction->kind == MapCorrection::Kind::merge ? result.merges : result.loops);
     mapper.apply(*correction);
+    seam = id;
   }
   if (!is_joined(mapper.map())) return std::nullopt;
-  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba));
+  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba, seam));
   result.map = mapper.map();
   return result;
 }
