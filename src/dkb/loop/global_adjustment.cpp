@@ -75,9 +75,16 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
   const std::vector<KeyframeId> keyframes = keyframes_around(map, around, most_neighbours);
   if (keyframes.size() < 2) return correction;
   std::vector<uint8_t> fixed = those_that_stay(map, keyframes);
-  // Points of one observation tie nothing together; they follow their keyframe.
+  std::vector<uint8_t> takes_part(static_cast<size_t>(map.keyframe_count()), 0);
+  for (KeyframeId k : keyframes) takes_part[static_cast<size_t>(k)] = 1;
+  // Points of one observation that takes part tie nothing together: they follow their keyframe, and do not move onto
+  // it.
   std::vector<PointId> points = map.points_of(keyframes);
-  std::erase_if(points, [&](PointId p) { return map.point(p)->observations.size() < 2; });
+  std::erase_if(points, [&](PointId p) {
+    int observed = 0;
+    for (const Observation& o : map.point(p)->observations) observed += takes_part[static_cast<size_t>(o.keyframe)];
+    return observed < 2;
+  });
   BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;

@@ -95,6 +95,20 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   EXPECT_GT(of_the_border, 0);
 }
 
+// Keyframes that take no part hold the point where it is, against one that does.
+TEST(GlobalAdjustment, DoesNotMoveAPointOntoTheOnlyOneOfItsObserversThatTakesPart) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound - 4);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const PointId held = world.map.live_points()[0];
+  const auto& points = world.map.keyframe(last)->points;
+  const auto free = std::find(points.begin(), points.end(), kNoPoint);
+  ASSERT_NE(free, points.end());
+  ASSERT_GE(world.map.point(held)->observations.size(), 2U);
+  world.map.observe(held, last, static_cast<int>(free - points.begin()));
+  for (const auto& p : adjust_globally(world.map, world.optics(), {}, last, 60).positions) EXPECT_NE(p.point, held);
+}
+
 // A motion ties the newest keyframe to one that takes no part.
 TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
   RoundTrip world;
