@@ -130,6 +130,41 @@ TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
     }
 }
 
+// What the observations of the snapshot and of local adjustment since have in common must not count twice.
+TEST(GlobalAdjustment, TakesThePlaceOfWhatLocalAdjustmentDidMeanwhile) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 2);
+  LocalMapper mapper = mapper_of(world, world.map);
+  LoopCloser closer(world.optics(), {}, 1);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto loop = closer.process(world.map, last);
+  ASSERT_TRUE(loop);
+  const MapView snapshot = mapper.apply(*loop);
+  MapCorrection adjustment = adjust_globally(*snapshot, world.optics(), {});
+  Map meanwhile = *snapshot;
+  local_bundle_adjustment(meanwhile, last, world.optics(), {});
+  const auto mean_chi2_after = [&](const MapCorrection& correction) {
+    Map map = meanwhile;
+    move_map(map, correction);
+    double sum = 0;
+    int count = 0;
+    for (PointId p : map.live_points())
+      for (const Observation& o : map.point(p)->observations) {
+        const Keyframe& k = *map.keyframe(o.keyframe);
+        const Keypoint& seen = k.features->keypoints[static_cast<size_t>(o.feature)];
+        const Eigen::Vector3d in_cam = k.cam_from_world * map.point(p)->position;
+        const double chi2 = (world.optics().camera.project(in_cam) - seen.pixel.cast<double>()).squaredNorm() /
+                            world.optics().corner_variance(seen);
+        sum += std::min(chi2, kChi2TwoDof95);
+        ++count;
+      }
+    return sum / count;
+  };
+  const double in_its_place = mean_chi2_after(adjustment);
+  adjustment.kind = MapCorrection::Kind::loop;  // which is applied on top
+  EXPECT_LT(in_its_place, 0.7 * mean_chi2_after(adjustment));
+}
+
 // Two parts of the way, in the dark between which a motion alone holds them together, and a map beside them.
 TEST(GlobalAdjustment, TakesWhatAMotionJoinsAndNoMapThatIsNotJoined) {
   RoundTrip world;
