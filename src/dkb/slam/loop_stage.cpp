@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/loop_stage.h"
 
+#include <algorithm>
+
 namespace dkb {
 namespace {
 
-constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
+constexpr size_t kMaxLate = 4;                 // searches outstanding in a real-time run
+constexpr size_t kNeighboursOfAKeyframe = 45;  // covisible ones, of those that the latency of an adjustment is told for
+
+// The keyframes of so many neighbours whose adjustment takes as long as this map's, which takes part of a large one.
+int adjusted_keyframes(const Map& map) {
+  size_t neighbours = 0;
+  for (KeyframeId k : map.live_keyframes()) neighbours += map.keyframe(k)->covisible.size();
+  return static_cast<int>(std::min(neighbours, kMostNeighbours) / kNeighboursOfAKeyframe);
+}
 
 }  // namespace
 
@@ -50,7 +60,8 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
-    adjustment_.push({view, adjust_around_, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
+    adjustment_.push({view, adjust_around_, generation_},
+                     now + rate.frames(options_.global_ba_latency(adjusted_keyframes(*view))));
     adjustment_wanted_ = false;
   }
 }

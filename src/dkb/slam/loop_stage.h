@@ -16,14 +16,14 @@ namespace dkb {
 // When background results become visible: so many seconds after they were asked for, in whole frames.
 struct BackgroundLatency {
   double base = 0;          // [s] > 0
-  double per_keyframe = 0;  // [s] >= 0, times the keyframes of the map
+  double per_keyframe = 0;  // [s] >= 0, times the keyframes that are looked at
   double operator()(int keyframes) const { return base + per_keyframe * keyframes; }
 };
 
 struct LoopStageOptions {
   LoopOptions loop;
-  BackgroundLatency loop_latency{1.0 / 3, 0.02 / 30};
-  BackgroundLatency global_ba_latency{0.5, 0.4 / 30};
+  BackgroundLatency loop_latency{1.0 / 3, 0.0002};
+  BackgroundLatency global_ba_latency{0.5, 0.4 / 30};  // of the keyframes that an adjustment takes, 45 neighbours each
 };
 
 // Loop closing and global bundle adjustment beside tracking and mapping, each on its own thread. Both work on views
