@@ -134,6 +134,11 @@ void LocalMapper::insert(const KeyframePacket& packet) {
     since.previous_from_current = from.cam_from_ancestor.inverse() * since.previous_from_current;
     k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{from.id, since});
   }
+  // As uncertain as what it hangs on and the way from there, until adjustment knows better; where nothing ties it to
+  // the map, it never does.
+  if (packet.reference != kNoKeyframe)
+    k.covariance = carried(packet.cam_from_reference, map_.keyframe(packet.reference)->covariance);
+  if (k.motion) k.covariance += k.motion->since.covariance;
   k.planes = packet.planes;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();

@@ -200,6 +200,18 @@ TEST_F(Mapping, MotionsTieNothingBetweenMapsThatAreNotJoined) {
   EXPECT_NE(mapper.map().keyframe(3)->motion, nullptr);
 }
 
+TEST_F(Mapping, AKeyframeThatNothingTiesToTheMapIsAsUncertainAsWhatItHangsOn) {
+  LocalMapper mapper = make();
+  mapper.process(packet(at(0)));
+  mapper.process(packet(at(1), {.pixel_noise = 0.5, .depth_noise = 0.01}));
+  const Matrix6d known = mapper.map().keyframe(1)->covariance;
+  ASSERT_GT(known.trace(), 0);
+  const KeyframePacket apart = packet(at(2), at(2), {}, [](int) { return false; });
+  const MapView view = mapper.process(apart);
+  const Matrix6d expected = carried(apart.cam_from_reference, known);
+  EXPECT_LT((view->keyframe(2)->covariance - expected).norm(), 1e-6 * expected.norm());
+}
+
 TEST_F(Mapping, RetractedPointsLeaveTheMap) {
   LocalMapper mapper = make();
   const MapView first = mapper.process(packet(at(0)));
