@@ -59,6 +59,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   apply_reports(packet);
   if (packet.id == kNoKeyframe) return map_.snapshot();
   insert(packet);
+  cull_if_empty(packet.id - 1);
   cull_points(packet.id);
   const auto triangulated = triangulate_new_points(map_, packet.id, optics_);
   young_.insert(young_.end(), triangulated.begin(), triangulated.end());
@@ -264,6 +265,15 @@ void LocalMapper::cull_keyframes(KeyframeId newest) {
       ++report_.keyframes_culled;
     }
   }
+}
+
+void LocalMapper::cull_if_empty(KeyframeId id) {
+  const Keyframe* k = map_.live_keyframe(id);
+  if (k == nullptr || k->parent == kNoKeyframe || (k->planes && !k->planes->patches.empty()) ||
+      std::any_of(k->points.begin(), k->points.end(), [](PointId p) { return p != kNoPoint; }))
+    return;
+  map_.cull_keyframe(id);
+  ++report_.keyframes_culled;
 }
 
 void LocalMapper::refresh(const std::vector<PointId>& points) {
