@@ -11,27 +11,44 @@
 namespace dkb {
 namespace {
 
-// The live keyframes nearest to the newest one by covisibility, increasing: as many as have that many neighbours
-// together.
-std::vector<KeyframeId> nearest_keyframes(const Map& map, size_t most_neighbours) {
-  std::vector<KeyframeId> nearest = map.live_keyframes();
-  const auto neighbours = [&map](KeyframeId k) { return map.keyframe(k)->covisible.size(); };
-  size_t sum = 0;
-  for (KeyframeId k : nearest) sum += neighbours(k);
-  if (sum <= most_neighbours) return nearest;
-  nearest.erase(nearest.begin(), nearest.end() - 1);
-  sum = neighbours(nearest[0]);
+// The live keyframes around `start`, increasing: as many as have that many neighbours together. They are sought along
+// all that holds keyframes together: points, motions, and the tree where there is neither. Without a start those of
+// each map around its newest one, the map of the newest of all first.
+std::vector<KeyframeId> keyframes_around(const Map& map, KeyframeId start, size_t most_neighbours) {
+  std::vector<KeyframeId> taken;
+  std::vector<std::vector<KeyframeId>> children(static_cast<size_t>(map.keyframe_count()));
+  std::vector<KeyframeId> starts = map.live_keyframes();
+  for (KeyframeId k : starts)
+    if (const KeyframeId parent = map.keyframe(k)->parent; parent != kNoKeyframe)
+      children[static_cast<size_t>(parent)].push_back(k);
+  std::reverse(starts.begin(), starts.end());
+  if (start != kNoKeyframe) starts = {map.live_ancestor(start).id};
+
   std::vector<uint8_t> seen(static_cast<size_t>(map.keyframe_count()), 0);
-  seen[static_cast<size_t>(nearest[0])] = 1;
-  for (size_t next = 0; next < nearest.size(); ++next)
-    for (const Covisible& c : map.keyframe(nearest[next])->covisible) {
-      if (seen[static_cast<size_t>(c.keyframe)] || sum + neighbours(c.keyframe) > most_neighbours) continue;
-      seen[static_cast<size_t>(c.keyframe)] = 1;
-      sum += neighbours(c.keyframe);
-      nearest.push_back(c.keyframe);
+  size_t sum = 0;
+  const auto take = [&](KeyframeId id) {
+    const Keyframe* k = map.live_keyframe(id);
+    if (k == nullptr || seen[static_cast<size_t>(id)]) return;
+    if (!taken.empty() && sum + k->covisible.size() > most_neighbours) return;
+    seen[static_cast<size_t>(id)] = 1;
+    sum += k->covisible.size();
+    taken.push_back(id);
+  };
+  size_t next = 0;
+  for (KeyframeId s : starts) {
+    take(s);
+    for (; next < taken.size(); ++next) {
+      const KeyframeId id = taken[next];
+      const Keyframe& k = *map.keyframe(id);
+      for (const Covisible& c : k.covisible) take(c.keyframe);
+      if (k.motion) take(k.motion->previous);
+      take(map.moved_on_from(id));
+      take(k.parent);
+      for (KeyframeId child : children[static_cast<size_t>(id)]) take(child);
     }
-  std::sort(nearest.begin(), nearest.end());
-  return nearest;
+  }
+  std::sort(taken.begin(), taken.end());
+  return taken;
 }
 
 // The roots of maps, and what has neighbours, by points or by motion, that take no part.
@@ -52,15 +69,22 @@ std::vector<uint8_t> those_that_stay(const Map& map, const std::vector<KeyframeI
 
 }  // namespace
 
-MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
+MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local, KeyframeId around,
                               size_t most_neighbours) {
   MapCorrection correction;
-  const std::vector<KeyframeId> keyframes = nearest_keyframes(map, most_neighbours);
+  const std::vector<KeyframeId> keyframes = keyframes_around(map, around, most_neighbours);
   if (keyframes.size() < 2) return correction;
   std::vector<uint8_t> fixed = those_that_stay(map, keyframes);
-  // Points of one observation tie nothing together; they follow their keyframe.
+  std::vector<uint8_t> takes_part(static_cast<size_t>(map.keyframe_count()), 0);
+  for (KeyframeId k : keyframes) takes_part[static_cast<size_t>(k)] = 1;
+  // Points of one observation that takes part tie nothing together: they follow their keyframe, and do not move onto
+  // it.
   std::vector<PointId> points = map.points_of(keyframes);
-  std::erase_if(points, [&](PointId p) { return map.point(p)->observations.size() < 2; });
+  std::erase_if(points, [&](PointId p) {
+    int observed = 0;
+    for (const Observation& o : map.point(p)->observations) observed += takes_part[static_cast<size_t>(o.keyframe)];
+    return observed < 2;
+  });
   BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;

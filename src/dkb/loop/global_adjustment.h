@@ -13,10 +13,11 @@ namespace dkb {
 // quarter of this number it is some seconds, and a path of 200 m already misses keyframes (docs/benchmarks.md).
 inline constexpr size_t kMostNeighbours = 160000;
 
-// Adjusts all keyframes and points of a snapshot; the first keyframe of each map stays. Where these have more than
-// `most_neighbours` covisible neighbours together, it takes those around the newest one, and what borders on the rest
+// Adjusts the keyframes and points of a snapshot: those of the map that keyframe `around` is in, or of all maps if
+// there is none. The first keyframe of each map stays. Where these have more than `most_neighbours` covisible
+// neighbours together, it takes what is nearest to `around`, else to the newest one, and what borders on the rest
 // stays. `local` tells how points are weighted. Deterministic.
 MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
-                              size_t most_neighbours = kMostNeighbours);
+                              KeyframeId around = kNoKeyframe, size_t most_neighbours = kMostNeighbours);
 
 }  // namespace dkb

@@ -16,7 +16,7 @@ std::optional<MapCorrection> LoopCloser::process(const Map& snapshot, KeyframeId
   const auto finding = find_loop(snapshot, id, optics_, options_, seed_);
   if (!finding) return std::nullopt;
   rests_until_ = id + 1 + kRestKeyframes;
-  return correct_loop(snapshot, *finding, &edges_);
+  return correct_loop(snapshot, *finding);
 }
 
 }  // namespace dkb

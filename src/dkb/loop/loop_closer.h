@@ -2,14 +2,12 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "dkb/loop/loop_correction.h"
 
 namespace dkb {
 
-// Looks for loops keyframe by keyframe, and remembers those that were closed. Deterministic: the same snapshots in the
-// same order give the same corrections.
+// Looks for loops keyframe by keyframe. Deterministic: the same snapshots in the same order give the same corrections.
 class LoopCloser {
  public:
   LoopCloser(const Optics& optics, const LoopOptions& options, uint64_t seed);
@@ -21,7 +19,6 @@ class LoopCloser {
   Optics optics_;
   LoopOptions options_;
   uint64_t seed_;
-  std::vector<LoopEdge> edges_;
   KeyframeId rests_until_ = 0;  // keyframe before which nothing is looked for
 };
 

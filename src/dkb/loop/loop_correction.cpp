@@ -2,6 +2,9 @@
 #include "dkb/loop/loop_correction.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <utility>
+#include <vector>
 
 #include "dkb/solver/bundle_adjustment.h"
 
@@ -34,13 +37,14 @@ PoseEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
   return e;
 }
 
-void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, KeyframeId root,
-                        MapCorrection& correction) {
+void move_by_pose_graph(const Map& map, const LoopFinding& finding, MapCorrection& correction) {
+  const KeyframeId far = finding.far_area.front(), root = map.root(far);
   BaProblem graph;
   std::vector<int> node(static_cast<size_t>(map.keyframe_count()), -1);
   std::vector<KeyframeId> keyframes;
+  const std::vector<KeyframeId> root_of = map.root_of_each();
   for (KeyframeId k : map.live_keyframes()) {
-    if (map.root(k) != root) continue;
+    if (root_of[static_cast<size_t>(k)] != root) continue;
     node[static_cast<size_t>(k)] = static_cast<int>(keyframes.size());
     keyframes.push_back(k);
     graph.cam_from_world.push_back(map.keyframe(k)->cam_from_world);
@@ -53,6 +57,7 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
     const int from = node[static_cast<size_t>(a)], to = node[static_cast<size_t>(b)];
     if (from >= 0 && to >= 0) graph.motions.push_back(graph_edge(from, to, b_from_a, shared));
   };
+  std::vector<std::pair<KeyframeId, KeyframeId>> seams;  // that the essential graph has not
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
     const int previous = k.motion ? node[static_cast<size_t>(k.motion->previous)] : -1;
@@ -65,16 +70,25 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
     // Parents are older but where two maps were joined: without the edge to a younger one the graph may fall apart.
     if (k.parent != kNoKeyframe && (shared > 0 || previous < 0 || k.parent > id))
       add(k.parent, id, relative(k.parent, id), shared);
+    const auto in_tree = [&](const Covisible& c) {
+      return c.keyframe == k.parent || map.keyframe(c.keyframe)->parent == id;
+    };
     for (const Covisible& c : k.covisible)
-      if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && c.keyframe != k.parent &&
-          map.keyframe(c.keyframe)->parent != id)
+      if (c.keyframe > id && c.shared_points >= kEssentialSharedPoints && !in_tree(c))
         add(id, c.keyframe, relative(id, c.keyframe), c.shared_points);
+    // A loop that was closed before holds by whom a keyframe shares most points with of those that it does not follow.
+    const auto seam = std::find_if(k.covisible.begin(), k.covisible.end(), [id](const Covisible& c) {
+      return std::abs(c.keyframe - id) >= kMinKeyframesBetween;
+    });
+    if (seam != k.covisible.end() && seam->shared_points < kEssentialSharedPoints && !in_tree(*seam))
+      seams.push_back(std::minmax(id, seam->keyframe));
   }
-  for (const LoopEdge& e : edges) {
-    const Map::Ancestor a = map.live_ancestor(e.a), b = map.live_ancestor(e.b);
-    if (a.id != b.id)
-      add(a.id, b.id, b.cam_from_ancestor.inverse() * e.b_from_a * a.cam_from_ancestor, e.shared_points);
-  }
+  std::sort(seams.begin(), seams.end());
+  seams.erase(std::unique(seams.begin(), seams.end()), seams.end());
+  for (const auto& [a, b] : seams) add(a, b, relative(a, b), points_shared_with(b, map.keyframe(a)->covisible));
+  const Rigid3 world_from_far = map.keyframe(far)->cam_from_world.inverse();
+  for (const LoopFinding::Support& s : finding.support)
+    add(far, s.keyframe, s.fit.cam_from_world * world_from_far, s.fit.inliers);
   bundle_adjust(graph, BaOptions::of_pose_graph());
   for (size_t n = 0; n < keyframes.size(); ++n)
     correction.poses.push_back({keyframes[n], map.keyframe(keyframes[n])->cam_from_world, graph.cam_from_world[n]});
@@ -82,16 +96,7 @@ void move_by_pose_graph(const Map& map, const std::vector<LoopEdge>& edges, Keyf
 
 }  // namespace
 
-std::vector<LoopEdge> loop_edges(const Map& map, const LoopFinding& finding) {
-  std::vector<LoopEdge> edges;
-  const KeyframeId far = finding.far_area.front();
-  const Rigid3 world_from_far = map.keyframe(far)->cam_from_world.inverse();
-  for (const LoopFinding::Support& s : finding.support)
-    edges.push_back({far, s.keyframe, s.fit.cam_from_world * world_from_far, s.fit.inliers});
-  return edges;
-}
-
-MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vector<LoopEdge>* edges) {
+MapCorrection correct_loop(const Map& map, const LoopFinding& finding) {
   MapCorrection correction;
   correction.kind = finding.merge ? MapCorrection::Kind::merge : MapCorrection::Kind::loop;
   correction.far_side = finding.far_area;
@@ -104,10 +109,8 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vect
         correction.same.emplace_back(own, point);
   }
   const KeyframeId near = finding.support.front().keyframe, far = finding.far_area.front();
-  const auto added = loop_edges(map, finding);
-  edges->insert(edges->end(), added.begin(), added.end());
   if (!finding.merge) {
-    move_by_pose_graph(map, *edges, map.root(near), correction);
+    move_by_pose_graph(map, finding, correction);
     return correction;
   }
   const PlaceFit& fit = finding.support.front().fit;
@@ -123,9 +126,10 @@ MapCorrection correct_loop(const Map& map, const LoopFinding& finding, std::vect
   const Keyframe& stays = *map.keyframe(correction.far_joint);
   correction.joint_covariance = carried(stays.cam_from_world.inverse(), stays.covariance) +
                                 carried(near_cam_from_world.inverse(), fit.covariance);
-  const KeyframeId moving = map.root(correction.near_joint);
+  const std::vector<KeyframeId> root_of = map.root_of_each();
+  const KeyframeId moving = root_of[static_cast<size_t>(correction.near_joint)];
   for (KeyframeId id : map.live_keyframes()) {
-    if (map.root(id) != moving) continue;
+    if (root_of[static_cast<size_t>(id)] != moving) continue;
     const Rigid3& before = map.keyframe(id)->cam_from_world;
     correction.poses.push_back({id, before, before * moved_from_world.inverse()});
   }

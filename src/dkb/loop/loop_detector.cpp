@@ -11,6 +11,7 @@ namespace {
 constexpr double kDegrees = 57.295779513082321;
 
 // Candidates. All figures of this file: chosen on the simulated rounds and twins, docs/decisions.md.
+constexpr int kNeighbourhood = 2;               // steps along covisibility that make a keyframe a neighbour
 constexpr int kMaxCandidates = 4;               // most alike keyframes that are verified
 constexpr double kMinRelativeSimilarity = 0.4;  // to a candidate, over that to the most alike neighbour
 constexpr size_t kAreaKeyframes = 8;            // a candidate and its best covisible ones, whose points are matched
@@ -49,11 +50,12 @@ bool supports(const Rigid3& expected_cam_from_world, const PlaceFit& fit) {
 }
 
 // Keyframes around `id` that may tell the same: covisible ones and those made just before.
-std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id) {
+std::vector<KeyframeId> support_candidates(const Map& map, KeyframeId id, const std::vector<KeyframeId>& root_of) {
   std::vector<KeyframeId> chosen;
   const auto add = [&](KeyframeId k) {
     if (static_cast<int>(chosen.size()) < kSupportKeyframes && k != id && map.live_keyframe(k) != nullptr &&
-        map.root(k) == map.root(id) && std::find(chosen.begin(), chosen.end(), k) == chosen.end())
+        root_of[static_cast<size_t>(k)] == root_of[static_cast<size_t>(id)] &&
+        std::find(chosen.begin(), chosen.end(), k) == chosen.end())
       chosen.push_back(k);
   };
   for (KeyframeId k = id - 1; k >= 0 && k >= id - (kSupportKeyframes + 1) / 2; --k) add(k);
@@ -68,12 +70,12 @@ const KeyframeMotion* motion_between(const Map& map, KeyframeId a, KeyframeId b)
   return nullptr;
 }
 
-// Keyframes within so many steps along covisibility, `id` included; one flag per keyframe.
-std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id, int steps) {
+// `id` and its neighbours; one flag per keyframe.
+std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id) {
   std::vector<uint8_t> near(static_cast<size_t>(map.keyframe_count()), 0);
   std::vector<KeyframeId> rim = {id};
   near[static_cast<size_t>(id)] = 1;
-  for (int s = 0; s < steps; ++s) {
+  for (int s = 0; s < kNeighbourhood; ++s) {
     std::vector<KeyframeId> next;
     for (KeyframeId k : rim)
       for (const Covisible& c : map.keyframe(k)->covisible)
@@ -128,10 +130,11 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
                                      uint64_t seed) {
   const Keyframe* newest = map.live_keyframe(id);
   if (newest == nullptr) return std::nullopt;
-  const std::vector<uint8_t> near = neighbourhood_of(map, id, options.neighbourhood);
-  const KeyframeId root = map.root(id);
+  const std::vector<uint8_t> near = neighbourhood_of(map, id);
+  const std::vector<KeyframeId> root_of = map.root_of_each();
+  const KeyframeId root = root_of[static_cast<size_t>(id)];
   const auto eligible = [&](KeyframeId k) {
-    return !near[static_cast<size_t>(k)] && (k <= id - options.min_keyframes_between || map.root(k) != root);
+    return !near[static_cast<size_t>(k)] && (k <= id - kMinKeyframesBetween || root_of[static_cast<size_t>(k)] != root);
   };
   const std::vector<KeyframeId> live = map.live_keyframes();
   if (std::none_of(live.begin(), live.end(), eligible)) return std::nullopt;
@@ -155,7 +158,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
   std::vector<PathThroughMap> paths;
   std::optional<LoopFinding> best;
   for (KeyframeId far : candidates) {
-    const bool merge = map.root(far) != root;
+    const bool merge = root_of[static_cast<size_t>(far)] != root;
     const MapArea area = area_around(map, far, kAreaKeyframes);
     const auto located =
         fit_by_descriptors(area.points, *newest->features, optics, kMinPlaceMatches,
@@ -185,7 +188,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     finding.merge = merge;
     finding.far_area = area.keyframes;
     finding.support.push_back({id, *fit});
-    for (KeyframeId supporter : support_candidates(map, id)) {
+    for (KeyframeId supporter : support_candidates(map, id, root_of)) {
       const Keyframe& k = *map.keyframe(supporter);
       const Rigid3 expected = k.cam_from_world * far_world_from_world.inverse();
       auto seen = fit_by_projection(area.points, *k.features, optics, expected, kSearchRadii);

@@ -47,15 +47,6 @@ TEST(LoopDetection, FindsTheStartAgainAfterARound) {
   EXPECT_GT(world.error(world.map, last), 0.1) << "where drift has brought it";
 }
 
-TEST(LoopDetection, KeyframesThatAreConnectedMakeNoLoop) {
-  RoundTrip world;
-  world.go(12);
-  LoopOptions eager;
-  eager.min_keyframes_between = 0;
-  eager.neighbourhood = 8;
-  EXPECT_FALSE(find_loop(world.map, 11, world.optics(), eager, 1));
-}
-
 TEST(LoopCorrection, ClosesTheRoundAndAdjustmentSharpensIt) {
   RoundTrip world;
   world.go(RoundTrip::kRound + 2);
@@ -74,7 +65,7 @@ TEST(LoopCorrection, ClosesTheRoundAndAdjustmentSharpensIt) {
   EXPECT_TRUE(std::any_of(view->keyframe(last)->covisible.begin(), view->keyframe(last)->covisible.end(),
                           [](const Covisible& c) { return c.keyframe < 5; }))
       << "the ends are connected now";
-  EXPECT_FALSE(closer.process(*view, last)) << "a loop is closed once";
+  EXPECT_FALSE(find_loop(*view, last, world.optics(), {}, 1)) << "keyframes that are connected make no loop";
   view = mapper.apply(adjust_globally(*view, world.optics(), {}));
   EXPECT_LT(worst_error(world, *view), 0.25 * before);
 }
@@ -85,7 +76,7 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   const KeyframeId last = world.map.keyframe_count() - 1;
   const auto whole = adjust_globally(world.map, world.optics(), {});
   EXPECT_EQ(whole.poses.size(), static_cast<size_t>(world.map.live_keyframe_count()));
-  const auto part = adjust_globally(world.map, world.optics(), {}, 60);
+  const auto part = adjust_globally(world.map, world.optics(), {}, kNoKeyframe, 60);
   EXPECT_EQ(part.poses.size(), whole.poses.size()) << "the others are told that they stay";
   std::vector<KeyframeId> moved;
   for (const MapCorrection::Pose& p : part.poses)
@@ -104,6 +95,20 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   EXPECT_GT(of_the_border, 0);
 }
 
+// Keyframes that take no part hold the point where it is, against one that does.
+TEST(GlobalAdjustment, DoesNotMoveAPointOntoTheOnlyOneOfItsObserversThatTakesPart) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound - 4);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const PointId held = world.map.live_points()[0];
+  const auto& points = world.map.keyframe(last)->points;
+  const auto free = std::find(points.begin(), points.end(), kNoPoint);
+  ASSERT_NE(free, points.end());
+  ASSERT_GE(world.map.point(held)->observations.size(), 2U);
+  world.map.observe(held, last, static_cast<int>(free - points.begin()));
+  for (const auto& p : adjust_globally(world.map, world.optics(), {}, last, 60).positions) EXPECT_NE(p.point, held);
+}
+
 // A motion ties the newest keyframe to one that takes no part.
 TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
   RoundTrip world;
@@ -117,35 +122,130 @@ TEST(GlobalAdjustment, HoldsWhoeverAMotionTiesToWhatTakesNoPart) {
   keyframes.back().motion =
       std::make_shared<const KeyframeMotion>(KeyframeMotion{0, {back, false, Matrix6d::Identity()}});
   const Map map = Map::restore(std::move(keyframes), std::move(points), {});
-  for (const MapCorrection::Pose& p : adjust_globally(map, world.optics(), {}, 60).poses)
+  size_t neighbours = map.keyframe(last)->covisible.size();
+  for (const Covisible& c : map.keyframe(last)->covisible) neighbours += map.keyframe(c.keyframe)->covisible.size();
+  for (const MapCorrection::Pose& p : adjust_globally(map, world.optics(), {}, kNoKeyframe, neighbours).poses)
     if (p.keyframe == last) {
       EXPECT_EQ(p.before.translation, p.after.translation);
     }
 }
 
-// The edge of a loop holds what the culled keyframe rides on.
-TEST(LoopCorrection, EdgesOutliveTheirKeyframes) {
+// What the observations of the snapshot and of local adjustment since have in common must not count twice.
+TEST(GlobalAdjustment, TakesThePlaceOfWhatLocalAdjustmentDidMeanwhile) {
   RoundTrip world;
   world.go(RoundTrip::kRound + 2);
+  LocalMapper mapper = mapper_of(world, world.map);
+  LoopCloser closer(world.optics(), {}, 1);
   const KeyframeId last = world.map.keyframe_count() - 1;
-  const auto found = find_loop(world.map, last, world.optics(), {}, 1);
-  ASSERT_TRUE(found);
-  std::vector<LoopEdge> edges = loop_edges(world.map, *found);
-  edges.resize(1);
-  ASSERT_EQ(edges[0].b, last);
-  world.go(2);
-  world.map.cull_keyframe(last);
-  ASSERT_EQ(world.map.live_keyframe(last), nullptr);
-  // Another loop that tells nothing new.
-  const KeyframeId newest = world.map.keyframe_count() - 1;
-  LoopFinding nothing_new;
-  nothing_new.far_area = {newest - 1};
-  nothing_new.support.push_back({newest, {}});
-  nothing_new.support[0].fit.cam_from_world = world.map.keyframe(newest)->cam_from_world;
-  nothing_new.support[0].fit.inliers = 100;
-  Map moved = world.map;
-  move_map(moved, correct_loop(world.map, nothing_new, &edges));
-  EXPECT_LT(world.error(moved, newest), 0.3 * world.error(world.map, newest));
+  const auto loop = closer.process(world.map, last);
+  ASSERT_TRUE(loop);
+  const MapView snapshot = mapper.apply(*loop);
+  MapCorrection adjustment = adjust_globally(*snapshot, world.optics(), {});
+  Map meanwhile = *snapshot;
+  local_bundle_adjustment(meanwhile, last, world.optics(), {});
+  const auto mean_chi2_after = [&](const MapCorrection& correction) {
+    Map map = meanwhile;
+    move_map(map, correction);
+    double sum = 0;
+    int count = 0;
+    for (PointId p : map.live_points())
+      for (const Observation& o : map.point(p)->observations) {
+        const Keyframe& k = *map.keyframe(o.keyframe);
+        const Keypoint& seen = k.features->keypoints[static_cast<size_t>(o.feature)];
+        const Eigen::Vector3d in_cam = k.cam_from_world * map.point(p)->position;
+        const double chi2 = (world.optics().camera.project(in_cam) - seen.pixel.cast<double>()).squaredNorm() /
+                            world.optics().corner_variance(seen);
+        sum += std::min(chi2, kChi2TwoDof95);
+        ++count;
+      }
+    return sum / count;
+  };
+  const double in_its_place = mean_chi2_after(adjustment);
+  adjustment.kind = MapCorrection::Kind::loop;  // which is applied on top
+  EXPECT_LT(in_its_place, 0.7 * mean_chi2_after(adjustment));
+}
+
+// Two parts of the way, in the dark between which a motion alone holds them together, and a map beside them.
+TEST(GlobalAdjustment, TakesWhatAMotionJoinsAndNoMapThatIsNotJoined) {
+  RoundTrip world;
+  world.go(12);
+  const KeyframeId last = 23, other = 24;
+  for (KeyframeId k = 12; k <= last; ++k) {
+    const Rigid3 truth = RoundTrip::truth_at(k + 15);
+    world.add(truth, truth);
+  }
+  for (KeyframeId k = other; k < other + 5; ++k) world.add(RoundTrip::truth_at(k), RoundTrip::truth_at(k), k == other);
+  std::vector<Keyframe> keyframes;
+  std::vector<MapPoint> points;
+  for (KeyframeId k = 0; k < world.map.keyframe_count(); ++k) keyframes.push_back(*world.map.keyframe(k));
+  for (PointId p : world.map.live_points()) points.push_back(*world.map.point(p));
+  const Rigid3 back = world.map.keyframe(11)->cam_from_world * world.map.keyframe(12)->cam_from_world.inverse();
+  keyframes[12].motion =
+      std::make_shared<const KeyframeMotion>(KeyframeMotion{11, {back, false, 1e-4 * Matrix6d::Identity()}});
+  const Map map = Map::restore(std::move(keyframes), std::move(points), {});
+  const auto moved = [&](KeyframeId around, size_t most_neighbours) {
+    std::vector<KeyframeId> ids;
+    for (const auto& p : adjust_globally(map, world.optics(), {}, around, most_neighbours).poses)
+      if (p.before.translation != p.after.translation) ids.push_back(p.keyframe);
+    return ids;
+  };
+  size_t neighbours = 0;
+  for (KeyframeId k = 0; k <= last; ++k) neighbours += map.keyframe(k)->covisible.size();
+  const std::vector<KeyframeId> both = moved(last, neighbours);
+  EXPECT_EQ(both.size(), static_cast<size_t>(last)) << "all but the first";
+  EXPECT_EQ(both.back(), last);
+  EXPECT_EQ(moved(last, kMostNeighbours), both);
+  EXPECT_EQ(moved(kNoKeyframe, kMostNeighbours).size(), both.size() + 4) << "each map";
+  EXPECT_EQ(moved(kNoKeyframe, neighbours - 10).back(), other + 4) << "the newest first";
+}
+
+// Thirty keyframes half a metre apart, each of which shares 20 points with the next. The way comes back beside keyframe
+// 2 at keyframe 20, where a loop was closed once: they share 20 points as well.
+TEST(LoopCorrection, ASeamHoldsWhenTheNextLoopIsClosed) {
+  constexpr int kShared = 20;
+  Map map;
+  const auto see = [&](KeyframeId first, int feature, KeyframeId then, int there) {
+    for (int i = 0; i < kShared; ++i) {
+      MapPoint p;
+      p.id = make_point_id(first, feature + i);
+      p.born_at = first;
+      map.add_point(p);
+      map.observe(p.id, first, feature + i);
+      map.observe(p.id, then, there + i);
+    }
+  };
+  for (KeyframeId id = 0; id < 30; ++id) {
+    Keyframe k;
+    k.id = id;
+    k.parent = id - 1;
+    auto features = std::make_shared<RgbdFeatures>();
+    features->keypoints.resize(3 * kShared);
+    features->descriptors.resize(3 * kShared);
+    k.features = features;
+    k.points.assign(3 * kShared, kNoPoint);
+    k.cam_from_world = TestScene::camera_at({0.5 * (id <= 11 ? id : 22 - id), 0, 0});
+    map.add_keyframe(std::move(k));
+    if (id > 0) see(id - 1, kShared, id, 0);
+    if (id == 20) see(2, 2 * kShared, 20, 2 * kShared);
+    map.update_covisibility(id, 15);
+  }
+  const double drift = 0.3;
+  LoopFinding finding;
+  finding.far_area = {0};
+  finding.support.emplace_back().keyframe = 29;
+  PlaceFit& fit = finding.support.back().fit;
+  fit.cam_from_world = map.keyframe(29)->cam_from_world;
+  fit.cam_from_world.translation.z() += drift;
+  fit.inliers = 400;
+  Map moved = map;
+  move_map(moved, correct_loop(map, finding));
+  const auto bent = [&](KeyframeId a, KeyframeId b) {
+    const Rigid3 before = map.cam_from_world(b) * map.cam_from_world(a).inverse();
+    const Rigid3 after = moved.cam_from_world(b) * moved.cam_from_world(a).inverse();
+    return distance_between(before, after);
+  };
+  EXPECT_GT(bent(0, 29), 0.8 * drift);
+  EXPECT_LT(bent(2, 20), 0.1 * drift);
 }
 
 TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
@@ -175,6 +275,35 @@ TEST(LoopCorrection, KeyframesMadeMeanwhileFollowTheirParents) {
   EXPECT_EQ(moved.cam_from_world(0).translation, world.map.cam_from_world(0).translation) << "the first one stays";
 }
 
+// How many pairs of keyframes share so many points without being covisible.
+int pairs_left_out(const Map& map, int min_shared_points) {
+  int left_out = 0;
+  for (KeyframeId id : map.live_keyframes())
+    for (const Covisible& c : map.observers_of(map.points_of({id})))
+      left_out += c.keyframe > id && c.shared_points >= min_shared_points &&
+                  points_shared_with(c.keyframe, map.keyframe(id)->covisible) == 0;
+  return left_out;
+}
+
+// What was fused at the seam is seen by keyframes beside those that found the loop, and by those made meanwhile.
+TEST(LoopCorrection, WhoeverSharesPointsAtTheSeamIsCovisibleAfterwards) {
+  RoundTrip world;
+  world.go(RoundTrip::kRound + 6);
+  LoopCloser closer(world.optics(), {}, 1);
+  const KeyframeId last = world.map.keyframe_count() - 1;
+  const auto correction = closer.process(*world.map.snapshot(), last);
+  ASSERT_TRUE(correction);
+  world.go(2);
+  ASSERT_EQ(pairs_left_out(world.map, 15), 0);
+  LocalMapper mapper = mapper_of(world, world.map);
+  const MapView view = mapper.apply(*correction);
+  EXPECT_EQ(pairs_left_out(*view, 15), 0);
+  for (KeyframeId k : {last + 1, last + 2})
+    EXPECT_TRUE(std::any_of(view->keyframe(k)->covisible.begin(), view->keyframe(k)->covisible.end(),
+                            [](const Covisible& c) { return c.keyframe < 12; }))
+        << "keyframe " << k;
+}
+
 TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst) {
   // Ten keyframes, half a metre apart, that share no point. The motion to the sixth is known to 10 cm, to others to 3
   // mm.
@@ -198,9 +327,8 @@ TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst)
   found.translation += drift;
   finding.support.emplace_back().keyframe = 9;
   finding.support.back().fit.cam_from_world = found;
-  // As firm as a place seen again by 400 points.
-  std::vector<LoopEdge> firm = {{0, 9, found * map.keyframe(0)->cam_from_world.inverse(), 400}};
-  const MapCorrection correction = correct_loop(map, finding, &firm);
+  finding.support.back().fit.inliers = 400;
+  const MapCorrection correction = correct_loop(map, finding);
   ASSERT_EQ(correction.poses.size(), 10U);
   const auto moved = [&](size_t k) -> Eigen::Vector3d {
     return centre_in_world(correction.poses[k].after) - centre_in_world(correction.poses[k].before);
@@ -299,17 +427,6 @@ TEST(MapMerge, TheYoungerMapMovesOntoTheOlderAsOnePiece) {
   const Rigid3 before = world.map.cam_from_world(23) * world.map.cam_from_world(13).inverse();
   const Rigid3 after = view->cam_from_world(23) * view->cam_from_world(13).inverse();
   EXPECT_LT((before * after.inverse()).translation.norm(), 1e-9);
-}
-
-TEST(MapMerge, ItsEdgesAreRememberedAsThoseOfALoop) {
-  RoundTrip world;
-  world.go(12);
-  for (int k = 12; k < 24; ++k) world.add(RoundTrip::truth_at(k - 20), RoundTrip::truth_at(k - 20), k == 12);
-  const auto finding = find_loop(world.map, 23, world.optics(), {}, 1);
-  ASSERT_TRUE(finding && finding->merge);
-  std::vector<LoopEdge> edges;
-  correct_loop(world.map, *finding, &edges);
-  EXPECT_EQ(edges.size(), finding->support.size());
 }
 
 TEST(MapMerge, MapsThatShareNothingStayApart) {

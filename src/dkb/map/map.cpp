@@ -82,6 +82,21 @@ KeyframeId Map::root(KeyframeId id) const {
   return k->id;
 }
 
+std::vector<KeyframeId> Map::root_of_each() const {
+  std::vector<KeyframeId> roots(keyframes_.size(), kNoKeyframe);
+  std::vector<KeyframeId> path;
+  for (KeyframeId id = 0; id < keyframe_count(); ++id) {
+    path.clear();
+    KeyframeId at = id;
+    for (; roots[static_cast<size_t>(at)] == kNoKeyframe && keyframe(at)->parent != kNoKeyframe;
+         at = keyframe(at)->parent)
+      path.push_back(at);
+    if (roots[static_cast<size_t>(at)] == kNoKeyframe) roots[static_cast<size_t>(at)] = at;
+    for (KeyframeId k : path) roots[static_cast<size_t>(k)] = roots[static_cast<size_t>(at)];
+  }
+  return roots;
+}
+
 std::vector<KeyframeId> Map::roots() const {
   std::vector<KeyframeId> ids;
   for (const auto& k : keyframes_)
@@ -92,8 +107,10 @@ std::vector<KeyframeId> Map::roots() const {
 std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
   std::vector<KeyframeId> newest;
   if (keyframe(id) == nullptr) return newest;
+  const std::vector<KeyframeId> root = root_of_each();
   for (KeyframeId k = keyframe_count(); k-- > 0 && static_cast<int>(newest.size()) < most;)
-    if (live_keyframe(k) != nullptr && root(k) == root(id)) newest.push_back(k);
+    if (live_keyframe(k) != nullptr && root[static_cast<size_t>(k)] == root[static_cast<size_t>(id)])
+      newest.push_back(k);
   std::reverse(newest.begin(), newest.end());
   return newest;
 }
@@ -284,7 +301,7 @@ void Map::update_covisibility(KeyframeId id, int min_shared_points) {
   // The best one stays, however little they share, and whoever has nobody else.
   const auto has_others = [&](const Covisible& c) {
     const std::vector<Covisible>& its = keyframe(c.keyframe)->covisible;
-    return its.size() != 1 || its[0].keyframe != id;
+    return std::any_of(its.begin(), its.end(), [id](const Covisible& other) { return other.keyframe != id; });
   };
   for (size_t i = found.size(); i-- > 1 && found[i].shared_points < min_shared_points;)
     if (has_others(found[i])) found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
@@ -321,16 +338,20 @@ KeyframeId Map::moved_on_from(KeyframeId id) const {
   return keyframe(next)->motion->previous == id ? next : kNoKeyframe;
 }
 
-// What told of the way to this keyframe and from it tells of the way past it.
-void Map::hand_on_motion(KeyframeId id) {
+// What told of the way to this keyframe and from it tells of the way past it. Where nothing tells of the way to it, the
+// way from it begins at its parent, on which it rides: as when a keyframe comes whose motion began at a culled one.
+void Map::hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent) {
   const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
   for (KeyframeId next = id + 1; next < keyframe_count(); ++next) {
     const Keyframe& k = *keyframe(next);
     if (k.culled || k.motion == nullptr || k.motion->previous != id) continue;
-    const std::shared_ptr<const KeyframeMotion> after = k.motion;
-    edit(next).motion = before ? std::make_shared<const KeyframeMotion>(
-                                     KeyframeMotion{before->previous, joined(before->since, after->since)})
-                               : nullptr;
+    KeyframeMotion past{parent, k.motion->since};
+    if (before)
+      past = {before->previous, joined(before->since, past.since)};
+    else
+      past.since.previous_from_current = cam_from_parent.inverse() * past.since.previous_from_current;
+    // Where two maps were joined a parent may be the younger one.
+    edit(next).motion = past.previous < next ? std::make_shared<const KeyframeMotion>(past) : nullptr;
   }
 }
 
@@ -364,7 +385,7 @@ void Map::cull_keyframe(KeyframeId id) {
   for (const Covisible& c : keyframe(id)->covisible) drop_covisible(edit(c.keyframe).covisible, id);
   for (const auto& other : keyframes_)
     if (!other.value->culled && other.value->parent == id) edit(other.value->id).parent = parent;
-  hand_on_motion(id);
+  hand_on_motion(id, parent, cam_from_parent);
   Keyframe& me = edit(id);
   me.culled = true;
   me.cam_from_parent = cam_from_parent;

@@ -115,7 +115,9 @@ class Map {
   // The plane that stands for this one since planes turned out to be the same; must exist.
   PlaneId plane(PlaneId id) const;
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
-  KeyframeId root(KeyframeId id) const;   // must exist
+  KeyframeId root(KeyframeId id) const;  // must exist
+  std::vector<KeyframeId> root_of_each()
+      const;                              // of all keyframes ever made: whoever asks for many walks no path twice
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
   // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.
   std::vector<KeyframeId> newest_beside(KeyframeId id, int most) const;
@@ -185,7 +187,7 @@ class Map {
   void add_live(MapPoint point);
   void add_gone(RemovedPoint point);
   void remove_point(PointId point, PointId replaced_by);
-  void hand_on_motion(KeyframeId id);
+  void hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent);
   void check_keyframes() const;
   void check_forwarding() const;
 

@@ -377,6 +377,20 @@ TEST(MapFile, KeepsMotionsAndPlanesAndPutsNewPlanesBesideThem) {
     for (PlaneId p : loaded.keyframe(id)->plane_of_patch) EXPECT_NE(p, made);
 }
 
+TEST(MapFile, AMotionWhoseTranslationIsUnknownIsRefused) {
+  Map map;
+  map.add_keyframe(test::keyframe_at(0, 0));
+  Keyframe next = test::keyframe_at(1, 1);
+  next.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{0, {{}, false, Matrix6d::Identity()}});
+  map.add_keyframe(std::move(next));
+  Contents contents = write_sections(map, fr1_context()).bytes;
+  std::string& motions = contents[5];
+  EXPECT_EQ(complaint(sealed(contents)), "no error");
+  motions[3] = 1;  // of its kind: after the number of motions, the keyframe and the step back
+  EXPECT_NE(complaint(sealed(contents)).find("section MOTN has a motion of an unknown kind"), std::string::npos)
+      << complaint(sealed(contents));
+}
+
 TEST(MapFile, DamageIsPutDownToItsSection) {
   std::string bytes = encode_map(test::random_map(7, 3, 8, 5), fr1_context());
   bytes.back() = static_cast<char>(bytes.back() ^ 1);

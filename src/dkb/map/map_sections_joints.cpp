@@ -25,8 +25,11 @@ bool is_covariance(const Matrix& m) {
          spectrum(m).values[0] >= -1e-9 * m.trace();
 }
 
+constexpr uint8_t kWholeMotion =
+    0;  // the only kind: a rotation alone would be adjusted by as if its translation were known
+
 bool sound(const MotionPrior& motion) {
-  return sound(motion.previous_from_current) && is_covariance(motion.covariance);
+  return !motion.rotation_only && sound(motion.previous_from_current) && is_covariance(motion.covariance);
 }
 
 bool sound(const PlanePatch& patch) {
@@ -80,7 +83,7 @@ std::string motion_section(const Map& map) {
     out.varint(static_cast<uint64_t>(id - before));
     before = id;
     out.varint(static_cast<uint64_t>(id - motion.previous));
-    out.u8(motion.since.rotation_only);
+    out.u8(kWholeMotion);
     write_pose(out, motion.since.previous_from_current);
     write_matrix(out, motion.since.covariance);
   }
@@ -97,9 +100,7 @@ void read_motion_section(std::string_view bytes, std::vector<Keyframe>& keyframe
     KeyframeMotion motion;
     motion.previous = id - static_cast<KeyframeId>(back);
     if (keyframes[static_cast<size_t>(motion.previous)].culled) in.fail("tells of a motion from a culled keyframe");
-    const uint8_t rotation_only = in.u8();
-    if (rotation_only > 1) in.fail("has a motion of an unknown kind");
-    motion.since.rotation_only = rotation_only == 1;
+    if (in.u8() != kWholeMotion) in.fail("has a motion of an unknown kind");
     motion.since.previous_from_current = read_pose(in);
     read_matrix(in, motion.since.covariance);
     if (!sound(motion.since)) in.fail("has an impossible motion to keyframe " + std::to_string(id));

@@ -230,6 +230,13 @@ TEST(Map, TooWeakCovisibilityLeavesTheBestEdgeAndThoseOfKeyframesThatHaveNoOther
   EXPECT_EQ(broken_invariant(world.map), "");
 }
 
+TEST(Map, AKeyframeWithoutNeighboursTakesWhateverEdgeThereIs) {
+  ThreeKeyframes world;
+  world.map.update_covisibility(1, 4);  // 0 is its best; 2 has nobody yet, and shares one point with it
+  EXPECT_EQ(points_shared_with(1, world.map.keyframe(2)->covisible), 1);
+  EXPECT_EQ(broken_invariant(world.map), "");
+}
+
 TEST(Map, CulledKeyframesRideOnTheirParents) {
   ThreeKeyframes world;
   const Rigid3 before = world.map.cam_from_world(1);
@@ -303,16 +310,30 @@ TEST(Map, AMotionPastOtherKeyframesOutlivesTheOneItBeganAt) {
   EXPECT_TRUE(map.keyframe(3)->motion->since.previous_from_current.translation.isApprox(Eigen::Vector3d(-2, 0, 0)));
 }
 
-TEST(Map, AGapInTheMotionStaysAGapWhenAKeyframeBesideItIsCulled) {
+TEST(Map, AMotionAfterAGapOutlivesTheKeyframeItBeganAt) {
   Map map;
   map.add_keyframe(keyframe_at(0, 0));
   map.add_keyframe(moved(1, 0));
-  map.add_keyframe(keyframe_at(2, 2));  // nothing tells how the camera came here
+  map.add_keyframe(keyframe_at(2, 2.5));  // nothing tells how the camera came here
   map.add_keyframe(moved(3, 2));
   map.cull_keyframe(1);
-  EXPECT_FALSE(map.keyframe(2)->motion);
+  EXPECT_FALSE(map.keyframe(2)->motion) << "a gap stays a gap";
   map.cull_keyframe(2);
-  EXPECT_FALSE(map.keyframe(3)->motion);
+  ASSERT_TRUE(map.keyframe(3)->motion);
+  EXPECT_EQ(map.keyframe(3)->motion->previous, 0) << "on which the culled one rides";
+  EXPECT_TRUE(map.keyframe(3)->motion->since.previous_from_current.translation.isApprox(Eigen::Vector3d(-3.5, 0, 0)));
+  EXPECT_TRUE(map.keyframe(3)->motion->since.covariance.isApprox(0.01 * Matrix6d::Identity()));
+}
+
+TEST(Map, NoMotionLeadsFromAYoungerKeyframe) {
+  Map map;
+  map.add_keyframe(keyframe_at(0, 0));
+  map.add_keyframe(keyframe_at(1, 1));
+  map.add_keyframe(moved(2, 1));
+  map.set_parent(2, 0);  // as where a tree was turned round to hang on another
+  map.set_parent(1, 2);
+  map.cull_keyframe(1);
+  EXPECT_FALSE(map.keyframe(2)->motion);
 }
 
 TEST(Map, TheRootIsNotCulled) {

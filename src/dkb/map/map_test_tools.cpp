@@ -113,6 +113,7 @@ std::string tree_broken(const Map& map) {
     int steps = 0;
     for (KeyframeId a = id; a != kNoKeyframe; a = map.keyframe(a)->parent)
       if (++steps > map.keyframe_count()) return "parents run in a circle";
+    if (map.root_of_each()[static_cast<size_t>(id)] != map.root(id)) return "roots are told in two ways";
     if (k.culled && (k.parent == kNoKeyframe || k.features || !k.points.empty() || !k.covisible.empty()))
       return "a culled keyframe is not empty, or has no parent";
     if (!k.culled && k.parent != kNoKeyframe && map.live_keyframe(k.parent) == nullptr)
@@ -217,8 +218,8 @@ KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen,
   }
   const KeyframeId id = k.id;
   if (k.id > 0 && random.below(4) != 0)
-    k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{
-        map.live_keyframes().back(), {random_pose(random), random.below(2) != 0, random_covariance(random)}});
+    k.motion = std::make_shared<const KeyframeMotion>(
+        KeyframeMotion{map.live_keyframes().back(), {random_pose(random), false, random_covariance(random)}});
   if (random.below(3) != 0) k.planes = random_planes(random);
   const size_t patches = k.planes ? k.planes->patches.size() : 0;
   map.add_keyframe(std::move(k));
@@ -352,7 +353,6 @@ std::string fingerprint(const Map& map) {
     }
     if (k.motion) {
       out.i32(k.motion->previous);
-      out.u8(k.motion->since.rotation_only);
       write(out, k.motion->since.previous_from_current);
       for (double v : k.motion->since.covariance.reshaped()) out.f64(v);
     }

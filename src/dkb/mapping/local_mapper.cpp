@@ -59,6 +59,7 @@ MapView LocalMapper::process(const KeyframePacket& packet) {
   apply_reports(packet);
   if (packet.id == kNoKeyframe) return map_.snapshot();
   insert(packet);
+  cull_if_empty(packet.id - 1);
   cull_points(packet.id);
   const auto triangulated = triangulate_new_points(map_, packet.id, optics_);
   young_.insert(young_.end(), triangulated.begin(), triangulated.end());
@@ -93,8 +94,10 @@ MapView LocalMapper::apply(const MapCorrection& correction) {
   for (KeyframeId k : near) report_.points_fused += fuse_into(k, map_.points_of(far), kSeamTolerance);
   for (KeyframeId k : far) report_.points_fused += fuse_into(k, map_.points_of(near), kSeamTolerance);
   near.insert(near.end(), far.begin(), far.end());
-  refresh(map_.points_of(near));
-  for (KeyframeId k : near) map_.update_covisibility(k, kMinSharedPoints);
+  const std::vector<PointId> seam = map_.points_of(near);
+  refresh(seam);
+  // Whoever sees a point of one side may share it with whoever sees it from the other.
+  for (const Covisible& c : map_.observers_of(seam)) map_.update_covisibility(c.keyframe, kMinSharedPoints);
   times_.add("map_correction", whole.ms());
   return map_.snapshot();
 }
@@ -132,6 +135,11 @@ void LocalMapper::insert(const KeyframePacket& packet) {
     since.previous_from_current = from.cam_from_ancestor.inverse() * since.previous_from_current;
     k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{from.id, since});
   }
+  // As uncertain as what it hangs on and the way from there, until adjustment knows better; where nothing ties it to
+  // the map, it never does.
+  if (packet.reference != kNoKeyframe)
+    k.covariance = carried(packet.cam_from_reference, map_.keyframe(packet.reference)->covariance);
+  if (k.motion) k.covariance += k.motion->since.covariance;
   k.planes = packet.planes;
   k.points = packet.points;
   const Rigid3 world_from_cam = k.cam_from_world.inverse();
@@ -235,24 +243,37 @@ void LocalMapper::cull_keyframes(KeyframeId newest) {
   for (const Covisible& c : neighbours) {
     const Keyframe* k = map_.live_keyframe(c.keyframe);
     if (k == nullptr || k->parent == kNoKeyframe) continue;
-    int points = 0, redundant = 0;
-    for (size_t f = 0; f < k->points.size(); ++f) {
+    const auto points = std::count_if(k->points.begin(), k->points.end(), [](PointId p) { return p != kNoPoint; });
+    const double enough = options_.redundant_share * static_cast<double>(points);
+    std::ptrdiff_t redundant = 0, left = points;
+    for (size_t f = 0; f < k->points.size() && static_cast<double>(redundant + left) > enough; ++f) {
       const MapPoint* p = map_.point(k->points[f]);
       if (p == nullptr) continue;
-      ++points;
+      --left;
       if (static_cast<int>(p->observations.size()) <= kRedundantObservers) continue;
       const int octave = k->features->keypoints[f].octave;
       int as_fine = 0;
-      for (const Observation& o : p->observations)
+      for (size_t i = 0; i < p->observations.size() && as_fine < kRedundantObservers; ++i) {
+        const Observation& o = p->observations[i];
         as_fine += o.keyframe != c.keyframe &&
                    map_.keyframe(o.keyframe)->features->keypoints[static_cast<size_t>(o.feature)].octave <= octave + 1;
+      }
       redundant += as_fine >= kRedundantObservers;
     }
-    if (points > 0 && redundant > options_.redundant_share * points) {
+    if (points > 0 && static_cast<double>(redundant) > enough) {
       map_.cull_keyframe(c.keyframe);
       ++report_.keyframes_culled;
     }
   }
+}
+
+void LocalMapper::cull_if_empty(KeyframeId id) {
+  const Keyframe* k = map_.live_keyframe(id);
+  if (k == nullptr || k->parent == kNoKeyframe || (k->planes && !k->planes->patches.empty()) ||
+      std::any_of(k->points.begin(), k->points.end(), [](PointId p) { return p != kNoPoint; }))
+    return;
+  map_.cull_keyframe(id);
+  ++report_.keyframes_culled;
 }
 
 void LocalMapper::refresh(const std::vector<PointId>& points) {

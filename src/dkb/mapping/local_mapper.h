@@ -47,6 +47,8 @@ class LocalMapper {
   void fuse_pair(PointId a, PointId b);
   int fuse_into(KeyframeId keyframe, const std::vector<PointId>& points, double tolerance = 1);
   void cull_keyframes(KeyframeId newest);
+  // A keyframe that shows nothing: the way past it remains.
+  void cull_if_empty(KeyframeId id);
   void refresh(const std::vector<PointId>& points);
 
   Optics optics_;

@@ -156,6 +156,30 @@ TEST_F(Mapping, RedundantKeyframesAreCulledAndTheirFramesKeepTheirPlaces) {
     EXPECT_LT(distance_between(view->cam_from_world(k), truth[static_cast<size_t>(k)]), 1e-3) << "keyframe " << k;
 }
 
+// In the dark, say. The motion from before it to after it remains.
+TEST_F(Mapping, AKeyframeThatShowsNothingIsCulledWhenTheNextOneHasCome) {
+  LocalMapper mapper = make();
+  mapper.process(packet(at(0)));
+  mapper.process(packet(at(1)));
+  const auto moved_from = [&](KeyframeId id) {
+    const Rigid3 step = estimates[static_cast<size_t>(id)] * estimates.back().inverse();
+    return std::make_shared<const KeyframeMotion>(KeyframeMotion{id, {step, false, 1e-6 * Matrix6d::Identity()}});
+  };
+  KeyframePacket dark = packet(at(2));
+  dark.motion = moved_from(1);
+  dark.points.assign(dark.points.size(), kNoPoint);
+  dark.new_points.clear();
+  MapView view = mapper.process(dark);
+  EXPECT_NE(view->live_keyframe(2), nullptr) << "the camera is there";
+  KeyframePacket next = packet(at(3));
+  next.motion = moved_from(2);
+  view = mapper.process(next);
+  EXPECT_EQ(view->live_keyframe(2), nullptr);
+  ASSERT_NE(view->keyframe(3)->motion, nullptr);
+  EXPECT_EQ(view->keyframe(3)->motion->previous, 1);
+  EXPECT_LT(distance_between(view->cam_from_world(2), at(2)), 1e-3) << "its frames keep their place";
+}
+
 TEST_F(Mapping, ViewsOfTheirOwnAreNotCulled) {
   LocalMapper mapper = make();
   MapView view;
@@ -198,6 +222,18 @@ TEST_F(Mapping, MotionsTieNothingBetweenMapsThatAreNotJoined) {
   next.motion = motion_from(2);
   mapper.process(next);
   EXPECT_NE(mapper.map().keyframe(3)->motion, nullptr);
+}
+
+TEST_F(Mapping, AKeyframeThatNothingTiesToTheMapIsAsUncertainAsWhatItHangsOn) {
+  LocalMapper mapper = make();
+  mapper.process(packet(at(0)));
+  mapper.process(packet(at(1), {.pixel_noise = 0.5, .depth_noise = 0.01}));
+  const Matrix6d known = mapper.map().keyframe(1)->covariance;
+  ASSERT_GT(known.trace(), 0);
+  const KeyframePacket apart = packet(at(2), at(2), {}, [](int) { return false; });
+  const MapView view = mapper.process(apart);
+  const Matrix6d expected = carried(apart.cam_from_reference, known);
+  EXPECT_LT((view->keyframe(2)->covariance - expected).norm(), 1e-6 * expected.norm());
 }
 
 TEST_F(Mapping, RetractedPointsLeaveTheMap) {

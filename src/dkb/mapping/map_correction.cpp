@@ -15,16 +15,22 @@ void hang_tree(Map& map, KeyframeId joint, KeyframeId parent) {
   for (size_t i = 1; i < path.size(); ++i) map.set_parent(path[i], path[i - 1]);
 }
 
+bool same(const Rigid3& a, const Rigid3& b) {
+  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
+
 }  // namespace
 
 void move_map(Map& map, const MapCorrection& correction) {
   const auto count = static_cast<size_t>(map.keyframe_count());
+  const bool adjusts = correction.kind == MapCorrection::Kind::adjustment;
   // How the world moves at each keyframe: new_world_from_old_world.
   std::vector<std::optional<Rigid3>> motion(count);
   for (const MapCorrection::Pose& p : correction.poses) {
     const Keyframe* k = map.live_keyframe(p.keyframe);
     if (k == nullptr) continue;
-    const Rigid3 after = k->cam_from_world * p.before.inverse() * p.after;
+    const Rigid3 after =
+        adjusts && !same(p.before, p.after) ? p.after : k->cam_from_world * p.before.inverse() * p.after;
     motion[static_cast<size_t>(p.keyframe)] = after.inverse() * k->cam_from_world;
   }
   // The others move as the nearest ancestor does that has a correction; trees without one stay.
@@ -54,7 +60,7 @@ void move_map(Map& map, const MapCorrection& correction) {
     MapPoint& moved = map.edit_point(id);
     if (own) {
       const MapCorrection::Position& c = correction.positions[next];
-      moved.position = c.after + moves.rotation * (moved.position - c.before);
+      moved.position = adjusts ? c.after : Eigen::Vector3d(c.after + moves.rotation * (moved.position - c.before));
     } else {
       moved.position = moves * moved.position;
     }

@@ -10,7 +10,9 @@
 namespace dkb {
 namespace {
 
-constexpr int kMaxDistance = 50;  // [bits] largest Hamming distance of an epipolar match
+constexpr size_t kTriangulated = 6;   // covisible keyframes to triangulate with
+constexpr double kMinParallax = 1.0;  // [deg] between the rays of a new point
+constexpr int kMaxDistance = 50;      // [bits] largest Hamming distance of an epipolar match
 
 // Point nearest to two rays, from the least squares of both; nothing when they are parallel or it lies behind.
 std::optional<Eigen::Vector3d> meet(const Eigen::Vector3d& centre_a, const Eigen::Vector3d& ray_a,
@@ -63,13 +65,12 @@ DescriptorMatch best_on_line(const Eigen::Vector3d& line, const Descriptor& desc
 
 }  // namespace
 
-std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const Optics& optics,
-                                            const PointCreationOptions& options) {
+std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const Optics& optics) {
   std::vector<PointId> made;
   const std::vector<Covisible> neighbours = map.keyframe(newest)->covisible;
-  const double max_cosine = std::cos(options.min_parallax_deg * M_PI / 180);
+  const double max_cosine = std::cos(kMinParallax * M_PI / 180);
   const CameraModel& camera = optics.camera;
-  for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours)); ++n) {
+  for (size_t n = 0; n < std::min(neighbours.size(), kTriangulated); ++n) {
     const Keyframe& a = *map.keyframe(newest);
     const Keyframe& b = *map.keyframe(neighbours[n].keyframe);
     const Rigid3 world_from_a = a.cam_from_world.inverse(), world_from_b = b.cam_from_world.inverse();

@@ -39,9 +39,7 @@ class PointCreation : public ::testing::Test {
     }
     map = SceneMap(known_scene, views, poses, [&](int i) { return known_scene.points[static_cast<size_t>(i)]; }).map;
   }
-  std::vector<PointId> create(const PointCreationOptions& options = {}) {
-    return triangulate_new_points(map, 1, scene.optics(), options);
-  }
+  std::vector<PointId> create() { return triangulate_new_points(map, 1, scene.optics()); }
 
   // `change` gets the fresh features of the first keyframe, and how far what they show is from it [m].
   void change_first(const std::function<void(Keypoint&, double)>& change) {
@@ -108,10 +106,8 @@ TEST_F(PointCreation, WithoutParallaxThereIsNothingToTriangulate) {
 }
 
 TEST_F(PointCreation, RaysMustMeetAtTheMinimumParallax) {
-  build(TestScene::camera_at({0.2, 0, 0}));
-  PointCreationOptions options;
-  options.min_parallax_deg = 20;  // 0.2 m seen from 1.5 m and more: 7.6 degrees at most
-  EXPECT_TRUE(create(options).empty());
+  build(TestScene::camera_at({0.025, 0, 0}));  // seen from 1.5 m and more: 0.95 degrees at most
+  EXPECT_TRUE(create().empty());
 }
 
 TEST_F(PointCreation, FeaturesWithDepthAreLeftAlone) {
@@ -142,13 +138,6 @@ TEST_F(PointCreation, NothingLiesBeforeTheSurfacesAround) {
 TEST_F(PointCreation, DescriptorsMustAgree) {
   build(TestScene::camera_at({0.2, 0, 0}), {.depth_share = 0, .flipped_bits = 100});
   EXPECT_TRUE(create().empty());
-}
-
-TEST_F(PointCreation, NoNeighboursNoPoints) {
-  build(TestScene::camera_at({0.2, 0, 0}));
-  PointCreationOptions options;
-  options.neighbours = 0;
-  EXPECT_TRUE(create(options).empty());
 }
 
 TEST_F(PointCreation, ASecondCallFindsNothingMore) {

@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/slam/loop_stage.h"
 
+#include <algorithm>
+
 namespace dkb {
 namespace {
 
-constexpr size_t kMaxLate = 4;  // searches outstanding in a real-time run
+constexpr size_t kMaxLate = 4;                 // searches outstanding in a real-time run
+constexpr size_t kNeighboursOfAKeyframe = 45;  // covisible ones, of those that the latency of an adjustment is told for
+
+// The keyframes of so many neighbours whose adjustment takes as long as this map's, which takes part of a large one.
+int adjusted_keyframes(const Map& map) {
+  size_t neighbours = 0;
+  for (KeyframeId k : map.live_keyframes()) neighbours += map.keyframe(k)->covisible.size();
+  return static_cast<int>(std::min(neighbours, kMostNeighbours) / kNeighboursOfAKeyframe);
+}
 
 }  // namespace
 
@@ -15,7 +25,6 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
       search_(
           [this](const Task& task) {
             Result result;
-            result.generation = task.generation;
             if (task.generation == closed_generation_) return result;  // the map is about to move
             const Stopwatch watch;
             if (auto correction = closer_.process(*task.view, task.keyframe)) {
@@ -31,7 +40,8 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             const Stopwatch watch;
             Result result;
             result.generation = task.generation;
-            result.correction = std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba));
+            result.correction =
+                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, task.keyframe));
             result.ms = watch.ms();
             return result;
           },
@@ -50,7 +60,8 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
-    adjustment_.push({view, kNoKeyframe, generation_}, now + rate.frames(options_.global_ba_latency(keyframes)));
+    adjustment_.push({view, adjust_around_, generation_},
+                     now + rate.frames(options_.global_ba_latency(adjusted_keyframes(*view))));
     adjustment_wanted_ = false;
   }
 }
@@ -59,9 +70,10 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
   std::vector<std::shared_ptr<const MapCorrection>> corrections;
   while (auto found = search_.take_due(now, wait)) {
     times_.add("loop", found->ms);
-    if (!found->correction || found->generation != generation_) continue;
+    if (!found->correction) continue;
     ++generation_;
     adjustment_wanted_ = true;
+    adjust_around_ = found->correction->near_side.front();
     corrections.push_back(std::move(found->correction));
   }
   while (auto adjusted = adjustment_.take_due(now, wait)) {

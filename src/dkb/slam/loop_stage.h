@@ -16,14 +16,14 @@ namespace dkb {
 // When background results become visible: so many seconds after they were asked for, in whole frames.
 struct BackgroundLatency {
   double base = 0;          // [s] > 0
-  double per_keyframe = 0;  // [s] >= 0, times the keyframes of the map
+  double per_keyframe = 0;  // [s] >= 0, times the keyframes that are looked at
   double operator()(int keyframes) const { return base + per_keyframe * keyframes; }
 };
 
 struct LoopStageOptions {
   LoopOptions loop;
-  BackgroundLatency loop_latency{1.0 / 3, 0.02 / 30};
-  BackgroundLatency global_ba_latency{0.5, 0.4 / 30};
+  BackgroundLatency loop_latency{1.0 / 3, 0.0002};
+  BackgroundLatency global_ba_latency{0.5, 0.4 / 30};  // of the keyframes that an adjustment takes, 45 neighbours each
 };
 
 // Loop closing and global bundle adjustment beside tracking and mapping, each on its own thread. Both work on views
@@ -40,8 +40,11 @@ class LoopStage {
   void offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip);
   // Keyframes below `first` are not searched: they were there before.
   void start_at(KeyframeId first) { next_ = first; }
-  // Has the whole map adjusted with the next view that is offered.
-  void want_adjustment() { adjustment_wanted_ = true; }
+  // Has all maps adjusted with the next view that is offered.
+  void want_adjustment() {
+    adjustment_wanted_ = true;
+    adjust_around_ = kNoKeyframe;
+  }
 
   // Corrections due at `now`, in the order in which mapping must take them.
   std::vector<std::shared_ptr<const MapCorrection>> take_due(FrameIndex now, bool wait);
@@ -52,12 +55,12 @@ class LoopStage {
  private:
   struct Task {
     MapView view;
-    KeyframeId keyframe = kNoKeyframe;
+    KeyframeId keyframe = kNoKeyframe;  // that is searched, or adjusted around
     int generation = 0;
   };
   struct Result {
     std::shared_ptr<const MapCorrection> correction;  // none when nothing was found
-    int generation = 0;
+    int generation = 0;                               // of an adjustment
     double ms = 0;
   };
 
@@ -67,6 +70,7 @@ class LoopStage {
   int generation_ = 0;          // corrections handed out that moved the map by a loop or a merge
   KeyframeId next_ = 0;         // the first keyframe that was not offered yet
   bool adjustment_wanted_ = false, adjustment_overtaken_ = false;
+  KeyframeId adjust_around_ = kNoKeyframe;  // where the last loop was; none: everywhere
   StageTimes times_;
   DueStage<Task, Result> search_, adjustment_;  // last: their threads use the above
 };

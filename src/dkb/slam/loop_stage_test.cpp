@@ -131,6 +131,25 @@ TEST(LoopStage, AMapThatHasShrunkIsAdjustedAsWell) {
   EXPECT_TRUE(stage.idle());
 }
 
+// The time of an adjustment is a matter of the neighbours that its keyframes have: 45 of them are one keyframe's.
+TEST(LoopStage, AnAdjustmentIsDueByTheNeighboursOfItsKeyframes) {
+  test::RoundTrip world;
+  world.go(30);
+  int neighbours = 0;
+  for (KeyframeId k : world.map.live_keyframes())
+    neighbours += static_cast<int>(world.map.keyframe(k)->covisible.size());
+  LoopStageOptions options = prompt();
+  options.global_ba_latency = {1, 1};
+  LoopStage stage(world.optics(), options, {}, 1, false);
+  stage.start_at(world.map.keyframe_count());
+  stage.want_adjustment();
+  stage.offer(world.map.snapshot(), 0, FrameRate(30), false);
+  const FrameIndex due = 30 * (1 + neighbours / 45);
+  EXPECT_LT(due, 30 * 30);
+  EXPECT_EQ(stage.take_due(due - 1, true).size(), 0U);
+  EXPECT_EQ(stage.take_due(due, true).size(), 1U);
+}
+
 TEST(LoopStage, EndsWithWorkOutstanding) {
   test::RoundTrip world;
   world.go(10);
