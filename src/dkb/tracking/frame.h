@@ -35,7 +35,12 @@ struct PosePrediction {
 
   // It may weigh in a pose by the images: not where the map shows another place.
   bool weighs = false;
+  // By something beside the camera, which may slip: it has no weight where the images do not allow it. Corners do not
+  // overrule the camera's own depth so: they may be on somebody who walks.
+  bool told = false;
 
+  // Whether what the images say alone may be of the same pose.
+  bool allows(const PosePrior& by_observations) const;
   // Whether a pose by the images may be the same one.
   bool agrees(const Rigid3& found_cam_from_world) const;
 };

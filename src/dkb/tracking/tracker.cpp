@@ -132,7 +132,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   }
   if (!expected || !expected->weighs) return optimise_pose(optics_.camera, initial, observations);
   const PosePrior prior{expected->cam_from_world, inverse(expected->covariance)};
-  return optimise_pose(optics_.camera, initial, observations, {}, &prior);
+  const PoseEstimate estimate = optimise_pose(optics_.camera, initial, observations, {}, &prior);
+  if (!expected->told || !estimate.by_observations || expected->allows(*estimate.by_observations)) return estimate;
+  return optimise_pose(optics_.camera, initial, observations);
 }
 
 double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, const RgbdFeatures& features) const {

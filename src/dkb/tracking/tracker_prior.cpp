@@ -22,27 +22,17 @@ constexpr size_t kKeyframesNearby = 3;    // that an expected pose is sought fro
 constexpr double kMaxViewDistance = 3.0;  // [m] between cameras that may show the same ...
 constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: about the field of view
 
-// The same motion told twice: each weighs by its covariance.
-MotionPrior weighed(const MotionPrior& one, const MotionPrior& other) {
-  const Vector6d apart = tangent_from_rigid3(one.previous_from_current.inverse() * other.previous_from_current);
-  const Matrix6d gain = one.covariance * inverse(one.covariance + other.covariance);
-  const Matrix6d covariance = one.covariance - gain * one.covariance;
-  return {one.previous_from_current * rigid3_from_tangent(gain * apart), false,
-          0.5 * (covariance + covariance.transpose())};
-}
-
 }  // namespace
 
 std::optional<MotionPrior> Tracker::expected_step(double timestamp, const MotionPrior* prior) const {
   if (!last_ || timestamp <= last_->timestamp) return std::nullopt;  // stamps may differ by less than a double tells
   if (state_ == TrackingState::lost) prior = nullptr;  // it tells of the step from a frame whose pose nobody knows
-  if (prior != nullptr && !prior->rotation_only && !velocity_) return *prior;
+  if (prior != nullptr && !prior->rotation_only) return *prior;
   MotionPrior step;
   const double seconds = timestamp - last_->timestamp;
   step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
   step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
-  if (!prior->rotation_only) return weighed(*prior, step);
   // Nothing corrects the translation: an acceleration since the camera was seen is off by half its time squared.
   const auto off = [](double t) { return 0.25 * kAccelerationSd * kAccelerationSd * t * t * t * t; };
   double variance = off(timestamp - last_seen_) - off(last_->timestamp - last_seen_);
@@ -68,7 +58,13 @@ std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
   if (!(told || known) || !plausible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
   pose.weighs = true;
+  pose.told = input.prior != nullptr;
   return pose;
+}
+
+bool PosePrediction::allows(const PosePrior& by_observations) const {
+  const Vector6d delta = tangent_from_rigid3(cam_from_world * by_observations.cam_from_world.inverse());
+  return delta.dot(solve_symmetric(covariance + inverse(by_observations.information), delta)) <= kChi2SixDof99;
 }
 
 bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {

@@ -63,25 +63,6 @@ TEST_F(ExpectedCamera, GoesOnWithoutTheImagesWhereTooFewPointsAreInView) {
   EXPECT_EQ(see(4, 7, step_to(4)).state, TrackingState::predicted);
 }
 
-// Wheels and the velocity so far tell the same step: each counts by its covariance.
-TEST_F(ExpectedCamera, StepsBetweenWheelsAndItsVelocity) {
-  const double now = (index + 1) * kFrameTime;
-  const MotionPrior by_velocity = *tracker.expected_step(now, nullptr);
-  const auto off = [&](const MotionPrior& step) {
-    return tangent_from_rigid3(by_velocity.previous_from_current.inverse() * step.previous_from_current);
-  };
-  MotionPrior wheels = by_velocity;
-  wheels.previous_from_current.translation += Eigen::Vector3d(0.03, 0, 0);
-  const Vector6d apart = off(wheels);
-  const MotionPrior half = *tracker.expected_step(now, &wheels);
-  EXPECT_LT((off(half) - 0.5 * apart).norm(), 0.01 * apart.norm());
-  EXPECT_LT((2 * half.covariance - by_velocity.covariance).norm(), 0.01 * by_velocity.covariance.norm());
-  wheels.covariance = 1e-6 * by_velocity.covariance;
-  EXPECT_LT((off(*tracker.expected_step(now, &wheels)) - apart).norm(), 1e-5);
-  wheels.covariance = 1e6 * by_velocity.covariance;
-  EXPECT_LT(off(*tracker.expected_step(now, &wheels)).norm(), 1e-5);
-}
-
 // A step that something beside the camera tells weighs in a pose as one by the camera's own depth does.
 TEST_F(ExpectedCamera, LeansOnWheelsByTheirCovariance) {
   MotionPrior wheels = step_to(4);  // 3 cm off
@@ -92,6 +73,21 @@ TEST_F(ExpectedCamera, LeansOnWheelsByTheirCovariance) {
   EXPECT_LT(by_images, 0.01);
   EXPECT_GT(apart, 1e-5) << "toward the wheels";
   EXPECT_LT(apart, 0.005) << "but not to them: they claim 2 cm";
+}
+
+// A wheel that slips for a frame: the images contradict it by more than both can be off.
+TEST_F(ExpectedCamera, LeavesWheelsOutThatTheImagesContradict) {
+  MotionPrior wheels = step_to(4);  // 3 cm off
+  wheels.covariance = axis_covariance(0.002, 0.001);
+  const TrackedFrame told = see(4, 30, wheels, {0, 0}, &wheels);
+  EXPECT_FALSE(told.by_observations);
+  EXPECT_LT(distance_between(told.cam_from_world, on_path(4)), 0.01);
+}
+
+TEST_F(ExpectedCamera, IsHeldByItsOwnDepthWhateverCornersSay) {
+  MotionPrior by_depth = step_to(4);
+  by_depth.covariance = axis_covariance(0.002, 0.001);
+  EXPECT_TRUE(see(4, 30, by_depth).by_observations);
 }
 
 // The second frame of a map, of a camera that stands: nobody knows yet how fast it moves, and most of the corners are
