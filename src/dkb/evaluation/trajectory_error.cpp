@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 
 #include "dkb/geometry/decompositions.h"
 #include "dkb/util/errors.h"
@@ -27,8 +26,15 @@ double degrees_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
 template <class At>
 size_t nearest(size_t begin, size_t end, double value, const At& at) {
   const auto first_of = [&](double bound) {
-    const auto all = std::views::iota(begin, end);
-    return begin + static_cast<size_t>(std::ranges::lower_bound(all, bound, {}, at) - all.begin());
+    size_t low = begin, high = end;
+    while (low < high) {
+      const size_t middle = low + (high - low) / 2;
+      if (at(middle) < bound)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return low;
   };
   const size_t above = first_of(value);
   if (above == begin) return begin;
