@@ -109,18 +109,21 @@ def _trajectory(given: TrajectoryLike) -> Any:
 
 
 def evaluate(truth: TrajectoryLike, estimate: TrajectoryLike, *, max_diff: float = 0.02, rpe_delta: str = "1f",
-             scale: bool = False) -> dict[str, Any]:
+             rpe_all_pairs: bool = False, time_offset: float = 0.0, scale: bool = False) -> dict[str, Any]:
     """Scores a trajectory against the truth: the dict of `dkb-slam eval --json`.
 
     truth, estimate: files in TUM format, (stamps_ns, poses) with rising stamps, or a Slam. max_diff: [s] between
-    matched stamps. rpe_delta: "N" and f, m or s: stretch of the relative error in frames, metres or seconds. scale:
-    align by a similarity.
+    matched stamps. rpe_delta: "N" and f, m or s: stretch of the relative error in frames, metres or seconds, from
+    every pose on with rpe_all_pairs. time_offset: [s] added to the stamps of the estimate. scale: align by a similarity.
 
     Keys: matched, ape.translation_m.{rmse, mean, median, std, min, max}, ape.rotation_deg, and rpe likewise, defined as
     in evo. ape.rotation_determined is false, and ape.rotation_deg None, where a path on a line or in one place leaves
-    the rotation of the alignment free. Raises InputError when a file is wrong or fewer than two stamps match.
+    the rotation of the alignment free; ape.rotation_sd_deg is that rotation's standard error. wrong_scale is there where
+    the estimate is of another size than the truth. Rows of a file of the truth with nan are left out. Raises InputError
+    when a file is wrong or fewer than two stamps match.
     """
-    return json.loads(_core._evaluate_json(_trajectory(truth), _trajectory(estimate), max_diff, rpe_delta, scale))
+    return json.loads(_core._evaluate_json(_trajectory(truth), _trajectory(estimate), max_diff, rpe_delta,
+                                           rpe_all_pairs, time_offset, scale))
 
 
 class Plot:

@@ -12,12 +12,14 @@ struct NamedTrajectory {
   std::string name;  // of its file
 };
 
-// Of a file in TUM format, or of (stamps_ns, poses) as Slam.trajectory() gives them.
-NamedTrajectory trajectory_of(const py::object& object, const char* name) {
+// Of a file in TUM format, or of (stamps_ns, poses) as Slam.trajectory() gives them. Rows of a file of the truth may be
+// hidden, as in `dkb-slam eval`.
+NamedTrajectory trajectory_of(const py::object& object, const char* name, bool is_truth = false) {
   if (!py::isinstance<py::tuple>(object)) {
     const std::string path = path_of(object, name);
     const Unlocked released;
-    return {read_poses(path), path};
+    size_t hidden = 0;
+    return {read_poses(path, is_truth ? &hidden : nullptr), path};
   }
   if (py::len(object) != 2) throw InputError(std::string(name) + ": give a file, or the pair (stamps_ns, poses)");
   const auto stamps = py::array_t<int64_t, py::array::c_style>::ensure(object[py::int_(0)]);
@@ -36,13 +38,8 @@ NamedTrajectory trajectory_of(const py::object& object, const char* name) {
   return trajectory;
 }
 
-Evaluation evaluated(const py::object& truth, const py::object& estimate, double max_diff, const std::string& rpe_delta,
-                     bool scale) {
-  const NamedTrajectory t = trajectory_of(truth, "truth"), e = trajectory_of(estimate, "estimate");
-  EvaluationOptions options;
-  options.max_difference = max_diff;
-  options.rpe_delta = parse_rpe_delta(rpe_delta);
-  options.with_scale = scale;
+Evaluation evaluated(const py::object& truth, const py::object& estimate, const EvaluationOptions& options) {
+  const NamedTrajectory t = trajectory_of(truth, "truth", true), e = trajectory_of(estimate, "estimate");
   const Unlocked released;
   return evaluate(t.poses, e.poses, options, e.name);
 }
@@ -50,12 +47,18 @@ Evaluation evaluated(const py::object& truth, const py::object& estimate, double
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
-  module.def("_evaluate_json",
-             [](const py::object& truth, const py::object& estimate, double max_diff, const std::string& rpe_delta,
-                bool scale) { return evaluation_json(evaluated(truth, estimate, max_diff, rpe_delta, scale)); });
+  module.def("_evaluate_json", [](const py::object& truth, const py::object& estimate, double max_diff,
+                                  const std::string& rpe_delta, bool all_pairs, double time_offset, bool scale) {
+    return evaluation_json(evaluated(truth, estimate,
+                                     {.max_difference = max_diff,
+                                      .time_offset = time_offset,
+                                      .rpe_delta = parse_rpe_delta(rpe_delta),
+                                      .rpe_all_pairs = all_pairs,
+                                      .with_scale = scale}));
+  });
   module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
     if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);
-    return evaluation_svg(evaluated(truth, estimate, EvaluationOptions().max_difference, "1f", false), title);
+    return evaluation_svg(evaluated(truth, estimate, {}), title);
   });
 }
 

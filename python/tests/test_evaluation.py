@@ -30,6 +30,23 @@ def test_the_score_is_that_of_eval_json(slam, sequence, command_line, tmp_path):
     assert by_slam["ape"]["translation_m"]["rmse"] == pytest.approx(score["ape"]["translation_m"]["rmse"], abs=1e-8)
 
 
+def test_all_pairs_and_an_offset_are_those_of_eval(slam, sequence, command_line, tmp_path):
+    truth, (stamps, poses) = sequence / "groundtruth.txt", slam.trajectory()
+    slam.save_trajectory(tmp_path / "trajectory.txt")
+    command_line("eval", truth, tmp_path / "trajectory.txt", "--json", tmp_path / "score.json", "--rpe-delta", "3f",
+                 "--rpe-all-pairs")
+    score = dkb_slam.evaluate(truth, tmp_path / "trajectory.txt", rpe_delta="3f", rpe_all_pairs=True)
+    assert score == json.loads((tmp_path / "score.json").read_text())
+    assert score["rpe"]["pairs"] == 37
+    late = dkb_slam.evaluate(truth, (stamps + 10**12, poses), time_offset=-1000)
+    assert late["matched"] == 40
+    # Motion capture writes nan where its markers are hidden.
+    lines = truth.read_text().splitlines()
+    lines[-1] = lines[-1].split()[0] + " nan" * 7
+    (tmp_path / "hidden.txt").write_text("\n".join(lines) + "\n")
+    assert dkb_slam.evaluate(tmp_path / "hidden.txt", (stamps, poses))["matched"] >= 39
+
+
 def test_what_cannot_be_scored_is_one_line(slam, sequence):
     stamps, poses = slam.trajectory()
     with pytest.raises(dkb_slam.InputError, match="^0 of 40 estimated"):
