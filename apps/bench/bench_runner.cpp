@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <list>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -450,7 +451,13 @@ RunnerReport run_jobs(const ResultsFolder& folder, const std::vector<Job>& jobs,
 
 std::string program_id(const fs::path& program) {
   uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (const char c : read_file(program)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
+  // In blocks, as a run's own memory is measured.
+  std::ifstream file(program, std::ios::binary);
+  std::vector<char> block(1 << 16);
+  while (file.read(block.data(), static_cast<std::streamsize>(block.size())), file.gcount() > 0)
+    for (std::streamsize i = 0; i < file.gcount(); ++i)
+      hash = (hash ^ static_cast<unsigned char>(block[static_cast<size_t>(i)])) * 0x100000001B3ULL;
+  if (!file.eof()) throw InputError(program.string() + ": cannot be read");
   return fmt::format("{} {:016x}", DKB_SLAM_VERSION, hash);
 }
 
