@@ -16,7 +16,7 @@ echo "== score against the exact path"
 "$dkb_slam" eval "$out/sequence/groundtruth.txt" "$out/result/trajectory.txt" \
   --json "$out/score.json" --plot "$out/trajectory.svg" | tee "$out/score.txt"
 
-first_frame=$(find "$out/sequence/rgb" -type f | sort | head -n 1)
+first_frame=$(find "$out/sequence/rgb" -type f | sort | sed -n 1p)
 echo
 echo "pictures: $out/trajectory.svg (paths and error), $first_frame (first of the frames, more beside it)"
 echo "map:      $out/result/map.ply"

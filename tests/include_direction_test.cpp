@@ -114,6 +114,13 @@ TEST(Architecture, TheLibraryNeitherSleepsNorExitsNorTunesForOneMachine) {
   }
 }
 
+// `head` ends before what feeds it: now and then that dies of SIGPIPE, and with pipefail the script with it.
+TEST(Architecture, ScriptsDoNotReadTheBeginningOfAPipeAlone) {
+  for (const std::string& file : files_below("scripts", {".sh"}))
+    for (const std::string& line : read_lines(source_dir() / file))
+      EXPECT_FALSE(std::regex_search(line, std::regex("\\|\\s*head\\b"))) << file << ": " << line << ": use sed -n 1p";
+}
+
 TEST(Architecture, EverySourceFileNamesItsLicence) {
   for (const std::string folder : {"src", "apps", "tests", "examples", "bench", "cmake", "fuzz", "python", "ros"}) {
     for (const std::string& file : files_below(folder, {".cpp", ".h", ".txt", ".cmake", ".py", ".pyi"})) {
