@@ -18,7 +18,6 @@
 #include "bench/bench_cv_orb.h"
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
-#include "dkb/dataset/image_codecs.h"
 #include "dkb/dataset/movers_file.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"

@@ -21,8 +21,7 @@ constexpr std::chrono::milliseconds kPatience{100};  // an interrupt is noticed 
 // None where the file cannot be used, for a run does not depend on it.
 std::vector<ViewerOptions::TruePosition> true_positions(const fs::path& source) try {
   std::vector<ViewerOptions::TruePosition> positions;
-  size_t hidden = 0;
-  for (const StampedPose& p : truth_beside(source, &hidden).value_or(Trajectory()))
+  for (const StampedPose& p : truth_beside(source).value_or(Trajectory()))
     positions.push_back({std::llround(p.timestamp * 1e9), p.world_from_cam.translation});
   return positions;
 } catch (const InputError&) {

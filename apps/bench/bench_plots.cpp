@@ -98,8 +98,7 @@ class Plotter {
   std::string paths_plot(size_t s) const {
     std::error_code ignored;
     if (!fs::exists(folder_.truth_path(s), ignored)) return "";
-    size_t hidden = 0;
-    const Trajectory truth = read_trajectory(folder_.truth_path(s), &hidden);
+    const Trajectory truth = read_truth(folder_.truth_path(s));
     std::vector<ComparedPath> paths;
     for (size_t k = 0; k < variants_.size(); ++k) {
       const RunRecord* run = middle_run(cell(s, variants_[k]));

@@ -98,10 +98,8 @@ Section overview(const Results& r) {
   Section section{"APE by sequence and variant", {}, {}, {"ape.svg"}};
   section.paragraphs.push_back(
       "Translation error after SE(3) alignment, RMSE in metres: median over the runs and, in brackets, the 95% "
-      "bootstrap "
-      "interval of that median (with five runs it reaches from the smallest to the largest). \"of 20%\": so many of "
-      "the "
-      "frames are scored, fewer than 95% of those of another variant; such errors do not compare.");
+      "bootstrap interval of that median (with five runs it reaches from the smallest to the largest). \"of 20%\": so "
+      "many of the frames are scored, fewer than 95% of those of another variant; such errors do not compare.");
   TextTable table;
   table.header = {"sequence"};
   for (size_t v = 0; v < r.suite->variants.size(); ++v)
@@ -129,8 +127,7 @@ Section comparison(const Results& r) {
       ", with its 95% bootstrap interval (runs of the same seed are drawn together). A sequence counts as better or "
       "worse when the interval of its own ratio leaves out 1. Runs left out failed, or the reference's did: look at "
       "their rows before believing a ratio. *: on one of its sequences, named with the scored shares of both, one of "
-      "the "
-      "two scored fewer than 95% of the frames of the other, most often the easy ones; such a ratio tells little.");
+      "the two scored fewer than 95% of the frames of the other, most often the easy ones; such a ratio tells little.");
   TextTable table;
   table.header = {"variant",      "sequences", "runs left out", "ratio of APEs",
                   "95% interval", "better on", "worse on",      "unevenly scored"};
@@ -160,10 +157,8 @@ Section details(const Results& r) {
   section.paragraphs.push_back(
       "Median over the runs that finished; worst is the largest APE, and the smallest tracked share. Online: poses as "
       "they were known when each was published. Scored: pairs that the APE is of, of those offered; frames of maps "
-      "that were "
-      "never joined to the first count as tracked alone. Map: points, and the size of map.dkb. Published numbers are "
-      "of whole "
-      "sequences: look at the pairs before comparing.");
+      "that were never joined to the first count as tracked alone. Map: points, and the size of map.dkb. Published "
+      "numbers are of whole sequences: look at the pairs before comparing.");
   TextTable table;
   table.text_columns = 2;
   table.header = {"sequence", "variant",   "runs",       "pairs",       "APE [m]",      "95% interval",
@@ -207,8 +202,7 @@ Section errors(const Results& r) {
   Section section{"Errors by sequence", {}, {}, {}};
   section.paragraphs.push_back(
       "Medians over the runs. APE after SE(3) alignment: RMSE, mean, median, standard deviation (S.D.) and largest, "
-      "and "
-      "RMSE of the rotation. RPE over one frame, RMSE. Scored: pairs that these are of, of those offered.");
+      "and RMSE of the rotation. RPE over one frame, RMSE. Scored: pairs that these are of, of those offered.");
   for (size_t s = 0; s < r.suite->sequences.size(); ++s) {
     TextTable table;
     table.header = {r.suite->sequences[s].name,

@@ -204,8 +204,7 @@ void read_stats(const fs::path& out, RunRecord* r) {
 void read_errors(const fs::path& out, const fs::path& truth_file, RunRecord* r) {
   std::error_code ignored;
   if (!fs::exists(truth_file, ignored)) return;
-  size_t hidden = 0;
-  const Trajectory truth = read_trajectory(truth_file, &hidden);
+  const Trajectory truth = read_truth(truth_file);
   const Evaluation final = evaluate(truth, read_trajectory(out / "trajectory.txt"));
   r->ape = Scores{final.ape.translation, final.ape.rotation};
   r->rpe = Scores{final.rpe.translation, final.rpe.rotation};

@@ -24,8 +24,13 @@ bool is_nan(std::string_view number) {
 
 }  // namespace
 
-Trajectory read_trajectory(const std::filesystem::path& path, size_t* hidden) {
-  return parse_trajectory(read_file(path), path.string(), hidden);
+Trajectory read_trajectory(const std::filesystem::path& path) {
+  return parse_trajectory(read_file(path), path.string());
+}
+
+Trajectory read_truth(const std::filesystem::path& path, size_t* hidden) {
+  size_t ignored = 0;
+  return parse_trajectory(read_file(path), path.string(), hidden != nullptr ? hidden : &ignored);
 }
 
 std::string hidden_text(size_t rows) {
@@ -36,7 +41,7 @@ std::optional<Trajectory> truth_beside(const std::filesystem::path& recording, s
   const std::filesystem::path file = recording / "groundtruth.txt";
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
-  return read_trajectory(file, hidden);
+  return read_truth(file, hidden);
 }
 
 Trajectory parse_trajectory(const std::string& text, const std::string& name, size_t* hidden) {

@@ -23,14 +23,15 @@ using Trajectory = std::vector<StampedPose>;  // stamps not falling
 // by stamp, equal stamps stay in the file's order; quaternions are normalised; further columns are ignored. Throws
 // InputError with file:line for malformed rows, values that are not finite and quaternions of length 0. An empty file
 // gives an empty trajectory.
+Trajectory read_trajectory(const std::filesystem::path& path);
 // With `hidden` the file is a truth: rows with `nan`, which motion capture writes where its markers are hidden, are
 // left out and counted.
-Trajectory read_trajectory(const std::filesystem::path& path, size_t* hidden = nullptr);
 Trajectory parse_trajectory(const std::string& text, const std::string& name, size_t* hidden = nullptr);
+Trajectory read_truth(const std::filesystem::path& path, size_t* hidden = nullptr);
 std::string hidden_text(size_t rows);  // how many were left out, for people
 
-// groundtruth.txt of a recording's folder; none where it has no such file. As read_trajectory() with `hidden`.
-std::optional<Trajectory> truth_beside(const std::filesystem::path& recording, size_t* hidden);
+// groundtruth.txt of a recording's folder, by read_truth(); none where it has no such file.
+std::optional<Trajectory> truth_beside(const std::filesystem::path& recording, size_t* hidden = nullptr);
 
 // TUM format with `#` header, 9 decimals, w of the quaternion not negative. Rows in the order given.
 std::string trajectory_to_text(const Trajectory& trajectory);

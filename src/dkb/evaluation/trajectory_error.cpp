@@ -21,26 +21,16 @@ double degrees_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
   return vector_from_rotation(a.conjugate() * b).norm() * 180.0 / std::numbers::pi;
 }
 
-// Of the numbers begin ... end - 1, whose values at(i) do not fall, the one nearest to `value`, the first of equally
-// near ones. begin < end.
-template <class At>
-size_t nearest(size_t begin, size_t end, double value, const At& at) {
-  const auto first_of = [&](double bound) {
-    size_t low = begin, high = end;
-    while (low < high) {
-      const size_t middle = low + (high - low) / 2;
-      if (at(middle) < bound)
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    return low;
-  };
-  const size_t above = first_of(value);
-  if (above == begin) return begin;
-  const size_t below = first_of(at(above - 1));
-  if (above == end) return below;
-  return std::abs(at(above) - value) < std::abs(at(below) - value) ? above : below;
+// Index, `begin` or later, of the one of these numbers, which do not fall, that is nearest to `value`, the first of
+// equally near ones. There is one.
+size_t nearest(const std::vector<double>& numbers, size_t begin, double value) {
+  const auto first = numbers.begin() + static_cast<std::ptrdiff_t>(begin);
+  auto at = std::lower_bound(first, numbers.end(), value);
+  if (at != first) {
+    const auto below = std::lower_bound(first, numbers.end(), *(at - 1));
+    if (at == numbers.end() || std::abs(*at - value) >= std::abs(*below - value)) at = below;
+  }
+  return static_cast<size_t>(at - numbers.begin());
 }
 
 // From every pose to the later one that is nearest to delta away.
@@ -57,7 +47,7 @@ std::vector<std::pair<size_t, size_t>> all_relative_pairs(const Evaluation& e) {
   const double tolerance = delta.unit == DeltaUnit::frames ? 0 : kTolerance * delta.value;
   std::vector<std::pair<size_t, size_t>> pairs;
   for (size_t i = 0; i + 1 < n; ++i) {
-    const size_t j = nearest(i + 1, n, along[i] + delta.value, [&](size_t k) { return along[k]; });
+    const size_t j = nearest(along, i + 1, along[i] + delta.value);
     if (std::abs(along[j] - along[i] - delta.value) <= tolerance) pairs.emplace_back(i, j);
   }
   return pairs;
@@ -208,9 +198,11 @@ ErrorStatistics error_statistics(const std::vector<double>& errors) {
 std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const Trajectory& b, double max_difference) {
   const bool walk_a = a.size() < b.size();
   const Trajectory &shorter = walk_a ? a : b, &longer = walk_a ? b : a;
+  std::vector<double> stamps;
+  for (const StampedPose& pose : longer) stamps.push_back(pose.timestamp);
   std::vector<std::pair<size_t, size_t>> matches;
   for (size_t i = 0; i < shorter.size() && !longer.empty(); ++i) {
-    const size_t j = nearest(0, longer.size(), shorter[i].timestamp, [&](size_t k) { return longer[k].timestamp; });
+    const size_t j = nearest(stamps, 0, shorter[i].timestamp);
     if (std::abs(longer[j].timestamp - shorter[i].timestamp) > max_difference) continue;
     matches.emplace_back(walk_a ? i : j, walk_a ? j : i);
   }
@@ -274,7 +266,7 @@ Trajectory read_poses(const std::filesystem::path& path, size_t* hidden) {
     throw InputError(path.string() + ": is a folder; give the trajectory in it, as " +
                      (path / (sequence ? "groundtruth.txt" : "trajectory.txt")).string());
   }
-  Trajectory trajectory = read_trajectory(path, hidden);
+  Trajectory trajectory = hidden != nullptr ? read_truth(path, hidden) : read_trajectory(path);
   if (trajectory.empty()) throw InputError(path.string() + ": holds no pose `timestamp tx ty tz qx qy qz qw`");
   return trajectory;
 }

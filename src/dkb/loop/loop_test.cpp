@@ -199,6 +199,18 @@ TEST(GlobalAdjustment, TakesWhatAMotionJoinsAndNoMapThatIsNotJoined) {
   EXPECT_EQ(moved(kNoKeyframe, neighbours - 10).back(), other + 4) << "the newest first";
 }
 
+// Keyframe `last` sees the first one's area again, and its pose is off by `drift` in its own axes.
+LoopFinding found_at_the_start(const Map& map, KeyframeId last, const Eigen::Vector3d& drift) {
+  LoopFinding finding;
+  finding.far_area = {0};
+  finding.support.emplace_back().keyframe = last;
+  PlaceFit& fit = finding.support.back().fit;
+  fit.cam_from_world = map.keyframe(last)->cam_from_world;
+  fit.cam_from_world.translation += drift;
+  fit.inliers = 400;
+  return finding;
+}
+
 // Thirty keyframes half a metre apart, each of which shares 20 points with the next. The way comes back beside keyframe
 // 2 at keyframe 20, where a loop was closed once: they share 20 points as well.
 TEST(LoopCorrection, ASeamHoldsWhenTheNextLoopIsClosed) {
@@ -230,15 +242,8 @@ TEST(LoopCorrection, ASeamHoldsWhenTheNextLoopIsClosed) {
     map.update_covisibility(id, 15);
   }
   const double drift = 0.3;
-  LoopFinding finding;
-  finding.far_area = {0};
-  finding.support.emplace_back().keyframe = 29;
-  PlaceFit& fit = finding.support.back().fit;
-  fit.cam_from_world = map.keyframe(29)->cam_from_world;
-  fit.cam_from_world.translation.z() += drift;
-  fit.inliers = 400;
   Map moved = map;
-  move_map(moved, correct_loop(map, finding));
+  move_map(moved, correct_loop(map, found_at_the_start(map, 29, {0, 0, drift})));
   const auto bent = [&](KeyframeId a, KeyframeId b) {
     const Rigid3 before = map.cam_from_world(b) * map.cam_from_world(a).inverse();
     const Rigid3 after = moved.cam_from_world(b) * moved.cam_from_world(a).inverse();
@@ -321,14 +326,7 @@ TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst)
     map.add_keyframe(std::move(k));
   }
   const Eigen::Vector3d drift(0.05, 0.2, 0);
-  LoopFinding finding;
-  finding.far_area = {0};
-  Rigid3 found = map.keyframe(9)->cam_from_world;
-  found.translation += drift;
-  finding.support.emplace_back().keyframe = 9;
-  finding.support.back().fit.cam_from_world = found;
-  finding.support.back().fit.inliers = 400;
-  const MapCorrection correction = correct_loop(map, finding);
+  const MapCorrection correction = correct_loop(map, found_at_the_start(map, 9, drift));
   ASSERT_EQ(correction.poses.size(), 10U);
   const auto moved = [&](size_t k) -> Eigen::Vector3d {
     return centre_in_world(correction.poses[k].after) - centre_in_world(correction.poses[k].before);

@@ -116,8 +116,8 @@ class Map {
   PlaneId plane(PlaneId id) const;
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;  // must exist
-  std::vector<KeyframeId> root_of_each()
-      const;                              // of all keyframes ever made: whoever asks for many walks no path twice
+  // Of all keyframes ever made: whoever asks for many walks no path twice.
+  std::vector<KeyframeId> root_of_each() const;
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
   // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.
   std::vector<KeyframeId> newest_beside(KeyframeId id, int most) const;

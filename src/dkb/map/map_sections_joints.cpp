@@ -25,8 +25,8 @@ bool is_covariance(const Matrix& m) {
          spectrum(m).values[0] >= -1e-9 * m.trace();
 }
 
-constexpr uint8_t kWholeMotion =
-    0;  // the only kind: a rotation alone would be adjusted by as if its translation were known
+// The only kind: a rotation alone would be adjusted by as if its translation were known.
+constexpr uint8_t kWholeMotion = 0;
 
 bool sound(const MotionPrior& motion) {
   return !motion.rotation_only && sound(motion.previous_from_current) && is_covariance(motion.covariance);

@@ -113,12 +113,14 @@ std::string tree_broken(const Map& map) {
     int steps = 0;
     for (KeyframeId a = id; a != kNoKeyframe; a = map.keyframe(a)->parent)
       if (++steps > map.keyframe_count()) return "parents run in a circle";
-    if (map.root_of_each()[static_cast<size_t>(id)] != map.root(id)) return "roots are told in two ways";
     if (k.culled && (k.parent == kNoKeyframe || k.features || !k.points.empty() || !k.covisible.empty()))
       return "a culled keyframe is not empty, or has no parent";
     if (!k.culled && k.parent != kNoKeyframe && map.live_keyframe(k.parent) == nullptr)
       return "a live keyframe hangs on a culled one";
   }
+  const std::vector<KeyframeId> roots = map.root_of_each();
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id)
+    if (roots[static_cast<size_t>(id)] != map.root(id)) return "roots are told in two ways";
   if (live != map.live_keyframe_count() || static_cast<size_t>(live) != map.live_keyframes().size())
     return "live keyframes are counted wrongly";
   return "";

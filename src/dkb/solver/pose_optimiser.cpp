@@ -103,7 +103,12 @@ class PoseProblem {
     Vector6d gradient;     // half the derivative of the cost
     double cost;
   };
-  Normal normal_at(const Rigid3& pose, bool robust, bool with_prior = true) {
+  Normal normal_at(const Rigid3& pose, bool robust) {
+    Normal n = of_observations(pose, robust);
+    add_prior(pose, &n);
+    return n;
+  }
+  Normal of_observations(const Rigid3& pose, bool robust) {
     set_pose(pose);
     input_.observations.inv_depth_sigma = array(kUsedInvDepthSigma);
     input_.limits = {robust, options_.chi2_pixel, options_.chi2_depth};
@@ -116,14 +121,15 @@ class PoseProblem {
     }
     for (int i = 0; i < 6; ++i) n.gradient[i] = *h++;
     n.cost = *h;
-    if (prior_ != nullptr && with_prior) {
-      // Between this camera and one at the prior's pose no motion was "measured".
-      const auto r = solver::relative_pose_residual(pose, prior_->cam_from_world, Rigid3());
-      n.information += r.jacobian_a.transpose() * prior_->information * r.jacobian_a;
-      n.gradient += r.jacobian_a.transpose() * prior_->information * r.error;
-      n.cost += r.error.dot(prior_->information * r.error);
-    }
     return n;
+  }
+  void add_prior(const Rigid3& pose, Normal* n) const {
+    if (prior_ == nullptr) return;
+    // Between this camera and one at the prior's pose no motion was "measured".
+    const auto r = solver::relative_pose_residual(pose, prior_->cam_from_world, Rigid3());
+    n->information += r.jacobian_a.transpose() * prior_->information * r.jacobian_a;
+    n->gradient += r.jacobian_a.transpose() * prior_->information * r.error;
+    n->cost += r.error.dot(prior_->information * r.error);
   }
 
  private:
@@ -244,7 +250,10 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   problem.weigh(estimate.inlier, pose, kClaim);
 
   estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
-  const Matrix6d information = problem.normal_at(pose, false).information;
+  const PoseProblem::Normal seen = problem.of_observations(pose, false);
+  PoseProblem::Normal known = seen;
+  problem.add_prior(pose, &known);
+  const Matrix6d& information = known.information;
   const auto [values, axes] = spectrum(information);
   const bool determined = information.allFinite() && values[0] > 1e-12 * values[5];
   if (estimate.inliers < options.min_inliers || !determined || !pose.translation.allFinite()) return estimate;
@@ -252,7 +261,6 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   estimate.cam_from_world = pose;
   estimate.covariance = axes * values.cwiseInverse().asDiagonal() * axes.transpose();
   if (prior == nullptr) return estimate;
-  const PoseProblem::Normal seen = problem.normal_at(pose, false, false);
   const Vector6d away = -solve_symmetric(seen.information, seen.gradient);
   if (away.allFinite() && spectrum(seen.information).values[0] > 1e-12 * values[5])
     estimate.by_observations = {solver::perturbed(pose, away), seen.information};

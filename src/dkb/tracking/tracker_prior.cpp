@@ -22,6 +22,13 @@ constexpr size_t kKeyframesNearby = 3;    // that an expected pose is sought fro
 constexpr double kMaxViewDistance = 3.0;  // [m] between cameras that may show the same ...
 constexpr double kMaxViewAngle = 1.0;     // [rad] ... and between their axes: about the field of view
 
+// Whether two poses may be the same one, by the covariance of what is between them: a right perturbation of
+// world_from_cam.
+bool may_be_one(const Rigid3& cam_from_world, const Rigid3& other, const Matrix6d& covariance) {
+  const Vector6d delta = tangent_from_rigid3(cam_from_world * other.inverse());
+  return delta.dot(solve_symmetric(covariance, delta)) <= kChi2SixDof99;
+}
+
 }  // namespace
 
 std::optional<MotionPrior> Tracker::expected_step(double timestamp, const MotionPrior* prior) const {
@@ -51,29 +58,26 @@ PosePrediction Tracker::pose_after(const MotionPrior& step) const {
 std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
   if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
     return std::nullopt;
-  const bool told = input.prior != nullptr && !input.prior->rotation_only;
+  const bool bridges = input.prior != nullptr && !input.prior->rotation_only;
   PosePrediction pose = pose_after(*input.step);
   const Vector6d variance = pose.covariance.diagonal();
   const bool known = variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
-  if (!(told || known) || !plausible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
+  if (!(bridges || known) || !plausible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
   pose.weighs = true;
   pose.told = input.prior != nullptr;
   return pose;
 }
 
 bool PosePrediction::allows(const PosePrior& by_observations) const {
-  const Vector6d delta = tangent_from_rigid3(cam_from_world * by_observations.cam_from_world.inverse());
-  return delta.dot(solve_symmetric(covariance + inverse(by_observations.information), delta)) <= kChi2SixDof99;
+  return may_be_one(cam_from_world, by_observations.cam_from_world, covariance + inverse(by_observations.information));
 }
 
 bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
-  // As a right perturbation of world_from_cam.
-  const Vector6d delta = tangent_from_rigid3(cam_from_world * found_cam_from_world.inverse());
   Matrix6d sum = covariance;
   sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
   sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
-  return delta.dot(solve_symmetric(sum, delta)) <= kChi2SixDof99;
+  return may_be_one(cam_from_world, found_cam_from_world, sum);
 }
 
 // The frame has no pose by its images: the predicted one stands in where there is one, and the next frame goes on from
