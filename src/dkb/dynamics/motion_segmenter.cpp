@@ -91,12 +91,16 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
   for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlockCells);
 }
 
-void MotionSegmenter::reset() {
+void MotionSegmenter::forget_views() {
   views_.clear();
   previous_.reset();
-  current_.reset();
   last_.reset();
   guessing_ = false;
+}
+
+void MotionSegmenter::reset() {
+  forget_views();
+  current_.reset();
 }
 
 void MotionSegmenter::move_views(const Rigid3& new_from_old, double after) {

@@ -56,6 +56,8 @@ class MotionSegmenter {
   void move_world(const Rigid3& new_from_old) { move_views(new_from_old, -std::numeric_limits<double>::infinity()); }
   // What the poses committed as guesses were off by, those since the last one that images told.
   void correct_guesses(const Rigid3& found_from_guessed) { move_views(found_from_guessed, told_); }
+  // Of all images but the one last given.
+  void forget_views();
   void reset();
   // Per cell of the frame last segmented: from -1, surely still, to 3, surely moving; 0 = nothing known;
   // empty before the first frame and after reset().

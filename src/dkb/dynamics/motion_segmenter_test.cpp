@@ -379,6 +379,21 @@ TEST(MotionSegmenter, CorrectsTheGuessesAlone) {
   }
 }
 
+// What was seen before is not known to lie to what is seen now; the image last given still tells the next step.
+TEST(MotionSegmenter, ForgetsTheViewsButNotTheImageLastGiven) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {});
+  for (int f = 0; f < 16; ++f) {
+    segment(segmenter, world.render(f, {}).image, world.cam_from_world(f));
+    EXPECT_EQ(segmenter.aligned_step().has_value(), f > 0) << f;
+    if (f == 10) segmenter.forget_views();
+    segmenter.commit(world.cam_from_world(f));
+  }
+  segmenter.reset();
+  segment(segmenter, world.render(16, {}).image, world.cam_from_world(16));
+  EXPECT_FALSE(segmenter.aligned_step());
+}
+
 TEST(MotionSegmenter, GivesTheSameMasksAgain) {
   std::vector<Image<uint8_t>> first, second;
   for (auto* masks : {&first, &second})

@@ -50,7 +50,21 @@ TEST(VelocityFilter, WeighsWhatIsMeasuredByItsNoise) {
   EXPECT_NEAR(filter.velocity()[0], 0.2 * (1 - 0.04 / 0.29), 1e-6);
   EXPECT_NEAR(filter.velocity()[5], 0.2 * (1 - 0.36 / 0.61), 1e-6);
   EXPECT_NEAR(filter.covariance(0, 0)(0, 0), 0.04 * 0.25 / 0.29, 1e-6);
-  EXPECT_NEAR(filter.covariance(0.1, 0.2)(0, 0) - filter.covariance(0, 0)(0, 0), 0.12, 1e-9);
+  // From 0.1 s on to 0.2 s: the change of speed has reached its bound of twice the speed's variance, that of turns has
+  // none.
+  const Matrix6d later = filter.covariance(0.1, 0.2) - filter.covariance(0, 0);
+  EXPECT_NEAR(later(0, 0), 0.08 - 0.04, 1e-9);
+  EXPECT_NEAR(later(5, 5), 36 * (0.04 - 0.01), 1e-9);
+}
+
+TEST(MotionModel, AHandKeepsItsSpeedsInBounds) {
+  EXPECT_NEAR(velocity_change_sd(0.05), 0.1, 1e-12);
+  EXPECT_NEAR(velocity_change_sd(10), std::sqrt(0.08), 1e-12);
+  EXPECT_NEAR(position_change_sd(0.1), 0.01, 1e-12);
+  // The integral of the velocity's: by steps of 1 ms.
+  double sum = 0;
+  for (double t = 0.5e-3; t < 1; t += 1e-3) sum += 1e-3 * velocity_change_sd(t);
+  EXPECT_NEAR(position_change_sd(1), sum, 1e-6);
 }
 
 TEST(VelocityFilter, FollowsNoisyStepsWithinItsCovariance) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <numbers>
+
 #include "dkb/geometry/decompositions.h"
 #include "dkb/geometry/rigid3.h"
 
@@ -14,6 +17,18 @@ inline constexpr double kAngularAccelerationSd = 6.0;  // [rad/s^2]
 inline constexpr double kSpeedSd = 0.2;                // [m/s]
 inline constexpr double kAngularSpeedSd = 0.3;         // [rad/s]
 inline constexpr double kEvenMotion = 0.2;             // [s] over which its motion is taken to be even
+
+// [m/s] What its velocity may have changed by after some time, in each axis: an acceleration lasts no longer than until
+// the velocity is any other that a hand may have, which two independent ones tell. Turns are not bounded: robots turn
+// faster than hands.
+inline double velocity_change_sd(double seconds) {
+  return std::min(kAccelerationSd * seconds, std::numbers::sqrt2 * kSpeedSd);
+}
+// [m] What that takes the camera off by.
+inline double position_change_sd(double seconds) {
+  const double bound = std::numbers::sqrt2 * kSpeedSd, even = bound / kAccelerationSd;
+  return seconds < even ? 0.5 * kAccelerationSd * seconds * seconds : bound * (seconds - 0.5 * even);
+}
 
 // [translation, rotation] of the same variance in each axis.
 inline Matrix6d axis_covariance(double position_sd, double rotation_sd) {
@@ -30,7 +45,8 @@ class VelocityFilter {
   const Vector6d& velocity() const { return velocity_; }
   // The same `after` seconds without a pose, of which it was told `since` already.
   Matrix6d covariance(double since, double after) const {
-    return covariance_ + (after * after - since * since) * axis_covariance(kAccelerationSd, kAngularAccelerationSd);
+    const auto change = [](double t) { return axis_covariance(velocity_change_sd(t), kAngularAccelerationSd * t); };
+    return covariance_ + change(after) - change(since);
   }
   // A velocity was measured over `seconds`.
   void update(const Vector6d& measured, const Matrix6d& measured_covariance, double seconds) {

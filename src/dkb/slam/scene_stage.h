@@ -93,7 +93,7 @@ class SceneStage {
   }
   // How the camera came to where it is now is not known: what earlier views saw cannot be put beside it.
   void forget_views() {
-    if (motion_) motion_->reset();
+    if (motion_) motion_->forget_views();
   }
 
   // Depth is held against earlier depth in each frame, whatever detects movers.

@@ -40,8 +40,8 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
   step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
-  // Nothing corrects the translation: an acceleration since the camera was seen is off by half its time squared.
-  const auto off = [](double t) { return 0.25 * kAccelerationSd * kAccelerationSd * t * t * t * t; };
+  // Nothing corrects the translation.
+  const auto off = [](double t) { return position_change_sd(t) * position_change_sd(t); };
   double variance = off(timestamp - last_seen_) - off(last_->timestamp - last_seen_);
   if (!velocity_) variance += seconds * seconds * kSpeedSd * kSpeedSd;
   step.covariance = Vector6d::Constant(variance).asDiagonal();
