@@ -243,7 +243,11 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
   if (!both) return std::nullopt;
 
   const uint8_t of_camera = of_most_surface(*both, matches);
-  if (both->count(of_camera) < min_still) return std::nullopt;
+  // How far points are whose depth is not measured the map may be wrong about: they go along with many a motion.
+  int measured = 0;
+  for (size_t i = 0; i < matches.size(); ++i)
+    measured += both->label[i] == of_camera && observations[matches[i].observation].depth > 0;
+  if (measured < min_still) return std::nullopt;
   const Labels one(matches.size(), 0);
   const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, Vector6d::Zero(), 4));
   if (both->cost + kMoves * both->count(1 - of_camera) >= cost_of_one) return std::nullopt;
