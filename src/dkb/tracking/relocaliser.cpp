@@ -63,11 +63,12 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
   std::vector<PoseProposal> proposals;
   for (const PlaceMatch& like : map.similar_keyframes(still, kCandidates)) {
     // A keyframe that sees what an earlier one led to would lead there again.
-    const auto& points = map.keyframe(like.id)->points;
+    std::vector<PointId> points = map.keyframe(like.id)->points;
+    std::sort(points.begin(), points.end());
     const bool explained = std::any_of(proposals.begin(), proposals.end(), [&](const PoseProposal& p) {
       if (!p.verified) return false;
       const auto shared = std::count_if(p.fit.points.begin(), p.fit.points.end(), [&](PointId id) {
-        return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
+        return id != kNoPoint && std::binary_search(points.begin(), points.end(), id);
       });
       return shared >= kMinPlaceMatches;
     });
