@@ -56,10 +56,15 @@ class PoseProblem {
     input_.count = static_cast<int>(padded_);
   }
 
-  // Observations within the limit at a pose.
-  std::vector<uint8_t> inliers(const Rigid3& pose) {
+  // How each observation fits at a pose.
+  void judge(const Rigid3& pose) {
+    set_pose(pose);
+    input_.observations.inv_depth_sigma = array(kInvDepthSigma);
+    kernels_.pose_chi2(input_, array(kChi2));
+  }
+  // Observations within the limit, as judged.
+  std::vector<uint8_t> inliers() const {
     std::vector<uint8_t> inlier(count_);
-    compute_chi2(pose);
     for (size_t i = 0; i < count_; ++i) inlier[i] = array(kChi2)[i] <= limit(i);
     return inlier;
   }
@@ -71,29 +76,28 @@ class PoseProblem {
       array(kUsedInvDepthSigma)[i] = inlier[i] ? array(kInvDepthSigma)[i] : 0.0;
     }
   }
-  // The same, each weighed by how it fits at a pose by its own sigmas, all `times` as much.
-  void weigh(const std::vector<uint8_t>& inlier, const Rigid3& pose, double times = 1) {
+  // The same, each weighed by how it fits, as judged, by its own sigmas, all `times` as much.
+  void weigh(const std::vector<uint8_t>& inlier, double times = 1) {
     use(inlier);
-    compute_chi2(pose);
-    double* const chi2 = array(kChi2);
+    const double* const chi2 = array(kChi2);
+    double* const own = array(kOwnChi2);
     double* const fits = array(kFits);
     double* end = fits;
     for (size_t i = 0; i < count_; ++i) {
-      chi2[i] /= array(kGiven)[i];
-      if (inlier[i]) *end++ = chi2[i];
+      own[i] = chi2[i] / array(kGiven)[i];
+      if (inlier[i]) *end++ = own[i];
     }
     if (end == fits) return;
     const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
-      const double weight = student_weight(chi2[i] / variance, times);
+      const double weight = student_weight(own[i] / variance, times);
       array(kWeight)[i] = weight;
       array(kUsedInvDepthSigma)[i] = array(kInvDepthSigma)[i] * std::sqrt(weight);
     }
   }
-  std::vector<uint8_t> in_front(const Rigid3& pose) {
+  std::vector<uint8_t> in_front() const {
     std::vector<uint8_t> in_front(count_);
-    compute_chi2(pose);
     for (size_t i = 0; i < count_; ++i) in_front[i] = std::isfinite(array(kChi2)[i]);
     return in_front;
   }
@@ -145,6 +149,7 @@ class PoseProblem {
     kUsedInvDepthSigma,
     kWeight,
     kChi2,
+    kOwnChi2,
     kFits,
     kGiven,
     kArrays
@@ -153,11 +158,6 @@ class PoseProblem {
   double* array(Array a) { return values_.data() + padded_ * a; }
   const double* array(Array a) const { return values_.data() + padded_ * a; }
   double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? options_.chi2_depth : options_.chi2_pixel; }
-  void compute_chi2(const Rigid3& pose) {
-    set_pose(pose);
-    input_.observations.inv_depth_sigma = array(kInvDepthSigma);
-    kernels_.pose_chi2(input_, array(kChi2));
-  }
   void set_pose(const Rigid3& pose) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(input_.camera.rotation) = pose.matrix3();
     Eigen::Map<Eigen::Vector3d>(input_.camera.translation) = pose.translation;
@@ -231,23 +231,29 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   PoseProblem problem(camera, observations, options, prior);
 
   Rigid3 pose = cam_from_world_initial;
-  std::vector<uint8_t> used = problem.in_front(pose);
+  problem.judge(pose);
+  std::vector<uint8_t> used = problem.in_front();
   for (int round = 0; round < kPoseRounds; ++round) {
     problem.use(used);
     estimate.iterations += descend(problem, round < kRobustRounds, pose);
-    estimate.inlier = problem.inliers(pose);
+    problem.judge(pose);
+    estimate.inlier = problem.inliers();
     // Within the limit, which is the kernel's corner, the kernel is least squares: the same observations would give
     // the same pose again, with the kernel or without.
     if (estimate.inlier == used) break;
     used = estimate.inlier;
   }
   for (int round = 0; round < options.tail_rounds; ++round) {
-    problem.weigh(estimate.inlier, pose);
+    problem.weigh(estimate.inlier);
     pose = one_step(problem, pose);
+    problem.judge(pose);
     ++estimate.iterations;
   }
-  estimate.inlier = problem.inliers(pose);
-  problem.weigh(estimate.inlier, pose, kClaim);
+  estimate.inlier = problem.inliers();
+  if (options.tail_rounds > 0)
+    problem.weigh(estimate.inlier, kClaim);
+  else
+    problem.use(estimate.inlier);
 
   estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
   const PoseProblem::Normal seen = problem.of_observations(pose, false);
