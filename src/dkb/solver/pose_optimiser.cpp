@@ -7,6 +7,7 @@
 #include "dkb/geometry/decompositions.h"
 #include "dkb/solver/kernels.h"
 #include "dkb/solver/relative_pose.h"
+#include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -29,9 +30,8 @@ constexpr double kSmallTranslation = 1e-4, kSmallRotation = 1e-4;
 // The observations as arrays, in groups of four, and the sums over them at a pose.
 class PoseProblem {
  public:
-  PoseProblem(const CameraModel& camera, std::span<const PoseObservation> observations, const PoseOptions& options,
-              const PosePrior* prior)
-      : count_(observations.size()), padded_((count_ + 3) / 4 * 4), prior_(prior), options_(options) {
+  PoseProblem(const CameraModel& camera, std::span<const PoseObservation> observations, const PosePrior* prior)
+      : count_(observations.size()), padded_((count_ + 3) / 4 * 4), prior_(prior) {
     values_.assign(padded_ * kArrays, 0.0);
     for (size_t i = 0; i < count_; ++i) {
       const PoseObservation& o = observations[i];
@@ -115,7 +115,7 @@ class PoseProblem {
   Normal of_observations(const Rigid3& pose, bool robust) {
     set_pose(pose);
     input_.observations.inv_depth_sigma = array(kUsedInvDepthSigma);
-    input_.limits = {robust, options_.chi2_pixel, options_.chi2_depth};
+    input_.limits = {robust, kChi2TwoDof95, kChi2ThreeDof95};
     double sums[solver::kPoseSums];
     kernels_.pose_sums(input_, sums);
     Normal n;
@@ -157,7 +157,8 @@ class PoseProblem {
 
   double* array(Array a) { return values_.data() + padded_ * a; }
   const double* array(Array a) const { return values_.data() + padded_ * a; }
-  double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? options_.chi2_depth : options_.chi2_pixel; }
+  // Of the square of an error: inliers are within it, where the Huber kernel has its corner.
+  double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? kChi2ThreeDof95 : kChi2TwoDof95; }
   void set_pose(const Rigid3& pose) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(input_.camera.rotation) = pose.matrix3();
     Eigen::Map<Eigen::Vector3d>(input_.camera.translation) = pose.translation;
@@ -165,19 +166,16 @@ class PoseProblem {
 
   const size_t count_, padded_;
   const PosePrior* prior_;
-  const PoseOptions& options_;
   const solver::SolverKernels& kernels_ = solver::solver_kernels();
   std::vector<double> values_;
   solver::PoseInput input_{};
 };
 
-// Levenberg-Marquardt from `pose` with the observations in use. Returns the number of steps tried.
-int descend(PoseProblem& problem, bool robust, Rigid3& pose) {
+// Levenberg-Marquardt from `pose` with the observations in use.
+void descend(PoseProblem& problem, bool robust, Rigid3& pose) {
   double damping = 1e-6;
   PoseProblem::Normal normal = problem.normal_at(pose, robust);
-  int tried = 0;
-  while (tried < kRoundSteps) {
-    ++tried;
+  for (int tried = 0; tried < kRoundSteps; ++tried) {
     Matrix6d damped = normal.information;
     // The floor keeps directions without information where they are.
     damped.diagonal() += damping * normal.information.diagonal() + Vector6d::Constant(1e-9);
@@ -195,7 +193,6 @@ int descend(PoseProblem& problem, bool robust, Rigid3& pose) {
     }
     if (small) break;
   }
-  return tried;
 }
 
 // A Gauss-Newton step with the observations in use, for a pose that lies near its minimum.
@@ -217,8 +214,6 @@ double variance_by_median(std::span<double> squares) {
 
 void PoseOptions::check() const {
   require_option(tail_rounds >= 0, "tail_rounds", tail_rounds, ">= 0");
-  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
-  require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
   require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
 }
 
@@ -228,14 +223,14 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   options.check();
   PoseEstimate estimate;
   estimate.cam_from_world = cam_from_world_initial;
-  PoseProblem problem(camera, observations, options, prior);
+  PoseProblem problem(camera, observations, prior);
 
   Rigid3 pose = cam_from_world_initial;
   problem.judge(pose);
   std::vector<uint8_t> used = problem.in_front();
   for (int round = 0; round < kPoseRounds; ++round) {
     problem.use(used);
-    estimate.iterations += descend(problem, round < kRobustRounds, pose);
+    descend(problem, round < kRobustRounds, pose);
     problem.judge(pose);
     estimate.inlier = problem.inliers();
     // Within the limit, which is the kernel's corner, the kernel is least squares: the same observations would give
@@ -247,7 +242,6 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
     problem.weigh(estimate.inlier);
     pose = one_step(problem, pose);
     problem.judge(pose);
-    ++estimate.iterations;
   }
   estimate.inlier = problem.inliers();
   if (options.tail_rounds > 0)

@@ -75,7 +75,7 @@ struct TrackedFrame : PosedFrame {
   // Per feature: the map point it matched, also where the pose rejects it, and where that is [m]; in tracking.
   std::vector<PointId> matched;
   std::vector<Eigen::Vector3d> matched_in_world;
-  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<uint8_t> outlier;                        // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
   std::vector<uint8_t> makes_point;          // per feature: 1 = it made a map point, when the frame became a keyframe
   std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that weighed in it

@@ -148,9 +148,8 @@ void Relocaliser::look_around(const Map& map, PointAppearance* appearance, PoseP
     const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
     const int octave = std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(optics_.scale_factor))), 0,
                                   optics_.levels - 1);
-    // What is gone may have been taken away: that happens in every place.
     const Look look = appearance->look(optics_.camera.project(in_cam), in_cam.z(), octave, c.descriptor);
-    if (look == Look::same || look == Look::other) proposal.looks.push_back({c.id, look == Look::same});
+    if (look != Look::unknown) proposal.looks.push_back({c.id, look == Look::same});
   }
 }
 
