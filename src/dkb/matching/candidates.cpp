@@ -80,7 +80,7 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
     if (scale < nearest_scale || scale > farthest_scale) continue;
     if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < kMinViewCosine * distance) continue;
     // After what is cheaper: a lens takes more than all the rest.
-    if (distorted && !pixel_in_view(camera, p.cast<double>())) continue;
+    if (distorted && !optics.well_in_view(u, v) && !pixel_in_view(camera, p.cast<double>())) continue;
     if (visible != nullptr) (*visible)[i] = 1;
     // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;
