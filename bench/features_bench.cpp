@@ -146,9 +146,8 @@ int main(int argc, char** argv) try {
   const OrbOptions options;
   OrbExtractor extractor(options);
   const auto orb = cv::ORB::create(options.count);
-  const OpticalFlowOptions flow_options;
-  const OpticalFlow flow(flow_options);
-  ImagePyramid previous_pyramid(flow_options.pyramid()), next_pyramid(flow_options.pyramid());
+  const OpticalFlow flow;
+  ImagePyramid previous_pyramid(flow_pyramid()), next_pyramid(flow_pyramid());
   Samples samples;
   double coverage = 0, orb_coverage = 0, images = 0;
   for (size_t i = 0; i + 1 < paths.size(); i += step) {
@@ -184,8 +183,8 @@ int main(int argc, char** argv) try {
       std::vector<uint8_t> status;
       std::vector<float> errors;
       samples.time("cv flow", [&] {
-        cv::calcOpticalFlowPyrLK(wrap(image), wrap(next), from, to, status, errors,
-                                 {flow_options.window, flow_options.window}, flow_options.levels - 1);
+        cv::calcOpticalFlowPyrLK(wrap(image), wrap(next), from, to, status, errors, {kFlowWindow, kFlowWindow},
+                                 flow_pyramid().levels - 1);
       });
     }
   }

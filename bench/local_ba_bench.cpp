@@ -68,8 +68,7 @@ void bench_pose(int points, int repetitions) {
   const double ms = median_ms(start, 20 * repetitions, [&](const Rigid3& pose) {
     estimate = optimise_pose(world.problem.camera, pose, observations);
   });
-  fmt::print("pose, {} observations, {} inliers, {} iterations: {:.3f} ms\n", observations.size(), estimate.inliers,
-             estimate.iterations, ms);
+  fmt::print("pose, {} observations, {} inliers: {:.3f} ms\n", observations.size(), estimate.inliers, ms);
   RansacPose ransac;
   const double ransac_ms = median_ms(
       start, repetitions, [&](const Rigid3&) { ransac = estimate_absolute_pose(world.problem.camera, observations); });

@@ -35,7 +35,7 @@ class CarriedObjectsTest : public ::testing::Test {
     PastFrame made;
     made.frame = index;
     made.keyframe = keyframe;
-    auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
+    auto pyramid = std::make_shared<ImagePyramid>(flow_pyramid());
     pyramid->build(image->grey);
     std::vector<PixelCorner> corners;
     FastCornerFinder().find(image->grey, 30, 20, corners);
@@ -133,7 +133,7 @@ TEST_F(CarriedObjectsTest, WhoWalksBeforeSomebodyWhoStandsDoesNotTakeTheOthersBo
     const GreyImage moved = world.render({1, 0, -static_cast<double>(kStep * f), 0}), mask = mask_of(f);
     for (size_t i = 0; i < mask.size(); ++i)
       if (mask.data()[i] != 0) image->grey.data()[i] = moved.data()[i];
-    auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
+    auto pyramid = std::make_shared<ImagePyramid>(flow_pyramid());
     pyramid->build(image->grey);
     std::vector<PixelCorner> corners;
     FastCornerFinder().find(image->grey, 30, 20, corners);

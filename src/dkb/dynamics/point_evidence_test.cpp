@@ -19,6 +19,15 @@ TEST(PointEvidence, AThirdOfASecondOnAMoverConvicts) {
   EXPECT_TRUE(evidence.weigh(++frames * kFrame, {}, {7}).empty()) << "it starts anew";
 }
 
+TEST(PointEvidence, ALookAfterFramesWithoutMoversLastsOneFrame) {
+  PointEvidence evidence;
+  int frame = 0;
+  while (frame < 30) evidence.weigh(++frame * kFrame, {}, {});
+  int looks = 0;
+  while (evidence.weigh(++frame * kFrame, {}, {3}).empty() && looks < 100) ++looks;
+  EXPECT_EQ(looks, 9) << "the tenth convicts";
+}
+
 TEST(PointEvidence, WhatIsFoundStillIsClearedTwiceAsFast) {
   PointEvidence evidence;
   evidence.weigh(0, {}, {});

@@ -12,7 +12,8 @@ Look ImageAppearance::look(const Eigen::Vector2d& pixel, double depth, int octav
   if (!image_.depth.contains(x, y) || !(image_.depth(x, y) > 0)) return Look::unknown;
   const double seen = image_.depth(x, y);
   if (seen < depth - noise_.surface_tolerance(depth)) return Look::unknown;  // hidden, if only by a hand's breadth
-  if (seen > depth + noise_.point_tolerance(depth)) return Look::gone;
+  // Gone: what lies behind it is seen. It may have been taken away, which happens in every place.
+  if (seen > depth + noise_.point_tolerance(depth)) return Look::unknown;
   if (!describer_) describer_.emplace(pyramid_).set_image(image_.grey);
   const auto bits = describer_->distance(at.x(), at.y(), octave, descriptor);
   if (!bits || (*bits > kSameBits && *bits < kOtherBits)) return Look::unknown;

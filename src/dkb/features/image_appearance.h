@@ -11,10 +11,9 @@ namespace dkb {
 
 // How a map point looks in an image where it ought to be.
 enum class Look : uint8_t {
-  unknown,  // hidden, without depth, or neither alike nor unlike
+  unknown,  // hidden or gone, without depth, or neither alike nor unlike
   same,
   other,  // a surface is there, and looks different
-  gone,   // the image shows what lies behind it
 };
 
 // How a place of an image looks compared with a map point that ought to be there.

@@ -14,24 +14,18 @@ constexpr int kMaxIterations = 10;                       // per level
 constexpr double kEpsilon = 0.02, kCoarseEpsilon = 0.1;  // [px of the level] a smaller step ends the search
 constexpr double kMinEigenvalue = 1;  // [(grey levels / px)^2] mean over the window; flatter windows are not followed
 constexpr double kMaxResidual = 30;   // [grey levels] a larger mean absolute difference means lost
+static_assert(kFlowWindow <= kLkMaxSize);
 }  // namespace
-
-void OpticalFlowOptions::check() const {
-  require_option(window >= 5 && window <= kLkMaxSize && window % 2 == 1, "window", window, "odd and in 5 ... 29");
-}
-
-OpticalFlow::OpticalFlow(OpticalFlowOptions options, Simd simd) : options_(options), simd_(simd) {
-  options_.check();
-}
 
 FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyramid& current,
                                   const Eigen::Vector2f& point) const {
-  const int size = options_.window;
-  const double samples_count = size * size;
+  constexpr int size = kFlowWindow;
+  constexpr double samples_count = size * size;
   alignas(32) LkSamples samples;
   LkTemplate reference;
   FlowResult result;
   double full_x = point.x(), full_y = point.y();
+  double residual = 0;  // [grey levels] mean absolute difference of the windows at full resolution
   if (!point.allFinite()) return result;
   for (int level = std::min(previous.levels(), current.levels()) - 1; level >= 0; --level) {
     const GreyImage& target = current.level(level);
@@ -57,8 +51,7 @@ FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyram
       if (!inside) break;
       lk_sample(target, x, y, size, samples, simd_);
       const LkSums sums = lk_sums(reference, samples, simd_);
-      if (level == 0)
-        result.residual = static_cast<float>(static_cast<double>(sums.absolute) / (kLkOne * samples_count));
+      residual = static_cast<double>(sums.absolute) / (kLkOne * samples_count);
       const double bx = static_cast<double>(sums.dx), by = static_cast<double>(sums.dy);
       // Differences in 1/16, slopes in 1/32 grey levels: hence the factor 2.
       const double step_x = 2.0 * (xy * by - yy * bx) / determinant;
@@ -71,7 +64,7 @@ FlowResult OpticalFlow::track_one(const ImagePyramid& previous, const ImagePyram
     if (!inside && level > 0) continue;  // the finer level begins where this one did
     full_x = current.full_x(level, x);
     full_y = current.full_y(level, y);
-    if (level == 0) result.found = inside && result.residual <= kMaxResidual;
+    if (level == 0) result.found = inside && static_cast<float>(residual) <= kMaxResidual;
   }
   result.position = {static_cast<float>(full_x), static_cast<float>(full_y)};
   return result;

@@ -10,18 +10,16 @@
 
 namespace dkb {
 
-struct OpticalFlowOptions {
-  int window = 11;     // [px] side of the window, odd, 5 ... 29                    (k of DKB section 3.1)
-  void check() const;  // throws InvalidOption
+constexpr int kFlowWindow = 11;  // [px] side of the window (k of DKB section 3.1)
 
-  // What build() of both frames' pyramids is best given.
-  ImagePyramidOptions pyramid() const { return {.levels = 4, .scale = 2.0, .min_size = 2 * window}; }
-};
+// What build() of both frames' pyramids is best given.
+inline ImagePyramidOptions flow_pyramid() {
+  return {.levels = 4, .scale = 2.0, .min_size = 2 * kFlowWindow};
+}
 
 struct FlowResult {
   Eigen::Vector2f position{0, 0};  // [px] in the current image; the last estimate when not found
   bool found = false;
-  float residual = 0;  // [grey levels] mean absolute difference of the windows at full resolution
 };
 
 // Sparse optical flow by pyramidal Lucas-Kanade (Lucas and Kanade, IJCAI 1981; Bouguet 2000): from the coarsest level
@@ -30,7 +28,7 @@ struct FlowResult {
 // over, the finest excepted. Deterministic and independent of the processor; results do not depend on one another.
 class OpticalFlow {
  public:
-  explicit OpticalFlow(OpticalFlowOptions options = {}, Simd simd = best_simd());
+  explicit OpticalFlow(Simd simd = best_simd()) : simd_(simd) {}
 
   // Positions [px, full resolution] of the previous image's `points` in the current image. Both pyramids must be of
   // equal size (InputError).
@@ -40,7 +38,6 @@ class OpticalFlow {
  private:
   FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point) const;
 
-  OpticalFlowOptions options_;
   Simd simd_;
 };
 

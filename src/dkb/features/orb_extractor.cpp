@@ -106,7 +106,7 @@ void OrbExtractor::describe_corners(int level, Worker& worker) {
   for (const PixelCorner& pixel : corners) {
     Corner& corner = features_.corners[at];
     corner.angle = orientation_angle(centroid_moments(pixels.row(pixel.y) + pixel.x, pixels.width(), simd_));
-    const SubpixelOffset offset = options_.subpixel ? refine_corner(pixels, pixel.x, pixel.y, simd_) : SubpixelOffset{};
+    const SubpixelOffset offset = refine_corner(pixels, pixel.x, pixel.y, simd_);
     corner.x = static_cast<float>(pyramid_.full_x(level, pixel.x + offset.x));
     corner.y = static_cast<float>(pyramid_.full_y(level, pixel.y + offset.y));
     corner.place_sigma = offset.sigma * static_cast<float>(pyramid_.scale_x(level));

@@ -27,7 +27,6 @@ struct OrbOptions {
   int levels = 8;              // pyramid levels, 1 ... 16
   int fast_threshold = 20;     // [grey levels] corner contrast, fast_threshold_min ... 254
   int fast_threshold_min = 7;  // [grey levels] used in cells where the first finds nothing, >= 1
-  bool subpixel = true;        // refine positions below the pixel
 };
 
 // Oriented FAST corners with rotated BRIEF descriptors on an image pyramid (Rublee et al., ICCV 2011), spread evenly

@@ -13,7 +13,6 @@ struct SensorNoise {
   static constexpr int kMaxLevels = 32;  // of an image pyramid
 
   double pixel_sigma = 1.0;          // [px] of a corner on the finest pyramid level, > 0
-  double scale_exponent = 0.5;       // how it grows with the scale of the level: sigma ~ scale^exponent, 0 ... 1
   double depth_sigma_base = 0.0012;  // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
   double depth_sigma_quadratic = 0.0019;  // [1/m] growth with (z - 0.4 m)^2, >= 0   (the same source)
   double depth_sigma_factor =
@@ -21,14 +20,13 @@ struct SensorNoise {
 
   void check() const {
     require_option(pixel_sigma > 0, "pixel_sigma", pixel_sigma, "greater than 0 px");
-    require_option(scale_exponent >= 0 && scale_exponent <= 1, "scale_exponent", scale_exponent, "0 ... 1");
     require_option(depth_sigma_base > 0, "depth_sigma_base", depth_sigma_base, "greater than 0 m");
     require_option(depth_sigma_quadratic >= 0, "depth_sigma_quadratic", depth_sigma_quadratic, "at least 0");
     require_option(depth_sigma_factor >= 1, "depth_sigma_factor", depth_sigma_factor, "at least 1");
   }
-  // Standard deviation [px, full resolution] of a corner found on a pyramid level.
+  // Standard deviation [px, full resolution] of a corner found on a pyramid level: as the root of the level's scale.
   double corner_sigma(int octave, double scale_factor) const {
-    return pixel_sigma * std::pow(scale_factor, scale_exponent * octave);
+    return pixel_sigma * std::pow(scale_factor, 0.5 * octave);
   }
   // Standard deviation [m] of a depth z [m] on a flat wall (the source), and at a corner.
   double flat_depth_sigma(double z) const { return depth_sigma_base + depth_sigma_quadratic * (z - 0.4) * (z - 0.4); }

@@ -47,7 +47,8 @@ Candidate candidate_of(const RgbdFeatures& features, size_t feature, const Eigen
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
                                                  const MatchableFeatures& matchable, const Optics& optics,
                                                  const Rigid3& cam_from_world, const ProjectionMatchOptions& options,
-                                                 const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible) {
+                                                 const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible,
+                                                 const std::vector<uint8_t>* skipped) {
   const RgbdFeatures& features = matchable.features;
   const CameraModel& camera = optics.camera;
   const double scale_factor = optics.scale_factor;
@@ -65,18 +66,21 @@ std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& c
 
   std::vector<ProjectionMatch> best_of_feature(features.size());
   for (size_t i = 0; i < candidates.size(); ++i) {
+    if (skipped != nullptr && (*skipped)[i]) continue;
     const Candidate& c = candidates[i];
     const Eigen::Vector3f world = c.position.cast<float>();
     const Eigen::Vector3f p = rotation * world + translation;
     if (p.z() < 0.05f) continue;
     const float inv_z = 1.0f / p.z();
     const float u = fx * p.x() * inv_z + cx, v = fy * p.y() * inv_z + cy;
-    if (distorted ? !pixel_in_view(camera, p.cast<double>()) : !(u >= 0 && v >= 0 && u < width && v < height)) continue;
+    if (!distorted && !(u >= 0 && v >= 0 && u < width && v < height)) continue;
     const Eigen::Vector3f ray = centre - world;
     const float distance = ray.norm();
     const float scale = c.reference_scale * c.reference_distance / distance;
     if (scale < nearest_scale || scale > farthest_scale) continue;
     if (c.normal.squaredNorm() > 0 && ray.dot(c.normal) < kMinViewCosine * distance) continue;
+    // After what is cheaper: a lens takes more than all the rest.
+    if (distorted && !optics.well_in_view(u, v) && !pixel_in_view(camera, p.cast<double>())) continue;
     if (visible != nullptr) (*visible)[i] = 1;
     // Counted rather than looked for: which it is, no processor foresees.
     int level = 0;

@@ -44,11 +44,13 @@ struct ProjectionMatch {
 };
 
 // Matches candidates to features near their projections. One match per feature and candidate: the smaller distance
-// wins, ties go to the earlier candidate. Features in `taken` (non-zero) are left alone. `visible` (when given) is set
-// to 1 for each candidate whose projection lies in view. Deterministic; result by increasing feature.
+// wins, ties go to the earlier candidate. Features in `taken` and candidates in `skipped` (non-zero) are left alone.
+// `visible` (when given) is set to 1 for each candidate whose projection lies in view. Deterministic; result by
+// increasing feature.
 std::vector<ProjectionMatch> match_by_projection(const std::vector<Candidate>& candidates,
                                                  const MatchableFeatures& matchable, const Optics& optics,
                                                  const Rigid3& cam_from_world, const ProjectionMatchOptions& options,
-                                                 const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible);
+                                                 const std::vector<uint8_t>* taken, std::vector<uint8_t>* visible,
+                                                 const std::vector<uint8_t>* skipped = nullptr);
 
 }  // namespace dkb

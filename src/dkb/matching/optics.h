@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "dkb/features/rgbd_features.h"
 #include "dkb/geometry/camera.h"
@@ -13,14 +14,7 @@ namespace dkb {
 // What an image's features are measured with.
 struct Optics {
   Optics(const CameraModel& camera_model = {}, const SensorNoise& sensor_noise = {}, double scale = 1.2,
-         int pyramid_levels = 8)
-      : camera(camera_model), noise(sensor_noise), scale_factor(scale), levels(pyramid_levels) {
-    for (size_t octave = 0; octave < variances_.size(); ++octave) {
-      const double sigma = noise.corner_sigma(static_cast<int>(octave), scale_factor);
-      variances_[octave] = sigma * sigma;
-      scales_[octave] = static_cast<float>(std::pow(scale_factor, octave));
-    }
-  }
+         int pyramid_levels = 8);
 
   CameraModel camera;
   SensorNoise noise;
@@ -36,10 +30,15 @@ struct Optics {
   // Size of a level over that of the finest.
   float scale(int level) const { return scales_[static_cast<size_t>(level)]; }
   double corner_sigma(const Keypoint& corner) const { return std::sqrt(corner_variance(corner)); }
+  // Whether an ideal pixel lies so far from the edges of the image as read that the lens need not be asked whether it
+  // is in view.
+  bool well_in_view(float u, float v) const { return u >= left_ && u <= right_ && v >= top_ && v <= bottom_; }
 
  private:
   std::array<double, SensorNoise::kMaxLevels> variances_;
   std::array<float, SensorNoise::kMaxLevels> scales_;
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+  float left_ = -kFar, right_ = kFar, top_ = -kFar, bottom_ = kFar;  // [px]
 };
 
 }  // namespace dkb

@@ -246,7 +246,11 @@ void Pipeline::follow_motion(const Scene& scene) {
 // Map points that stand where a mover is, at the mover's depth, lose trust; those that fit the still world regain it.
 void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   // A map that must not change keeps its points: nothing would come in their place.
-  if (!tracked.tracked() || localize_only_ || (scene.mask.empty() && !evidence_.suspects())) return;
+  if (!tracked.tracked() || localize_only_) return;
+  if (scene.mask.empty() && !evidence_.suspects()) {
+    evidence_.weigh(tracked.timestamp, {}, {});  // the next look lasts since this frame
+    return;
+  }
   std::vector<PointId> matched, on_mover;
   matched.reserve(tracked.points.size());
   for (PointId p : tracked.points)
@@ -256,7 +260,7 @@ void Pipeline::weigh_evidence(const Scene& scene, const TrackedFrame& tracked) {
   for (const PointInView& point : tracker_.points_in_view()) {
     const Eigen::Vector2f at = point.image_pixel.cast<float>();
     if (!scene.mask.at(at.x(), at.y())) continue;
-    const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+    const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
     if (!depth.contains(x, y) || !(depth(x, y) > 0)) continue;
     if (std::abs(depth(x, y) - point.depth) <= options_.noise.point_tolerance(point.depth) &&
         !std::binary_search(matched.begin(), matched.end(), point.id))

@@ -98,7 +98,7 @@ Carried SceneStage::carry(const CarryTask& task) {
   const Stopwatch watch;
   const RgbdImage& image = *task.frame.image();
   Carried made;
-  auto pyramid = std::make_shared<ImagePyramid>(OpticalFlowOptions().pyramid());
+  auto pyramid = std::make_shared<ImagePyramid>(flow_pyramid());
   pyramid->build(image.grey);
   const auto receive = [&](bool of_this_frame) {
     for (const DueDetections& d : task.due) {

@@ -25,7 +25,7 @@ BaLayout::BaLayout(const BaProblem& problem)
     free_of_camera.push_back(problem.fixed[c] ? -1 : static_cast<int>(camera_of_free.size()));
     if (!problem.fixed[c]) camera_of_free.push_back(c);
   }
-  motions.emplace(problem.motions, free_of_camera, "bundle adjustment");
+  motions.emplace(problem.motions, free_of_camera);
   sort_observations(problem);
   number_pairs();
   find_blocks();

@@ -14,6 +14,9 @@
 namespace dkb {
 namespace {
 
+constexpr double kMostAdaptive = 2;          // largest adaptive weight, and its inverse the smallest
+constexpr double kAdaptiveRedundancy = 200;  // redundant measurements at which its estimate counts half
+
 // Three centres are always in a plane.
 constexpr int kMinObservers = 4;
 constexpr double kMinTheta = 1e-8;  // [m^2]
@@ -87,8 +90,7 @@ std::vector<PointResiduals> inlying_residuals(const BaProblem& problem) {
   return residuals;
 }
 
-double adaptive_edge_weight(const BaProblem& problem, const std::vector<PointShape>& shape,
-                            const GeometricWeightOptions& options) {
+double adaptive_edge_weight(const BaProblem& problem, const std::vector<PointShape>& shape) {
   const std::vector<PointResiduals> residuals = inlying_residuals(problem);
   VarianceComponent planar, edge;
   for (size_t p = 0; p < residuals.size(); ++p) {
@@ -101,9 +103,9 @@ double adaptive_edge_weight(const BaProblem& problem, const std::vector<PointSha
   }
   if (!(planar.sum > 0) || !(edge.sum > 0)) return 1.0;
   const double redundancy = std::min(planar.redundancy, edge.redundancy);
-  const double trust = redundancy / (redundancy + options.adaptive_redundancy);
+  const double trust = redundancy / (redundancy + kAdaptiveRedundancy);
   const double weight = std::pow(planar.variance() / edge.variance(), trust);
-  return std::clamp(weight, 1 / options.adaptive_max, options.adaptive_max);
+  return std::clamp(weight, 1 / kMostAdaptive, kMostAdaptive);
 }
 
 }  // namespace
@@ -155,7 +157,7 @@ GeometricWeights set_geometric_weights(BaProblem& problem, const GeometricWeight
     }
   const auto [observers, first] = observers_of(problem);
   GeometricWeights weights = classify_points(centres, observers, first, options);
-  if (options.adaptive) weights.edge_weight = adaptive_edge_weight(problem, weights.shape, options);
+  if (options.adaptive) weights.edge_weight = adaptive_edge_weight(problem, weights.shape);
   for (BaObservation& o : problem.observations) o.weight = weights.weight(o.point);
   return weights;
 }

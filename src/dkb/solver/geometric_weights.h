@@ -14,9 +14,7 @@ struct GeometricWeightOptions {
   // The ratio of the two classes' residual variances, estimated from the residuals, instead of the fixed edge_weight.
   // Measures better over many seeds (docs/benchmarks.md).
   bool adaptive = true;
-  double edge_weight = 1.5;   // w of edge points where not adaptive, (0, 10]; planar points have 1     (DKB Table 1)
-  double adaptive_max = 2.0;  // largest such ratio, and its inverse the smallest, >= 1
-  double adaptive_redundancy = 200;  // redundant measurements at which the estimate counts half, > 0
+  double edge_weight = 1.5;  // w of edge points where not adaptive, (0, 10]; planar points have 1      (DKB Table 1)
 };
 
 enum class PointShape : uint8_t { planar, edge };
@@ -40,7 +38,8 @@ GeometricWeights classify_points(std::span<const Eigen::Vector3d> centres_in_wor
 
 // Classifies the points of a problem by all of its observations and writes BaObservation::weight. With
 // options.adaptive the edge weight is the ratio of the variances of planar and edge residuals at the present state
-// (variance components of two groups), drawn toward 1 where few measurements are redundant.
+// (variance components of two groups), drawn toward 1 where few measurements are redundant, between a half
+// and two.
 GeometricWeights set_geometric_weights(BaProblem& problem, const GeometricWeightOptions& options = {});
 
 }  // namespace dkb

@@ -78,32 +78,39 @@ TEST(GeometricWeights, AreWrittenToAllObservationsOfAPoint) {  // DKB eq. 48
   }
 }
 
-TEST(GeometricWeights, AdaptiveWeightIsTheRatioOfTheVariances) {
-  TestWorld world({.cameras = 14,
-                   .points = 1500,
+// What set_geometric_weights() makes of a world where the residuals of planar points have so many times the variance of
+// those of edge points.
+double adaptive_weight(int cameras, int points, double ratio) {
+  TestWorld world({.cameras = cameras,
+                   .points = points,
                    .pixel_noise = 0,
                    .depth_noise = 0.01,
                    .visibility = 0.5,
                    .pose_error = 0,
                    .point_error = 0,
                    .seed = 3});
-  GeometricWeightOptions options{.adaptive_max = 4};
-  const GeometricWeights shapes = set_geometric_weights(world.problem, options);
-  ASSERT_GT(shapes.edges, 100);
+  const GeometricWeights shapes = set_geometric_weights(world.problem);
   Random random(5);
-  // Noise of edge points is half that of planar ones: variance ratio 4 in measured, 0.7 sigma so that few are cut off.
-  // The true state's residuals have lost no degrees of freedom, but the estimate takes them off both classes alike.
+  // Noise of 0.7 sigma at most, so that few are cut off.
   for (BaObservation& o : world.problem.observations) {
-    const double sigma = (shapes.shape[o.point] == PointShape::edge ? 0.35 : 0.7) / o.inv_sigma;
+    const double share = shapes.shape[static_cast<size_t>(o.point)] == PointShape::edge ? 1 / std::sqrt(ratio) : 1;
+    const double sigma = 0.7 * share / o.inv_sigma;
     o.u += sigma * random.normal();
     o.v += sigma * random.normal();
   }
-  options.adaptive_redundancy = 1e-3;
-  EXPECT_NEAR(set_geometric_weights(world.problem, options).edge_weight, 3.95, 0.35);
-  options.adaptive_max = 2;
-  EXPECT_EQ(set_geometric_weights(world.problem, options).edge_weight, 2);
-  options.adaptive_redundancy = 1e9;  // nothing is believed
-  EXPECT_NEAR(set_geometric_weights(world.problem, options).edge_weight, 1, 1e-3);
+  return set_geometric_weights(world.problem).edge_weight;
+}
+
+TEST(GeometricWeights, AdaptiveWeightIsTheRatioOfTheVariancesWithinHalfAndTwo) {
+  EXPECT_NEAR(adaptive_weight(14, 1500, 1.5), 1.5, 0.1);
+  EXPECT_NEAR(adaptive_weight(14, 1500, 1 / 1.5), 1 / 1.5, 0.1);
+  EXPECT_EQ(adaptive_weight(14, 1500, 4), 2);
+}
+
+TEST(GeometricWeights, AdaptiveWeightIsNearOneWhereLittleIsMeasured) {
+  const double weight = adaptive_weight(8, 15, 4);
+  EXPECT_GT(weight, 1);
+  EXPECT_LT(weight, 1.5);
 }
 
 }  // namespace

@@ -9,15 +9,13 @@
 
 namespace dkb::solver {
 
-PoseEdges::PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera,
-                     const std::string& problem)
-    : edges_(edges) {
+PoseEdges::PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera) : edges_(edges) {
   const int n = static_cast<int>(free_of_camera.size());
   free_ =
       static_cast<size_t>(std::count_if(free_of_camera.begin(), free_of_camera.end(), [](int f) { return f >= 0; }));
   for (const PoseEdge& e : edges) {
     if (e.a < 0 || e.b < 0 || e.a >= n || e.b >= n || e.a == e.b) {
-      throw InputError(problem + ": edge from " + std::to_string(e.a) + " to " + std::to_string(e.b) +
+      throw InputError("bundle adjustment: edge from " + std::to_string(e.a) + " to " + std::to_string(e.b) +
                        " does not join two of the " + std::to_string(n) + " poses");
     }
     placed_.push_back({free_of_camera[static_cast<size_t>(e.a)], free_of_camera[static_cast<size_t>(e.b)]});

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "dkb/geometry/rigid3.h"
@@ -31,9 +30,9 @@ using PoseColumns = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 // equations by right perturbations of world_from_cam. Deterministic.
 class PoseEdges {
  public:
-  // `free_of_camera`: number of each pose among the free ones, -1 = fixed. Throws InputError, beginning with `problem`,
-  // for edges that do not join two of the poses.
-  PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera, const std::string& problem);
+  // `free_of_camera`: number of each pose among the free ones, -1 = fixed. Throws InputError for edges that do not join
+  // two of the poses.
+  PoseEdges(const std::vector<PoseEdge>& edges, const std::vector<int>& free_of_camera);
 
   // Per free pose, the free ones behind it that an edge joins it with; may repeat.
   std::vector<std::vector<int>> later_neighbours() const;

@@ -7,6 +7,7 @@
 #include "dkb/geometry/decompositions.h"
 #include "dkb/solver/kernels.h"
 #include "dkb/solver/relative_pose.h"
+#include "dkb/util/chi_square.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
@@ -29,9 +30,8 @@ constexpr double kSmallTranslation = 1e-4, kSmallRotation = 1e-4;
 // The observations as arrays, in groups of four, and the sums over them at a pose.
 class PoseProblem {
  public:
-  PoseProblem(const CameraModel& camera, std::span<const PoseObservation> observations, const PoseOptions& options,
-              const PosePrior* prior)
-      : count_(observations.size()), padded_((count_ + 3) / 4 * 4), prior_(prior), options_(options) {
+  PoseProblem(const CameraModel& camera, std::span<const PoseObservation> observations, const PosePrior* prior)
+      : count_(observations.size()), padded_((count_ + 3) / 4 * 4), prior_(prior) {
     values_.assign(padded_ * kArrays, 0.0);
     for (size_t i = 0; i < count_; ++i) {
       const PoseObservation& o = observations[i];
@@ -56,10 +56,15 @@ class PoseProblem {
     input_.count = static_cast<int>(padded_);
   }
 
-  // Observations within the limit at a pose.
-  std::vector<uint8_t> inliers(const Rigid3& pose) {
+  // How each observation fits at a pose.
+  void judge(const Rigid3& pose) {
+    set_pose(pose);
+    input_.observations.inv_depth_sigma = array(kInvDepthSigma);
+    kernels_.pose_chi2(input_, array(kChi2));
+  }
+  // Observations within the limit, as judged.
+  std::vector<uint8_t> inliers() const {
     std::vector<uint8_t> inlier(count_);
-    compute_chi2(pose);
     for (size_t i = 0; i < count_; ++i) inlier[i] = array(kChi2)[i] <= limit(i);
     return inlier;
   }
@@ -71,29 +76,28 @@ class PoseProblem {
       array(kUsedInvDepthSigma)[i] = inlier[i] ? array(kInvDepthSigma)[i] : 0.0;
     }
   }
-  // The same, each weighed by how it fits at a pose by its own sigmas, all `times` as much.
-  void weigh(const std::vector<uint8_t>& inlier, const Rigid3& pose, double times = 1) {
+  // The same, each weighed by how it fits, as judged, by its own sigmas, all `times` as much.
+  void weigh(const std::vector<uint8_t>& inlier, double times = 1) {
     use(inlier);
-    compute_chi2(pose);
-    double* const chi2 = array(kChi2);
+    const double* const chi2 = array(kChi2);
+    double* const own = array(kOwnChi2);
     double* const fits = array(kFits);
     double* end = fits;
     for (size_t i = 0; i < count_; ++i) {
-      chi2[i] /= array(kGiven)[i];
-      if (inlier[i]) *end++ = chi2[i];
+      own[i] = chi2[i] / array(kGiven)[i];
+      if (inlier[i]) *end++ = own[i];
     }
     if (end == fits) return;
     const double variance = variance_by_median({fits, end});
     for (size_t i = 0; i < count_; ++i) {
       if (!inlier[i]) continue;
-      const double weight = student_weight(chi2[i] / variance, times);
+      const double weight = student_weight(own[i] / variance, times);
       array(kWeight)[i] = weight;
       array(kUsedInvDepthSigma)[i] = array(kInvDepthSigma)[i] * std::sqrt(weight);
     }
   }
-  std::vector<uint8_t> in_front(const Rigid3& pose) {
+  std::vector<uint8_t> in_front() const {
     std::vector<uint8_t> in_front(count_);
-    compute_chi2(pose);
     for (size_t i = 0; i < count_; ++i) in_front[i] = std::isfinite(array(kChi2)[i]);
     return in_front;
   }
@@ -111,7 +115,7 @@ class PoseProblem {
   Normal of_observations(const Rigid3& pose, bool robust) {
     set_pose(pose);
     input_.observations.inv_depth_sigma = array(kUsedInvDepthSigma);
-    input_.limits = {robust, options_.chi2_pixel, options_.chi2_depth};
+    input_.limits = {robust, kChi2TwoDof95, kChi2ThreeDof95};
     double sums[solver::kPoseSums];
     kernels_.pose_sums(input_, sums);
     Normal n;
@@ -145,6 +149,7 @@ class PoseProblem {
     kUsedInvDepthSigma,
     kWeight,
     kChi2,
+    kOwnChi2,
     kFits,
     kGiven,
     kArrays
@@ -152,12 +157,8 @@ class PoseProblem {
 
   double* array(Array a) { return values_.data() + padded_ * a; }
   const double* array(Array a) const { return values_.data() + padded_ * a; }
-  double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? options_.chi2_depth : options_.chi2_pixel; }
-  void compute_chi2(const Rigid3& pose) {
-    set_pose(pose);
-    input_.observations.inv_depth_sigma = array(kInvDepthSigma);
-    kernels_.pose_chi2(input_, array(kChi2));
-  }
+  // Of the square of an error: inliers are within it, where the Huber kernel has its corner.
+  double limit(size_t i) const { return array(kInvDepthSigma)[i] > 0 ? kChi2ThreeDof95 : kChi2TwoDof95; }
   void set_pose(const Rigid3& pose) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(input_.camera.rotation) = pose.matrix3();
     Eigen::Map<Eigen::Vector3d>(input_.camera.translation) = pose.translation;
@@ -165,19 +166,16 @@ class PoseProblem {
 
   const size_t count_, padded_;
   const PosePrior* prior_;
-  const PoseOptions& options_;
   const solver::SolverKernels& kernels_ = solver::solver_kernels();
   std::vector<double> values_;
   solver::PoseInput input_{};
 };
 
-// Levenberg-Marquardt from `pose` with the observations in use. Returns the number of steps tried.
-int descend(PoseProblem& problem, bool robust, Rigid3& pose) {
+// Levenberg-Marquardt from `pose` with the observations in use.
+void descend(PoseProblem& problem, bool robust, Rigid3& pose) {
   double damping = 1e-6;
   PoseProblem::Normal normal = problem.normal_at(pose, robust);
-  int tried = 0;
-  while (tried < kRoundSteps) {
-    ++tried;
+  for (int tried = 0; tried < kRoundSteps; ++tried) {
     Matrix6d damped = normal.information;
     // The floor keeps directions without information where they are.
     damped.diagonal() += damping * normal.information.diagonal() + Vector6d::Constant(1e-9);
@@ -195,7 +193,6 @@ int descend(PoseProblem& problem, bool robust, Rigid3& pose) {
     }
     if (small) break;
   }
-  return tried;
 }
 
 // A Gauss-Newton step with the observations in use, for a pose that lies near its minimum.
@@ -217,8 +214,6 @@ double variance_by_median(std::span<double> squares) {
 
 void PoseOptions::check() const {
   require_option(tail_rounds >= 0, "tail_rounds", tail_rounds, ">= 0");
-  require_option(chi2_pixel > 0, "chi2_pixel", chi2_pixel, "> 0");
-  require_option(chi2_depth > 0, "chi2_depth", chi2_depth, "> 0");
   require_option(min_inliers >= 3, "min_inliers", min_inliers, ">= 3");
 }
 
@@ -228,26 +223,31 @@ PoseEstimate optimise_pose(const CameraModel& camera, const Rigid3& cam_from_wor
   options.check();
   PoseEstimate estimate;
   estimate.cam_from_world = cam_from_world_initial;
-  PoseProblem problem(camera, observations, options, prior);
+  PoseProblem problem(camera, observations, prior);
 
   Rigid3 pose = cam_from_world_initial;
-  std::vector<uint8_t> used = problem.in_front(pose);
+  problem.judge(pose);
+  std::vector<uint8_t> used = problem.in_front();
   for (int round = 0; round < kPoseRounds; ++round) {
     problem.use(used);
-    estimate.iterations += descend(problem, round < kRobustRounds, pose);
-    estimate.inlier = problem.inliers(pose);
+    descend(problem, round < kRobustRounds, pose);
+    problem.judge(pose);
+    estimate.inlier = problem.inliers();
     // Within the limit, which is the kernel's corner, the kernel is least squares: the same observations would give
     // the same pose again, with the kernel or without.
     if (estimate.inlier == used) break;
     used = estimate.inlier;
   }
   for (int round = 0; round < options.tail_rounds; ++round) {
-    problem.weigh(estimate.inlier, pose);
+    problem.weigh(estimate.inlier);
     pose = one_step(problem, pose);
-    ++estimate.iterations;
+    problem.judge(pose);
   }
-  estimate.inlier = problem.inliers(pose);
-  problem.weigh(estimate.inlier, pose, kClaim);
+  estimate.inlier = problem.inliers();
+  if (options.tail_rounds > 0)
+    problem.weigh(estimate.inlier, kClaim);
+  else
+    problem.use(estimate.inlier);
 
   estimate.inliers = static_cast<int>(std::count(estimate.inlier.begin(), estimate.inlier.end(), 1));
   const PoseProblem::Normal seen = problem.of_observations(pose, false);

@@ -9,7 +9,6 @@
 
 #include "dkb/geometry/camera.h"
 #include "dkb/geometry/rigid3.h"
-#include "dkb/util/chi_square.h"
 
 namespace dkb {
 
@@ -39,10 +38,9 @@ struct PoseObservation {
 };
 
 struct PoseOptions {
-  int tail_rounds = 3;                  // of weights by how well an observation fits, and a step, >= 0
-  double chi2_pixel = kChi2TwoDof95;    // inlier limit and Huber corner without depth (2 d.o.f., 95 %), > 0
-  double chi2_depth = kChi2ThreeDof95;  // the same with depth (3 d.o.f.), > 0
-  int min_inliers = 6;                  // fewer at the end: not ok, >= 3
+  int tail_rounds =
+      3;  // of weights by how well an observation fits, and a step, >= 0; without, all inliers weigh alike
+  int min_inliers = 6;  // fewer at the end: not ok, >= 3
 
   void check() const;  // throws InvalidOption
 };
@@ -64,7 +62,6 @@ struct PoseEstimate {
   std::optional<PosePrior> by_observations;
   std::vector<uint8_t> inlier;  // per observation
   int inliers = 0;
-  int iterations = 0;  // over all rounds
 };
 
 // Pose that minimises sum rho(e^T Sigma^-1 e), e = [reprojection px, depth m], by Levenberg-Marquardt on 6 numbers;

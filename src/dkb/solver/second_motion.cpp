@@ -63,9 +63,7 @@ Match linearise(const CameraModel& camera, const Eigen::Vector3d& q, const PoseO
   m.error << (camera.project(q) - o.pixel) / o.pixel_sigma, (q.z() - o.depth) * inv_depth_sigma;
   Eigen::Matrix3d by_point;
   by_point << fx, 0, -fx * q.x() * inverse, 0, fy, -fy * q.y() * inverse, 0, 0, inv_depth_sigma;
-  Eigen::Matrix3d turned;  // q x w
-  turned << 0, -q.z(), q.y(), q.z(), 0, -q.x(), -q.y(), q.x(), 0;
-  m.jacobian << -by_point, by_point * turned;
+  m.jacobian << -by_point, by_point * skew(q);
   return m;
 }
 

@@ -45,35 +45,42 @@ struct PosePrediction {
   bool agrees(const Rigid3& found_cam_from_world) const;
 };
 
-// A frame with its pose, as tracking leaves it. The pose hangs on a keyframe, since the world may move under the
-// tracker.
-struct TrackedFrame {
+// What the frames after it need to know of one. The pose hangs on a keyframe, since the world may move under the
+// tracker. All but index, stamp and state holds when tracking or relocalised; of a predicted frame the reference and
+// the pose.
+struct PosedFrame {
   FrameIndex index = 0;
   double timestamp = 0;  // [s]
-  // Of the frame before, which its map starts with: made again at the velocity that only this frame tells.
-  std::shared_ptr<const RgbdFeatures> start_features;
   TrackingState state = TrackingState::initialising;
-  bool ambiguous = false;                   // lost: it shows a place of the map, or one that looks like it
-  bool starts_map = false;                  // it wants to be a map's first keyframe
-  std::optional<PosePrediction> predicted;  // by the step from the frame before
-  // What follows holds when tracking or relocalised; of a predicted frame the reference and the pose.
+  bool starts_map = false;  // it wants to be a map's first keyframe
   std::shared_ptr<const RgbdFeatures> features;
-  std::vector<FeatureMotion> motion;  // per feature
-  std::vector<PointId> matched;  // per feature: the map point it matched, also where the pose rejects it; in tracking
-  std::vector<PointId> points;   // per feature: the map point it shows (inliers of the pose), else kNoPoint
-  std::vector<uint8_t> outlier;  // per feature: 1 = matched, but rejected by the robust pose
-  std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
-  std::vector<uint8_t> makes_point;  // per feature: 1 = it made a map point, when the frame became a keyframe
-  std::vector<int> source;           // per feature: its index among the features that tracking was given
+  std::vector<PointId> points;  // per feature: the map point it shows (inliers of the pose), else kNoPoint
+  std::vector<int> source;      // per feature: its index among the features that tracking was given
   KeyframeId reference = kNoKeyframe;
   Rigid3 cam_from_reference;
   Rigid3 seen_cam_from_cam;  // the camera that saw the features, from this one; identity unless it is predicted
   Rigid3 cam_from_world;     // by the map as tracking knew it at the time
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation of world_from_cam, [m, rad], camera axes
-  std::optional<PosePrior> by_observations;    // the pose without what was predicted, where that weighed in it
-  int inliers = 0;                             // among `points`
 
   bool tracked() const { return state == TrackingState::tracking || state == TrackingState::relocalised; }
+};
+
+// A frame as tracking leaves it.
+struct TrackedFrame : PosedFrame {
+  // Of the frame before, which its map starts with: made again at the velocity that only this frame tells.
+  std::shared_ptr<const RgbdFeatures> start_features;
+  bool ambiguous = false;                   // lost: it shows a place of the map, or one that looks like it
+  std::optional<PosePrediction> predicted;  // by the step from the frame before
+  std::vector<FeatureMotion> motion;        // per feature
+  // Per feature: the map point it matched, also where the pose rejects it, and where that is [m]; in tracking.
+  std::vector<PointId> matched;
+  std::vector<Eigen::Vector3d> matched_in_world;
+  std::vector<uint8_t> outlier;                        // per feature: 1 = matched, but rejected by the robust pose
+  std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
+  std::vector<uint8_t> makes_point;          // per feature: 1 = it made a map point, when the frame became a keyframe
+  std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that weighed in it
+  int inliers = 0;                           // among `points`
+
   // None of its features shows anything.
   void show_nothing() {
     points.assign(features->size(), kNoPoint);

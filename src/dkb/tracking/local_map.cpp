@@ -4,22 +4,26 @@
 #include <algorithm>
 
 namespace dkb {
+namespace {
 
-std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map,
-                                            const LocalMapOptions& options) {
+constexpr size_t kVotedKeyframes = 30;   // that share most points with the frame
+constexpr size_t kNeighboursOfEach = 5;  // covisible keyframes added for each of them
+constexpr size_t kKeyframes = 60;        // at most, in all
+
+}  // namespace
+
+std::vector<Candidate> local_map_candidates(const std::vector<PointId>& points, const Map& map) {
   const auto ranked = map.observers_of(points);
   std::vector<KeyframeId> keyframes;
   const auto add = [&](KeyframeId id) {
-    if (static_cast<int>(keyframes.size()) < options.keyframes &&
-        std::find(keyframes.begin(), keyframes.end(), id) == keyframes.end())
+    if (keyframes.size() < kKeyframes && std::find(keyframes.begin(), keyframes.end(), id) == keyframes.end())
       keyframes.push_back(id);
   };
-  const size_t voted = std::min(ranked.size(), static_cast<size_t>(options.voted_keyframes));
+  const size_t voted = std::min(ranked.size(), kVotedKeyframes);
   for (size_t i = 0; i < voted; ++i) add(ranked[i].keyframe);
   for (size_t i = 0; i < voted; ++i) {
     const auto& neighbours = map.keyframe(ranked[i].keyframe)->covisible;
-    for (size_t n = 0; n < std::min(neighbours.size(), static_cast<size_t>(options.neighbours_of_each)); ++n)
-      add(neighbours[n].keyframe);
+    for (size_t n = 0; n < std::min(neighbours.size(), kNeighboursOfEach); ++n) add(neighbours[n].keyframe);
   }
   return candidates_of(map, map.points_of(keyframes));
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "dkb/matching/test_scene.h"
 #include "dkb/util/errors.h"
 
@@ -64,30 +66,35 @@ std::vector<PointId> operator+(std::vector<PointId> x, const std::vector<PointId
 
 TEST(LocalMap, PointsThatAreNotInTheMapVoteForNobody) {
   const Chain w;
-  EXPECT_TRUE(local_map_candidates({kNoPoint, make_point_id(7, 3), make_point_id(0, 9)}, w.map, {}).empty());
-  EXPECT_TRUE(local_map_candidates({}, w.map, {}).empty());
-  EXPECT_TRUE(local_map_candidates({kNoPoint}, w.map, {}).empty());
+  EXPECT_TRUE(local_map_candidates({kNoPoint, make_point_id(7, 3), make_point_id(0, 9)}, w.map).empty());
+  EXPECT_TRUE(local_map_candidates({}, w.map).empty());
+  EXPECT_TRUE(local_map_candidates({kNoPoint}, w.map).empty());
 }
 
 TEST(LocalMap, HoldsTheVotedKeyframesAndTheirNeighbours) {
   const Chain w;
-  LocalMapOptions options;
-  EXPECT_EQ(ids_of(local_map_candidates({w.a[0]}, w.map, options)), w.a + w.b);  // keyframe 0 and its neighbour 1
-  options.neighbours_of_each = 0;
-  EXPECT_EQ(ids_of(local_map_candidates({w.a[0]}, w.map, options)), w.a);
-  EXPECT_EQ(ids_of(local_map_candidates({w.a[3]}, w.map, options)), w.a + w.b);  // keyframes 0 and 1 see it
+  EXPECT_EQ(ids_of(local_map_candidates({w.a[0]}, w.map)), w.a + w.b);        // keyframe 0 and its neighbour 1
+  EXPECT_EQ(ids_of(local_map_candidates({w.a[3]}, w.map)), w.a + w.b + w.c);  // keyframes 0 and 1, whose neighbour is 2
 }
 
-TEST(LocalMap, HoldsNoMoreKeyframesThanAskedFor) {
-  const Chain w;
-  LocalMapOptions options;
-  options.keyframes = 1;
-  EXPECT_EQ(ids_of(local_map_candidates({w.b[0]}, w.map, options)),
-            (std::vector<PointId>{w.a[3], w.a[4]} + w.b));  // what keyframe 1 sees
-  options.keyframes = 60;
-  options.voted_keyframes = 1;
-  options.neighbours_of_each = 1;  // keyframe 0 shares two points with keyframe 1, keyframe 2 only one
-  EXPECT_EQ(ids_of(local_map_candidates({w.b[0]}, w.map, options)), w.a + w.b);
+TEST(LocalMap, HoldsSixtyKeyframesAtMost) {
+  // 30 keyframes that see one point share two more with two others each; each of the 90 makes a point of its own.
+  constexpr int kOwn = 10;
+  Map map;
+  const PointId seen_by_all = make_point_id(0, 0);
+  for (int k = 0; k < 30; ++k) {
+    add_keyframe(map, k == 0 ? std::vector<PointId>{} : std::vector<PointId>{seen_by_all});
+    if (k == 0) add_point(map, k, 0);
+    for (int feature : {1, 2, kOwn}) add_point(map, k, feature);
+  }
+  for (int k = 30; k < 90; ++k) {
+    const KeyframeId first = (k - 30) / 2;
+    add_keyframe(map, {make_point_id(first, 1), make_point_id(first, 2)});
+    add_point(map, k, kOwn);
+  }
+  for (KeyframeId k = 0; k < 90; ++k) map.update_covisibility(k, 1);
+  const std::vector<PointId> ids = ids_of(local_map_candidates({seen_by_all}, map));
+  EXPECT_EQ(std::count_if(ids.begin(), ids.end(), [](PointId id) { return birth_feature(id) == kOwn; }), 60);
 }
 
 TEST(LocalMap, CarriesWhatMatchingNeeds) {
@@ -97,7 +104,7 @@ TEST(LocalMap, CarriesWhatMatchingNeeds) {
   p.reference_distance = 2.5F;
   p.reference_scale = 1.44F;
   p.descriptor = {1, 2, 3, 4};
-  const auto candidates = local_map_candidates({w.a[2]}, w.map, {});
+  const auto candidates = local_map_candidates({w.a[2]}, w.map);
   const Candidate& c = candidates.at(2);
   EXPECT_EQ(c.id, w.a[2]);
   EXPECT_EQ(c.position, w.map.point(w.a[2])->position);
@@ -112,9 +119,7 @@ TEST(LocalMap, LeavesOutWhatWasRemovedOrFused) {
   Chain w;
   w.map.remove_point(w.a[0]);
   w.map.fuse(w.a[1], w.a[2]);
-  LocalMapOptions options;
-  options.neighbours_of_each = 0;
-  EXPECT_EQ(ids_of(local_map_candidates({w.a[2]}, w.map, options)), (std::vector<PointId>{w.a[2], w.a[3], w.a[4]}));
+  EXPECT_EQ(ids_of(local_map_candidates({w.a[2]}, w.map)), (std::vector<PointId>{w.a[2], w.a[3], w.a[4]} + w.b));
 }
 
 }  // namespace

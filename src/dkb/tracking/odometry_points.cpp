@@ -17,7 +17,7 @@ SightRay transformed(const Rigid3& pose, const SightRay& ray) {
 
 }  // namespace
 
-std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) const {
+std::vector<Candidate> OdometryPoints::candidates(const PosedFrame& frame) const {
   const Rigid3 world_from_cam = frame.cam_from_world.inverse();
   std::vector<Candidate> result;
   result.reserve(points_.size());
@@ -29,7 +29,7 @@ std::vector<Candidate> OdometryPoints::candidates(const TrackedFrame& frame) con
   return result;
 }
 
-OdometryMatch OdometryPoints::match(size_t i, const TrackedFrame& frame) const {
+OdometryMatch OdometryPoints::match(size_t i, const PosedFrame& frame) const {
   const Point& p = points_[i];
   const Rigid3 world_from_cam = frame.cam_from_world.inverse();
   return {world_from_cam * p.point_in_cam, p.guessed, transformed(world_from_cam, p.first_in_cam), p.moves};
@@ -101,7 +101,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
   }
 }
 
-void OdometryPoints::drop_mapped(const TrackedFrame& frame) {
+void OdometryPoints::drop_mapped(const PosedFrame& frame) {
   std::erase_if(points_, [&](const Point& p) { return frame.points[static_cast<size_t>(p.feature)] != kNoPoint; });
 }
 

@@ -22,9 +22,9 @@ class OdometryPoints {
 
   // The points as matching wants them, in the world that `frame`, the one last remembered, lives in now. Candidate ids
   // are kNoPoint.
-  std::vector<Candidate> candidates(const TrackedFrame& frame) const;
+  std::vector<Candidate> candidates(const PosedFrame& frame) const;
   // Candidate `i`, shown by a feature of the frame after.
-  OdometryMatch match(size_t i, const TrackedFrame& frame) const;
+  OdometryMatch match(size_t i, const PosedFrame& frame) const;
   // [px] standard deviation of where a guessed point lies in an image, since its depth is one: from the last frame's
   // pose, in which the guess was made, to that of the image. It may as well be twice as near or far away; an inverse
   // depth that is even from 0 to twice the guess has a standard deviation of the guess over sqrt(3).
@@ -38,7 +38,7 @@ class OdometryPoints {
   // for guessed ones; the others start at their depth.
   void remember(const TrackedFrame& frame);
   // Leaves out what has become a map point of `frame`, the one last remembered.
-  void drop_mapped(const TrackedFrame& frame);
+  void drop_mapped(const PosedFrame& frame);
   void clear() { points_.clear(); }
 
  private:

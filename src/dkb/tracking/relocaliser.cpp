@@ -63,11 +63,12 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
   std::vector<PoseProposal> proposals;
   for (const PlaceMatch& like : map.similar_keyframes(still, kCandidates)) {
     // A keyframe that sees what an earlier one led to would lead there again.
-    const auto& points = map.keyframe(like.id)->points;
+    std::vector<PointId> points = map.keyframe(like.id)->points;
+    std::sort(points.begin(), points.end());
     const bool explained = std::any_of(proposals.begin(), proposals.end(), [&](const PoseProposal& p) {
       if (!p.verified) return false;
       const auto shared = std::count_if(p.fit.points.begin(), p.fit.points.end(), [&](PointId id) {
-        return id != kNoPoint && std::find(points.begin(), points.end(), id) != points.end();
+        return id != kNoPoint && std::binary_search(points.begin(), points.end(), id);
       });
       return shared >= kMinPlaceMatches;
     });
@@ -147,9 +148,8 @@ void Relocaliser::look_around(const Map& map, PointAppearance* appearance, PoseP
     const double scale = c.reference_scale * c.reference_distance / (c.position - centre).norm();
     const int octave = std::clamp(static_cast<int>(std::lround(std::log(scale) / std::log(optics_.scale_factor))), 0,
                                   optics_.levels - 1);
-    // What is gone may have been taken away: that happens in every place.
     const Look look = appearance->look(optics_.camera.project(in_cam), in_cam.z(), octave, c.descriptor);
-    if (look == Look::same || look == Look::other) proposal.looks.push_back({c.id, look == Look::same});
+    if (look != Look::unknown) proposal.looks.push_back({c.id, look == Look::same});
   }
 }
 

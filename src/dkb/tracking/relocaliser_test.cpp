@@ -149,7 +149,6 @@ TEST_F(RelocaliserTest, TheImageTellsHowPointsLookThatNoFeatureMatched) {
   const auto [matched, none] = looks_by(Look::unknown);
   EXPECT_GT(matched, 40);
   EXPECT_EQ(none, 0);
-  EXPECT_EQ(looks_by(Look::gone), std::pair(matched, 0L)) << "somebody may have taken it away";
   const auto [still, different] = looks_by(Look::other);
   EXPECT_EQ(still, matched);
   EXPECT_NEAR(static_cast<double>(different) / static_cast<double>(matched), 1, 0.3);

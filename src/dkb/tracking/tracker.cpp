@@ -50,7 +50,7 @@ Rigid3 Tracker::take_view(MapView view) {
 }
 
 // A frame's pose and points by the view as it is now; how the world moved under its camera.
-Rigid3 Tracker::express_anew(TrackedFrame& frame) const {
+Rigid3 Tracker::express_anew(PosedFrame& frame) const {
   const Rigid3 moved = frame.cam_from_reference * map_.cam_from_world(frame.reference);
   const Rigid3 new_world_from_old = moved.inverse() * frame.cam_from_world;
   frame.cam_from_world = moved;
@@ -72,7 +72,7 @@ std::optional<Eigen::Vector3d> Tracker::position(PointId id) const {
   if (const MapPoint* p = map_.view().point(id)) return p->position;
   const auto it = provisional_.find(id);
   if (it == provisional_.end()) return std::nullopt;
-  return map_.cam_from_world(it->second.keyframe).inverse() * it->second.point_in_keyframe;
+  return map_.world_from_pending(it->second.keyframe) * it->second.point_in_keyframe;
 }
 
 std::vector<std::optional<Eigen::Vector3d>> Tracker::positions(const std::vector<PointId>& points) const {
@@ -162,10 +162,39 @@ double Tracker::forget_strays(const std::vector<Pair>& pairs, size_t first, cons
 }
 
 void Tracker::refresh_candidates(const std::vector<PointId>& points, double now) {
-  if (candidates_made_ && now - *candidates_made_ < kRefreshAfter) return;
-  candidates_ = local_map_candidates(points, map_.view());
-  for (Candidate& c : candidates_) c.established = established(c.id, now);
-  candidates_made_ = now;
+  if (!candidates_made_ || now - *candidates_made_ >= kRefreshAfter) {
+    candidates_ = local_map_candidates(points, map_.view());
+    for (Candidate& c : candidates_) c.established = established(c.id, now);
+    candidates_made_ = now;
+    from_view_ = candidates_.size();
+  }
+  candidates_.resize(from_view_);
+  candidates_.reserve(from_view_ + provisional_.size());
+  for (const auto& [id, p] : provisional_) {
+    Candidate& c = candidates_.emplace_back();
+    c.id = id;
+    c.position = map_.world_from_pending(p.keyframe) * p.point_in_keyframe;
+    c.normal.setZero();
+    c.reference_distance = static_cast<float>(p.point_in_keyframe.norm());
+    c.reference_scale = p.scale;
+    c.descriptor = p.descriptor;
+  }
+}
+
+// Per candidate: 1 = it is of `matched` (increasing) or was retracted.
+std::vector<uint8_t> Tracker::candidates_to_skip(const std::vector<PointId>& matched) const {
+  std::vector<uint8_t> skipped(candidates_.size(), 0);
+  const auto skip = [&](size_t first, size_t end, const std::vector<PointId>& ids) {
+    auto at = ids.begin();
+    for (size_t i = first; i < end && at != ids.end(); ++i) {
+      while (at != ids.end() && *at < candidates_[i].id) ++at;
+      skipped[i] |= at != ids.end() && *at == candidates_[i].id;
+    }
+  };
+  skip(0, from_view_, matched);
+  skip(0, from_view_, retracted_);
+  skip(from_view_, candidates_.size(), matched);
+  return skipped;
 }
 
 // Keyframes of a map that was loaded are of another clock, and old.
@@ -178,7 +207,8 @@ bool Tracker::established(PointId id, double now) const {
 
 // Features on movers that showed no well-known point end here: mapping never sees them.
 void Tracker::drop_unmatched_suspects(TrackedFrame& frame) {
-  frame.matched.clear();  // it is of all features
+  frame.matched.clear();  // they are of all features
+  frame.matched_in_world.clear();
   frame.source.clear();
   frame.source.reserve(frame.points.size());
   for (size_t f = 0; f < frame.points.size(); ++f)
@@ -206,33 +236,25 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       matched.push_back(points[f]);
     }
   radix_sort(matched);
-  std::vector<Candidate> candidates;
-  candidates.reserve(candidates_.size() + provisional_.size());
-  const auto is_matched = [&](PointId id) { return std::binary_search(matched.begin(), matched.end(), id); };
-  for (const Candidate& c : candidates_)
-    if (!is_matched(c.id) && !is_retracted(c.id)) candidates.push_back(c);
-  for (const auto& [id, p] : provisional_) {
-    if (is_matched(id)) continue;
-    Candidate c;
-    c.id = id;
-    c.position = *position(id);
-    c.normal.setZero();
-    c.reference_distance = static_cast<float>(p.point_in_keyframe.norm());
-    c.reference_scale = p.scale;
-    c.descriptor = p.descriptor;
-    candidates.push_back(c);
-  }
+  const std::vector<uint8_t> skipped = candidates_to_skip(matched);
   const ProjectionMatchOptions match{
       .radius = static_cast<float>(radius), .max_distance = kMatchDistance, .ratio = kMatchRatio};
-  std::vector<uint8_t> visible(candidates.size(), 0);
-  const auto matches = match_by_projection(candidates, frame.matchable(), optics_, initial, match, &taken, &visible);
-  for (const auto& m : matches)
-    points[static_cast<size_t>(m.feature)] = candidates[static_cast<size_t>(m.candidate)].id;
+  std::vector<Eigen::Vector3d> in_world(features.size(), Eigen::Vector3d::Zero());
+  for (size_t f = 0; f < points.size(); ++f)
+    if (points[f] != kNoPoint) in_world[f] = *position(points[f]);
+  std::vector<uint8_t> visible(candidates_.size(), 0);
+  const auto matches =
+      match_by_projection(candidates_, frame.matchable(), optics_, initial, match, &taken, &visible, &skipped);
+  for (const auto& m : matches) {
+    const Candidate& c = candidates_[static_cast<size_t>(m.candidate)];
+    points[static_cast<size_t>(m.feature)] = c.id;
+    in_world[static_cast<size_t>(m.feature)] = c.position;
+  }
 
   std::vector<Pair> pairs;
   pairs.reserve(features.size());
   for (size_t f = 0; f < points.size(); ++f)
-    if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), *position(points[f])});
+    if (points[f] != kNoPoint) pairs.push_back({static_cast<int>(f), in_world[f]});
   const size_t in_map = pairs.size();
   std::vector<std::optional<OdometryMatch>> followed(features.size());
   if (last_) {
@@ -251,13 +273,14 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
 
   const double limit = forget_strays(pairs, in_map, pose, features, followed);
   std::vector<PointId> in_view, found;
-  in_view.reserve(candidates.size());
+  in_view.reserve(candidates_.size());
   found.reserve(features.size());
-  for (size_t i = 0; i < candidates.size(); ++i)
-    if (visible[i]) in_view.push_back(candidates[i].id);
+  for (size_t i = 0; i < candidates_.size(); ++i)
+    if (visible[i]) in_view.push_back(candidates_[i].id);
   visibility_.add_visible(std::move(in_view));
   visibility_.add_visible(std::move(matched));
   frame.matched = points;
+  frame.matched_in_world = std::move(in_world);
   frame.show_nothing();
   for (size_t i = 0; i < pairs.size(); ++i) {
     const auto f = static_cast<size_t>(pairs[i].feature);
@@ -310,7 +333,7 @@ void Tracker::finish(TrackedFrame& frame) {
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(reference).inverse();
 }
 
-Vector6d Tracker::velocity_to(const TrackedFrame& frame) const {
+Vector6d Tracker::velocity_to(const PosedFrame& frame) const {
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
   return tangent_from_rigid3(step) / (frame.timestamp - last_->timestamp);
 }
@@ -324,7 +347,7 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
   int in_map = 0;
   for (size_t f = 0; f < frame.points.size(); ++f)
     if (frame.points[f] != kNoPoint) {
-      pairs.push_back({static_cast<int>(f), *position(frame.points[f])});
+      pairs.push_back({static_cast<int>(f), frame.matched_in_world[f]});
       ++in_map;
     }
   for (size_t f = 0; f < frame.points.size(); ++f)
@@ -374,7 +397,7 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
 bool Tracker::confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input) {
   if (!unconfirmed_) return false;
   const TrackingState before = state_;
-  std::optional<TrackedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
+  std::optional<PosedFrame> before_loss = std::exchange(last_, std::exchange(unconfirmed_, std::nullopt));
   state_ = TrackingState::tracking;
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;  // it is of the way that this sighting contradicts

@@ -69,7 +69,7 @@ class Tracker {
   void retract(const std::vector<PointId>& points);
   // The map points near the last frame that its pose puts in view.
   std::vector<PointInView> points_in_view() const;
-  const std::optional<TrackedFrame>& last_frame() const { return last_; }
+  const std::optional<PosedFrame>& last_frame() const { return last_; }
 
   // Points of the reference keyframe that another keyframe sees as well; all of them where a map begins.
   int reference_point_count(KeyframeId reference) const;
@@ -116,14 +116,15 @@ class Tracker {
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
   bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);
-  Rigid3 express_anew(TrackedFrame& frame) const;
+  Rigid3 express_anew(PosedFrame& frame) const;
   bool start_map(TrackedFrame& frame, const PosePrediction* expected);
   // `accept`: what else a pose must fulfil; may be empty.
   bool track_local_map(const Rigid3& initial, double radius, int min_inliers, std::vector<PointId>& points,
                        TrackedFrame& frame, const std::function<bool(const PoseEstimate&)>& accept = {});
   bool is_retracted(PointId id) const;
   void refresh_candidates(const std::vector<PointId>& points, double now);
-  Vector6d velocity_to(const TrackedFrame& frame) const;
+  std::vector<uint8_t> candidates_to_skip(const std::vector<PointId>& matched) const;
+  Vector6d velocity_to(const PosedFrame& frame) const;
   bool refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
   void leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const;
   void remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next);
@@ -144,16 +145,17 @@ class Tracker {
   std::vector<PointId> unreported_;  // of these, what mapping was not told yet
 
   TrackingState state_ = TrackingState::initialising;
-  std::optional<TrackedFrame> last_;         // last frame with a pose
+  std::optional<PosedFrame> last_;           // last frame with a pose
   OdometryPoints odometry_;                  // from the last frame
   PlaceEvidence place_evidence_;             // of the frames since the camera was lost
-  std::optional<TrackedFrame> unconfirmed_;  // where the frame before was found again, to be confirmed
+  std::optional<PosedFrame> unconfirmed_;    // where the frame before was found again, to be confirmed
   std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
   VelocityFilter filter_;                    // of the same, with its covariance
   double last_seen_ = 0;                     // [s] when the images told the pose last
   std::optional<PosePrediction> suggested_;  // by the user
   std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map
-  std::vector<Candidate> candidates_;        // from the view
+  std::vector<Candidate> candidates_;        // from the view, then of provisional points; either by increasing id
+  size_t from_view_ = 0;                     // of these, the first
   std::optional<double> candidates_made_;    // [s] nothing = the view is newer
 };
 

@@ -46,9 +46,13 @@ std::vector<PointInView> Tracker::points_in_view() const {
     if (p.z() < 0.1) return;
     if (const auto at = pixel_in_view(optics_.camera, p)) in_view.push_back({id, *at, p.z()});
   };
-  for (const Candidate& c : candidates_)
-    if (!is_retracted(c.id)) offer(c.id, c.position);
-  for (const auto& [id, p] : provisional_) offer(id, *position(id));
+  auto retracted = retracted_.begin();
+  for (size_t i = 0; i < from_view_; ++i) {
+    const Candidate& c = candidates_[i];
+    while (retracted != retracted_.end() && *retracted < c.id) ++retracted;
+    if (retracted == retracted_.end() || *retracted != c.id) offer(c.id, c.position);
+  }
+  for (const auto& [id, p] : provisional_) offer(id, map_.world_from_pending(p.keyframe) * p.point_in_keyframe);
   return in_view;
 }
 

@@ -76,6 +76,8 @@ void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, Tracked
     std::replace(next.points.begin(), next.points.end(), id, kNoPoint);
     std::replace(next.matched.begin(), next.matched.end(), id, kNoPoint);
   }
+  for (size_t f = 0; f < next.matched.size(); ++f)
+    if (next.matched[f] != kNoPoint) next.matched_in_world[f] = *position(next.matched[f]);
   last_->features = features;
   next.start_features = std::move(features);
 }

@@ -110,7 +110,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   for (size_t f = 0; f < frame.matched.size(); ++f) {
     if (frame.matched[f] == kNoPoint) continue;
     matched.push_back(f);
-    observations.push_back(pose_observation(frame.features->keypoints[f], *position(frame.matched[f]), optics_));
+    observations.push_back(pose_observation(frame.features->keypoints[f], frame.matched_in_world[f], optics_));
   }
   const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers);
   if (!moves) return;

@@ -11,11 +11,13 @@ namespace dkb {
 void TrackingMap::take_view(MapView view) {
   view_ = std::move(view);
   std::erase_if(pending_, [&](const Pending& p) { return view_->keyframe(p.id) != nullptr; });
+  for (Pending& p : pending_) p.world_from_cam = placed(p).inverse();
 }
 
 void TrackingMap::add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference,
                               const Matrix6d& covariance) {
-  pending_.push_back({id, reference, cam_from_reference, covariance});
+  pending_.push_back({id, reference, cam_from_reference, covariance, {}});
+  pending_.back().world_from_cam = placed(pending_.back()).inverse();
 }
 
 const TrackingMap::Pending& TrackingMap::pending(KeyframeId id) const {
@@ -26,7 +28,10 @@ const TrackingMap::Pending& TrackingMap::pending(KeyframeId id) const {
 
 Rigid3 TrackingMap::cam_from_world(KeyframeId id) const {
   if (view_->keyframe(id) != nullptr) return view_->cam_from_world(id);
-  const Pending& p = pending(id);
+  return placed(pending(id));
+}
+
+Rigid3 TrackingMap::placed(const Pending& p) const {
   return p.reference == kNoKeyframe ? p.cam_from_reference : p.cam_from_reference * cam_from_world(p.reference);
 }
 

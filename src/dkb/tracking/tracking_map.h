@@ -23,6 +23,8 @@ class TrackingMap {
   // frames that follow rest on the same points as they do.
   void add_pending(KeyframeId id, KeyframeId reference, const Rigid3& cam_from_reference, const Matrix6d& covariance);
 
+  // Of a keyframe that is not in the view. Throws std::logic_error for one that was never made.
+  const Rigid3& world_from_pending(KeyframeId id) const { return pending(id).world_from_cam; }
   // Pose of a keyframe. Throws std::logic_error for one that was never made.
   Rigid3 cam_from_world(KeyframeId id) const;
   // Of the map where this keyframe is: left perturbation of world_from_cam, [translation m, rotation rad]. For one that
@@ -36,7 +38,9 @@ class TrackingMap {
     KeyframeId id = kNoKeyframe, reference = kNoKeyframe;
     Rigid3 cam_from_reference;
     Matrix6d covariance;
+    Rigid3 world_from_cam;  // by the view
   };
+  Rigid3 placed(const Pending& p) const;
   const Pending& pending(KeyframeId id) const;
 
   MapView view_;
