@@ -106,6 +106,15 @@ TEST_F(Bench, ARunThatCrashesIsARowThatSaysSo) {
   EXPECT_NE(retry.out.find("1 runs done, 0 of them failed; 3 were there already"), std::string::npos) << retry.out;
 }
 
+TEST_F(Bench, ARunThatFailsBeforeItWritesIsARowAndTheOthersGoOn) {
+  const fs::path file = suite(suite_text());
+  const std::string failing = program_that("echo 'error: no memory' >&2; exit 1");
+  const Finished run = bench({file.string(), "--out", out(), "--program", failing});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(records(temp_ / "out"), 4u);
+  EXPECT_EQ(results()["cells"][0]["runs"][1]["failure"], "no memory");
+}
+
 TEST_F(Bench, IsAFailureWhereEveryRunFailed) {
   write_text(temp_ / "failing", "#!/bin/sh\nexit 3\n");
   fs::permissions(temp_ / "failing", fs::perms::owner_all);

@@ -101,7 +101,7 @@ std::string bar_panels_svg(const std::string& title, const std::string& unit, co
 
 std::string compared_paths_svg(const std::string& title, const Trajectory& truth,
                                const std::vector<ComparedPath>& paths) {
-  constexpr double kWidth = 960, kSide = 385, kTall = 360;
+  constexpr double kWidth = 960, kTall = 360;
   std::vector<std::pair<const char*, std::string>> legend = {{kTruth, "ground truth (dashed)"}};
   for (const ComparedPath& path : paths) legend.emplace_back(colour_of(path.place), path.name);
   std::string body = svg::label(70, 34, "start", 18, svg::kInk, title, " font-weight=\"bold\"");
@@ -147,22 +147,14 @@ std::string compared_paths_svg(const std::string& title, const Trajectory& truth
       }
     range[a] = ends.empty() ? svg::Range{0, 1} : svg::range_of(ends);
   }
-  std::array<size_t, 3> order{0, 1, 2};
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return range[a].length() > range[b].length(); });
-  static constexpr const char* kAxisName[] = {"x [m]", "y [m]", "z [m]"};
-  for (size_t side = 0; side < 2; ++side) {
-    const size_t h = order[0], v = order[side + 1];
-    svg::Range x = range[h], y = range[v];
-    svg::frame_equally(kSide, kTall, &x, &y);
-    const svg::Panel panel(70 + 470 * static_cast<double>(side), top, kSide, kTall, x, y);
-    body += panel.axes(kAxisName[h], kAxisName[v]);
+  for (const svg::Projection& p : svg::widest_projections(range, top, kTall)) {
+    body += p.axes();
     for (size_t c = 0; c < curves.size(); ++c) {
-      if (curves[c].axis[h].empty()) continue;
+      if (curves[c].axis[p.across].empty()) continue;
       const bool is_truth = c < true_curves;
-      body += panel.path(curves[c].axis[h], curves[c].axis[v], curves[c].starts,
-                         is_truth ? kTruth : colour_of(paths[c - true_curves].place), is_truth ? 2.2 : 1.4,
-                         is_truth ? " stroke-dasharray=\"6 4\"" : "");
+      body += p.panel.path(curves[c].axis[p.across], curves[c].axis[p.up], curves[c].starts,
+                           is_truth ? kTruth : colour_of(paths[c - true_curves].place), is_truth ? 2.2 : 1.4,
+                           is_truth ? " stroke-dasharray=\"6 4\"" : "");
     }
   }
   return svg::opening(kWidth, top + kTall + 50) + body + "</svg>\n";

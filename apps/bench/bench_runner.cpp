@@ -19,6 +19,7 @@
 #include <thread>
 
 #include "bench/bench_process.h"
+#include "bench/fnv1a.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/util/errors.h"
@@ -33,18 +34,20 @@ namespace {
 
 struct Interrupted {};
 
-// Host and process: names what this bench has under way, on file systems that several machines share.
-std::string own_name() {
+std::string host_prefix() {
   char host[256] = {};
   gethostname(host, sizeof host - 1);
-  return fmt::format("{}-{}", host, getpid());
+  return std::string(host) + "-";
+}
+
+// Host and process: names what this bench has under way, on file systems that several machines share.
+std::string own_name() {
+  return host_prefix() + std::to_string(getpid());
 }
 
 // Runs that a killed bench left behind on this host.
 void remove_stale_work(const fs::path& work) {
-  char host[256] = {};
-  gethostname(host, sizeof host - 1);
-  const std::string prefix = std::string(host) + "-";
+  const std::string prefix = host_prefix();
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(work, error)) {
     const std::string name = entry.path().filename().string();
@@ -74,6 +77,18 @@ class WorkFolder {
  private:
   fs::path path_;
 };
+
+// Whether the disk takes as much as a run may leave.
+bool has_room(const fs::path& folder) {
+  constexpr off_t kRoom = off_t{64} << 20;  // [bytes]
+  const fs::path probe = folder / "room";
+  const int fd = ::open(probe.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0644);
+  const bool room = fd >= 0 && posix_fallocate(fd, 0, kRoom) == 0;
+  if (fd >= 0) ::close(fd);
+  std::error_code ignored;
+  fs::remove(probe, ignored);
+  return room;
+}
 
 // One line that renews itself on a terminal; a line per run elsewhere.
 class Progress {
@@ -374,13 +389,13 @@ class Runner {
     return r;
   }
 
-  // Keeps what a run left. Throws OutputError when the disk is full, of which a run's failure may be the first sign.
+  // Keeps what a run left. Throws OutputError when the disk is full, of which a run's failure may be the first sign:
+  // statistics are the last of its results.
   RunRecord finish(const Running& run, const Ended& how, const std::string& failure) const {
     const RunRecord r = record_of(run, how, failure);
-    // Statistics are the last of a run's results: a run that went wrong without them could not write.
-    if (how.exit_code == 1 && !fs::exists(run.out / "stats.json"))
-      throw OutputError(r.failure + "; finished runs are kept, start again to go on");
     std::error_code ignored;
+    if (how.exit_code == 1 && !fs::exists(run.out / "stats.json", ignored) && !has_room(run.out))
+      throw OutputError(r.failure + "; finished runs are kept, start again to go on");
     const fs::path trajectory = run.out / "trajectory.txt";
     const fs::path truth = folder_.truth_path(run.job.sequence);
     if (r.ape && !fs::exists(truth, ignored)) {
@@ -449,13 +464,12 @@ RunnerReport run_jobs(const ResultsFolder& folder, const std::vector<Job>& jobs,
 }
 
 std::string program_id(const fs::path& program) {
-  uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
+  uint64_t hash = kFnv1aStart;
   // In blocks, as a run's own memory is measured.
   std::ifstream file(program, std::ios::binary);
   std::vector<char> block(1 << 16);
   while (file.read(block.data(), static_cast<std::streamsize>(block.size())), file.gcount() > 0)
-    for (std::streamsize i = 0; i < file.gcount(); ++i)
-      hash = (hash ^ static_cast<unsigned char>(block[static_cast<size_t>(i)])) * 0x100000001B3ULL;
+    hash = fnv1a({block.data(), static_cast<size_t>(file.gcount())}, hash);
   if (!file.eof()) throw InputError(program.string() + ": cannot be read");
   return fmt::format("{} {:016x}", DKB_SLAM_VERSION, hash);
 }

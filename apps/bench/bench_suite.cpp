@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "bench/fnv1a.h"
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -398,10 +399,7 @@ std::string suite_hash(const Suite& suite) {
                              {"classes", v.classes},
                              {"inference", v.inference},
                              {"set", v.set}});
-  uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (const char c : j.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
-  return fmt::format("{:016x}", hash);
+  return fmt::format("{:016x}", fnv1a(j.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)));
 }
 
 std::vector<Job> jobs_of(const Suite& suite) {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dkb/dataset/image_codecs.h"
+#include "dkb/dataset/reduced_jpeg.h"
 #include "dkb/evaluation/svg_drawing.h"
 
 namespace dkb::report {
@@ -14,46 +14,6 @@ namespace {
 
 constexpr double kWantedWidth = 320;  // [px] wanted
 constexpr int kQuality = 72;
-
-// Means over blocks of `factor` pixels a side. `channels` bytes a pixel.
-std::vector<uint8_t> reduced(const ImageView& image, int factor, int channels) {
-  const int width = image.width / factor, height = image.height / factor;
-  std::vector<uint8_t> out(static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels));
-  std::vector<uint16_t> column(image.row_bytes());
-  // Multiplied in the place of divided: exact, since a sum is less than 2^32 / area.
-  const auto area = static_cast<uint64_t>(factor) * static_cast<uint64_t>(factor);
-  const uint64_t share = ((uint64_t{1} << 32) + area - 1) / area;
-  uint8_t* to = out.data();
-  for (int y = 0; y < height; ++y) {
-    std::fill(column.begin(), column.end(), uint16_t{0});
-    for (int dy = 0; dy < factor; ++dy) {
-      const uint8_t* in = image.row(y * factor + dy);
-      for (size_t i = 0; i < column.size(); ++i) column[i] = static_cast<uint16_t>(column[i] + in[i]);
-    }
-    for (int x = 0; x < width; ++x)
-      for (int c = 0; c < channels; ++c) {
-        uint32_t sum = 0;
-        for (int dx = 0; dx < factor; ++dx) sum += column[static_cast<size_t>((x * factor + dx) * channels + c)];
-        *to++ = static_cast<uint8_t>(sum * share >> 32);
-      }
-  }
-  return out;
-}
-
-std::string jpeg_of(const Frame& frame, int factor) {
-  const bool colour = !frame.colour().empty();
-  const ImageView image = colour ? frame.colour() : frame.grey();
-  const std::vector<uint8_t> pixels = reduced(image, factor, colour ? 3 : 1);
-  const int width = image.width / factor, height = image.height / factor;
-  if (!colour) {
-    GreyImage small(width, height);
-    std::copy(pixels.begin(), pixels.end(), small.data());
-    return encode_jpeg(small, kQuality);
-  }
-  ColourImage small(width, height);
-  for (size_t i = 0; i < small.size(); ++i) small.data()[i] = {pixels[3 * i], pixels[3 * i + 1], pixels[3 * i + 2]};
-  return encode_jpeg(small, kQuality);
-}
 
 const char* shape_of(FeatureState state) {
   switch (state) {
@@ -102,8 +62,8 @@ std::string base64(const std::string& bytes) {
 OverlayPicture take_picture(size_t row, const Frame& frame, const FrameResult& result) {
   const int full_width = frame.grey().width, full_height = frame.grey().height;
   const int factor = std::max(1, static_cast<int>(std::lround(full_width / kWantedWidth)));
-  OverlayPicture picture{row, full_width / factor, full_height / factor, 1.0 / factor, jpeg_of(frame, factor), {}, {},
-                         {}};
+  OverlayPicture picture{
+      row, full_width / factor, full_height / factor, 1.0 / factor, reduced_jpeg(frame, factor, kQuality), {}, {}, {}};
   for (const FeatureReport& f : result.features)
     picture.marks.push_back({static_cast<int16_t>(std::lround(f.image_x / static_cast<float>(factor))),
                              static_cast<int16_t>(std::lround(f.image_y / static_cast<float>(factor))), f.state});

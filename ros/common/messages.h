@@ -77,6 +77,7 @@ OdometryMessage odometry_from(const Message& m, int64_t stamp_ns) {
   odometry.twist << m.twist.twist.linear.x, m.twist.twist.linear.y, m.twist.twist.linear.z, m.twist.twist.angular.x,
       m.twist.twist.angular.y, m.twist.twist.angular.z;
   odometry.twist_covariance = covariance_from(m.twist.covariance);
+  odometry.pose_covariance = covariance_from(m.pose.covariance);
   return odometry;
 }
 

@@ -13,8 +13,11 @@ constexpr int64_t kMaxGyroGap = 100'000'000;  // [ns] the same of angular veloci
 constexpr int64_t kMaxAhead = 100'000'000;    // [ns] beyond the newest message
 constexpr size_t kMaxMessages = 4000;         // 10 s at 400 Hz
 constexpr int kMostRefused = 10;              // messages in a row
-constexpr double kMinSd = 1e-4;               // [m, rad] no sensor is better between two images
-constexpr double kGyroBias = 0.005;           // [rad/s] standard deviation of what a gyroscope shows at rest
+// The library's recordings are read with the same numbers: src/dkb/dataset/odometry_track.h and recorded_motion.cpp.
+constexpr double kMinSd = 1e-3;      // [m, rad] of any motion: wheels slip and shake
+constexpr double kDriftLength = 10;  // [m, rad] that the drift is told for
+constexpr double kGyroBias = 0.01;   // [rad/s] standard deviation of what a gyroscope shows at rest
+constexpr double kUnknown = 1;       // [m^2, rad^2] a larger variance is as good as unknown
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -28,10 +31,8 @@ Matrix6d turned(const Eigen::Quaterniond& rotation) {
   return m;
 }
 
-Matrix6d with_floor(Matrix6d covariance) {
-  covariance = (0.5 * (covariance + covariance.transpose())).eval();
-  covariance.diagonal().array() += kMinSd * kMinSd;
-  return covariance;
+bool tells(double variance) {
+  return std::isfinite(variance) && variance > 0;
 }
 
 template <class Message>
@@ -101,49 +102,56 @@ Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam,
 bool OdometryHistory::add(const OdometryMessage& message) {
   const bool finite = message.pose.translation.allFinite() && message.pose.rotation.coeffs().allFinite() &&
                       std::abs(message.pose.rotation.norm() - 1) < 0.01 && message.twist.allFinite() &&
-                      message.twist_covariance.allFinite();
+                      message.twist_covariance.allFinite() && message.pose_covariance.allFinite();
   if (!finite || !take_stamp(&messages_, &refused_, message.stamp_ns)) return false;
   keep(&messages_, message);
   messages_.back().pose.rotation.normalize();
   return true;
 }
 
-std::optional<Rigid3> OdometryHistory::pose_at(int64_t stamp_ns) const {
+std::optional<OdometryHistory::Moment> OdometryHistory::at(int64_t stamp_ns) const {
   const auto after = first_not_before(messages_, stamp_ns);
   if (after == messages_.end()) {
     if (empty() || stamp_ns - messages_.back().stamp_ns > kMaxAhead) return std::nullopt;
     const OdometryMessage& last = messages_.back();
     const double dt = kNs * static_cast<double>(stamp_ns - last.stamp_ns);
-    return last.pose * Rigid3(rotation_by(dt * last.twist.tail<3>()), dt * last.twist.head<3>());
+    return Moment{last.pose * Rigid3(rotation_by(dt * last.twist.tail<3>()), dt * last.twist.head<3>()),
+                  Vector6d::Zero()};
   }
-  if (after->stamp_ns == stamp_ns) return after->pose;
+  if (after->stamp_ns == stamp_ns) return Moment{after->pose, after->pose_covariance.diagonal()};
   if (after == messages_.begin()) return std::nullopt;
   const OdometryMessage &a = *(after - 1), &b = *after;
   if (b.stamp_ns - a.stamp_ns > kMaxGap) return std::nullopt;
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
-  return Rigid3(a.pose.rotation.slerp(share, b.pose.rotation),
-                a.pose.translation + share * (b.pose.translation - a.pose.translation));
+  const Vector6d first = a.pose_covariance.diagonal(), second = b.pose_covariance.diagonal();
+  return Moment{{a.pose.rotation.slerp(share, b.pose.rotation),
+                 a.pose.translation + share * (b.pose.translation - a.pose.translation)},
+                first + share * (second - first)};
 }
 
 std::optional<dkb::MotionPrior> OdometryHistory::between(int64_t from_ns, int64_t to_ns) const {
-  const std::optional<Rigid3> from = pose_at(from_ns), to = pose_at(to_ns);
+  const std::optional<Moment> from = at(from_ns), to = at(to_ns);
   if (!from || !to) return std::nullopt;
   dkb::MotionPrior prior;
-  prior.previous_from_current = from->inverse() * *to;
+  prior.previous_from_current = from->pose.inverse() * to->pose;
   const auto nearest = first_not_before(messages_, to_ns);
-  const OdometryMessage& message = nearest == messages_.end() ? messages_.back() : *nearest;
+  const bool ahead = nearest == messages_.end();  // how the pose's covariance grew until then is not told
+  const OdometryMessage& message = ahead ? messages_.back() : *nearest;
   const double dt = kNs * static_cast<double>(to_ns - from_ns);
-  if (message.twist_covariance.isZero()) {
-    const double way = prior.previous_from_current.translation.norm();
-    const double turn = Eigen::Quaterniond::Identity().angularDistance(prior.previous_from_current.rotation);
-    const double sd_m = drift_ * way + 1e-3, sd_rad = drift_ * (turn + way) + 1e-3;
-    prior.covariance.setZero();
-    prior.covariance.diagonal().head<3>().setConstant(sd_m * sd_m);
-    prior.covariance.diagonal().tail<3>().setConstant(sd_rad * sd_rad);
-  } else {
-    prior.covariance = dt * dt * message.twist_covariance;
+  const double distance = prior.previous_from_current.translation.norm();
+  const double angle = Eigen::Quaterniond::Identity().angularDistance(prior.previous_from_current.rotation);
+  const Eigen::Matrix3d child_from_parent = to->pose.matrix3().transpose();
+  Vector6d growth = to->variance - from->variance;
+  growth << child_from_parent.cwiseAbs2() * growth.head<3>(), child_from_parent.cwiseAbs2() * growth.tail<3>();
+  prior.covariance.setZero();
+  for (int i = 0; i < 6; ++i) {
+    double variance = drift_ * drift_ * kDriftLength * (i < 3 ? distance : distance + angle);
+    if (!ahead && tells(growth(i)))
+      variance = growth(i);
+    else if (tells(message.twist_covariance(i, i)))
+      variance = dt * dt * message.twist_covariance(i, i);
+    prior.covariance(i, i) = std::min(variance + kMinSd * kMinSd, kUnknown);
   }
-  prior.covariance = with_floor(prior.covariance);
   return prior;
 }
 
@@ -159,26 +167,31 @@ std::optional<dkb::MotionPrior> GyroHistory::between(int64_t from_ns, int64_t to
   if (empty() || to_ns <= from_ns) return std::nullopt;
   auto sample = first_not_before(messages_, from_ns);
   if (sample == messages_.begin() && sample->stamp_ns > from_ns) return std::nullopt;
-  // Each sample holds until the next one; the first is the last before `from`.
+  // From the last sample before `from` on. The newest one holds.
   if (sample == messages_.end() || sample->stamp_ns > from_ns) --sample;
   dkb::MotionPrior prior;
   prior.rotation_only = true;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d variance = Eigen::Vector3d::Constant(kGyroBias * kGyroBias);
   for (int64_t at = from_ns; at < to_ns; ++sample) {
     const auto next = sample + 1;
     const int64_t until = next == messages_.end() ? to_ns : std::min(next->stamp_ns, to_ns);
     if (until - sample->stamp_ns > kMaxGyroGap) return std::nullopt;
     const double dt = kNs * static_cast<double>(until - at);
-    prior.previous_from_current.rotation =
-        (prior.previous_from_current.rotation * rotation_by(dt * sample->angular_velocity)).normalized();
-    covariance += dt * dt * sample->covariance;
+    Eigen::Vector3d rate = sample->angular_velocity;
+    if (next != messages_.end()) {  // its mean over the part within the interval
+      const double middle = 0.5 * static_cast<double>((at - sample->stamp_ns) + (until - sample->stamp_ns)) /
+                            static_cast<double>(next->stamp_ns - sample->stamp_ns);
+      rate += middle * (next->angular_velocity - sample->angular_velocity);
+    }
+    prior.previous_from_current.rotation = (prior.previous_from_current.rotation * rotation_by(dt * rate)).normalized();
+    for (int axis = 0; axis < 3; ++axis)
+      if (tells(sample->covariance(axis, axis))) variance(axis) = sample->covariance(axis, axis);
     at = until;
   }
-  const double bias = kGyroBias * kNs * static_cast<double>(to_ns - from_ns);
-  covariance.diagonal().array() += bias * bias;
+  const double duration = kNs * static_cast<double>(to_ns - from_ns);
   prior.covariance.setIdentity();
-  prior.covariance.bottomRightCorner<3, 3>() = covariance;
-  prior.covariance = with_floor(prior.covariance);
+  for (int axis = 0; axis < 3; ++axis)
+    prior.covariance(3 + axis, 3 + axis) = std::min(duration * duration * variance(axis) + kMinSd * kMinSd, kUnknown);
   return prior;
 }
 

@@ -28,7 +28,8 @@ Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam,
 // Poses of wheel odometry; answers with the motion between two times.
 class OdometryHistory {
  public:
-  // `drift`: [m per m, rad per rad, rad per m] assumed where the messages give no covariance.
+  // `drift`: the share that ten metres, or ten radians, are off by where the messages give no covariance. A shorter
+  // motion is off by more: its standard deviation grows with the root of it.
   explicit OdometryHistory(double drift) : drift_(drift) {}
 
   // False when its stamp does not rise or a number is not finite; it is left out then. After ten stamps in a row that
@@ -38,12 +39,18 @@ class OdometryHistory {
   bool empty() const { return messages_.empty(); }
   const std::string& child_frame_id() const { return messages_.back().child_frame_id; }
 
-  // The motion of the child frame; its covariance is that of a right perturbation in the child frame's axes. Poses are
-  // interpolated, and carried on by the twist for at most 0.1 s after the newest. Nothing where messages are missing.
+  // The motion of the child frame; its covariance is that of a right perturbation in the child frame's axes: in each
+  // direction the growth of the pose's; else, where that tells nothing, the twist's; else that of the drift; and 1 mm
+  // and 1 mrad. So it is in recordings, too. Poses are interpolated, and carried on by the twist for at most 0.1 s
+  // after the newest. Nothing where messages are missing.
   std::optional<dkb::MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
 
  private:
-  std::optional<Rigid3> pose_at(int64_t stamp_ns) const;
+  struct Moment {
+    Rigid3 pose;
+    Vector6d variance = Vector6d::Zero();  // of the pose, in the axes of the frame that stands still
+  };
+  std::optional<Moment> at(int64_t stamp_ns) const;
 
   double drift_;
   std::deque<OdometryMessage> messages_;  // by stamp
@@ -58,7 +65,8 @@ class GyroHistory {
   bool empty() const { return messages_.empty(); }
   const std::string& frame_id() const { return messages_.back().frame_id; }
 
-  // The rotation of the sensor's frame. Nothing where samples are more than 0.1 s apart.
+  // The rotation of the sensor's frame, by rates that change evenly from sample to sample; their covariance, or
+  // 0.01 rad/s where there is none, times the duration, and 1 mrad. Nothing where samples are more than 0.1 s apart.
   std::optional<dkb::MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
 
  private:

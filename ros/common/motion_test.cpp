@@ -70,8 +70,34 @@ TEST(OdometryHistory, GivesTheMotionBetweenItsMessages) {
   EXPECT_TRUE(history.between(980 * kMillisecond, 1033 * kMillisecond));
   EXPECT_FALSE(history.between(980 * kMillisecond, 1133 * kMillisecond));
   EXPECT_FALSE(history.between(-10 * kMillisecond, 33 * kMillisecond));
-  // 2% of 0.0165 m and 1 mm.
-  EXPECT_NEAR(std::sqrt(prior->covariance(0, 0)), 0.02 * 0.0165 + 1e-3, 1e-4);
+}
+
+TEST(OdometryHistory, IsAsSureAsARecordingsWithoutCovariances) {
+  OdometryHistory history(0.01);
+  history.add(odometry_at(0)), history.add(odometry_at(100 * kMillisecond));
+  const Matrix6d covariance = history.between(0, 100 * kMillisecond)->covariance;
+  // 5 cm and 0.04 rad: (1 mm)^2 + 0.01^2 * 10 m * 0.05 m, and + 0.01^2 * 10 * (0.05 + 0.04).
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(covariance(i, i), 1e-6 + 5e-5, 1e-7);
+  for (int i = 3; i < 6; ++i) EXPECT_NEAR(covariance(i, i), 1e-6 + 9e-5, 1e-7);
+}
+
+TEST(OdometryHistory, CovariancesOfThePoseGoBeforeThoseOfTheTwist) {
+  OdometryMessage first = odometry_at(0), second = odometry_at(100 * kMillisecond);
+  second.pose.rotation.setIdentity();
+  second.twist_covariance(0, 0) = 4, second.twist_covariance(5, 5) = 9;  // x, about z
+  const auto covariance = [&](int64_t from_ns, int64_t to_ns) {
+    OdometryHistory history(0.01);
+    history.add(first), history.add(second);
+    return history.between(from_ns, to_ns)->covariance;
+  };
+  EXPECT_NEAR(covariance(0, second.stamp_ns)(0, 0), 4 * 0.01 + 1e-6, 1e-9);
+  EXPECT_NEAR(covariance(0, second.stamp_ns)(5, 5), 9 * 0.01 + 1e-6, 1e-9);
+  first.pose_covariance(0, 0) = 0.5, second.pose_covariance(0, 0) = 0.7;
+  EXPECT_NEAR(covariance(0, second.stamp_ns)(0, 0), 0.2 + 1e-6, 1e-9);
+  EXPECT_NEAR(covariance(second.stamp_ns, second.stamp_ns + 100 * kMillisecond)(0, 0), 4 * 0.01 + 1e-6, 1e-9)
+      << "carried on by the twist";
+  second.pose_covariance(0, 0) = 1e9;
+  EXPECT_EQ(covariance(0, second.stamp_ns)(0, 0), 1) << "as good as unknown";
 }
 
 TEST(OdometryHistory, LeavesOutWhatIsLateOrNoNumber) {
@@ -119,10 +145,24 @@ TEST(GyroHistory, AddsUpRotations) {
   ASSERT_TRUE(prior);
   EXPECT_TRUE(prior->rotation_only);
   EXPECT_LT(prior->previous_from_current.rotation.angularDistance(rotation_by({0, 0, 0.4 * 0.095})), 1e-9);
+  // 0.01 rad/s for 95 ms, and 1 mrad.
+  EXPECT_NEAR(prior->covariance(3, 3), 1e-4 * 0.095 * 0.095 + 1e-6, 1e-12);
   EXPECT_FALSE(history.between(3 * kMillisecond, 300 * kMillisecond));
   m.stamp_ns = 200 * kMillisecond;
   m.covariance(0, 0) = -1;  // an imu without a gyroscope
   EXPECT_FALSE(history.add(m));
+}
+
+// From 0 to 1 rad/s in 0.1 s: after t seconds 5 t^2 rad.
+TEST(GyroHistory, RatesChangeEvenlyFromSampleToSample) {
+  GyroHistory history;
+  ImuMessage m;
+  history.add(m);
+  m.stamp_ns = 100 * kMillisecond, m.angular_velocity = {0, 0, 1};
+  history.add(m);
+  const auto prior = history.between(20 * kMillisecond, 60 * kMillisecond);
+  ASSERT_TRUE(prior);
+  EXPECT_LT(prior->previous_from_current.rotation.angularDistance(rotation_by({0, 0, 5 * (0.0036 - 0.0004)})), 1e-9);
 }
 
 TEST(MotionPrior, OfTheBaseIsTheCamerasAfterTheMount) {

@@ -26,7 +26,7 @@ struct Parameters {
   int queue_size = 10;
 
   PriorKind prior = PriorKind::automatic;
-  double prior_drift = 0.02;
+  double prior_drift = 0.01;
 
   dkb::DetectorChoice detector;
   std::string load_map;

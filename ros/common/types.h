@@ -49,6 +49,7 @@ struct OdometryMessage {
   Rigid3 pose;                                   // of the child frame in a frame that stands still
   Vector6d twist = Vector6d::Zero();             // [v m/s, w rad/s] in the child frame
   Matrix6d twist_covariance = Matrix6d::Zero();  // of `twist`; zero = unknown
+  Matrix6d pose_covariance = Matrix6d::Zero();   // of `pose`, in the axes of the frame that stands still; likewise
 };
 
 struct ImuMessage {

@@ -68,6 +68,7 @@ export class View {
   private measured: THREE.Vector3[] = [];
   private whole: { at: THREE.Vector3; radius: number } | null = null; // the map, once the run has ended
   private dirty = true;
+  private aligned = false; // the truth, with this world
   private lastDrawn = 0;
   private movedAt = 0;
   private coarse = false; // what is seen is not the whole map
@@ -124,6 +125,12 @@ export class View {
     this.known.clear();
     this.edges.clear();
     this.clearPath();
+    // What lay in the world before, or was laid on it, is not to be shown in this one.
+    for (const dense of [this.surface, this.grid]) {
+      dense.geometry.dispose();
+      dense.geometry = new THREE.BufferGeometry();
+    }
+    this.aligned = false;
     this.truth.visible = this.surface.visible = this.grid.visible = false;
     const c = hello.camera, z = 0.16;
     const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
@@ -166,12 +173,11 @@ export class View {
     this.staleEdges = true;
     this.dirty = true;
   }
-  takeLoops(data: DataView): number {
+  takeLoops(data: DataView): void {
     this.loops.clear();
     for (let at = 0; at < data.byteLength; at += 12)
       this.loops.add(data.getInt32(at, true), [0, 0, 0], data.getInt32(at + 4, true), [0, 0, 0]);
     this.dirty = true;
-    return data.byteLength / 12;
   }
   clearPath(): void {
     this.path.clear();
@@ -250,6 +256,7 @@ export class View {
     }
     if (worldFromTruth) {
       this.truth.matrix.copy(this.matrix(worldFromTruth));
+      this.aligned = true;
       this.truth.visible = !this.hidden.has("truth");
     }
     this.moverList = movers;
@@ -285,7 +292,8 @@ export class View {
       points: this.cloud.group, keyframes: this.keyframes.object, covisibility: this.covisibility.object,
       path: this.path.object, movers: this.movers, truth: this.truth, loops: this.loops.object, surface: this.surface, grid: this.grid,
     };
-    const empty = (layer === "surface" || layer === "grid") && !(objects[layer] as THREE.Mesh).geometry.index;
+    const dense = layer === "surface" || layer === "grid";
+    const empty = dense ? !(objects[layer] as THREE.Mesh).geometry.index : layer === "truth" && !this.aligned;
     objects[layer].visible = on && !empty;
     this.dirty = true;
   }
@@ -482,6 +490,8 @@ export class View {
     data.calls = String(this.renderer.info.render.calls);
     data.geometries = String(this.renderer.info.memory.geometries);
     data.look = this.camera.position.toArray().map((x) => x.toFixed(3)).join(" ");
+    data.surface = String(this.surface.visible);
+    data.truth = String(this.truth.visible);
     data.drawn = String(Number(data.drawn ?? 0) + 1);
   }
   private label(): void {

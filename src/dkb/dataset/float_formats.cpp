@@ -60,6 +60,9 @@ class Tiff {
       throw InputError(name_ + ": is a compressed TIFF, which is not supported; store it without compression");
     if (fields_.count(322) != 0 || fields_.count(273) == 0)
       throw InputError(name_ + ": is a TIFF in tiles, which is not supported; store it in strips");
+    // Strips may all name one place: memory is set aside for as much as the file holds.
+    if (4 * static_cast<size_t>(header_.width) * static_cast<size_t>(header_.height) > bytes_.size())
+      broken(name_, "TIFF", "the file is truncated");
     Image<float> image(header_.width, header_.height);
     const std::vector<size_t> offsets = values(273);
     const int64_t rows_per_strip = std::max<int64_t>(1, std::min<int64_t>(value(278, header_.height), header_.height));

@@ -161,6 +161,24 @@ TEST(FloatDepth, BigEndianTiffInSeveralStripsIsRead) {
   EXPECT_EQ(depth(0, 1), 2.0f);
 }
 
+// One row of samples, named by every strip.
+TEST(FloatDepth, ATiffHoldsAsManySamplesAsItShows) {
+  const uint32_t side = 64, data = 8, offsets = data + 4 * side, directory = offsets + 4 * side;
+  std::string bytes("II*\0", 4);
+  const auto put = [&bytes](uint32_t value, int n) {
+    for (int i = 0; i < n; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xFF);
+  };
+  put(directory, 4);
+  for (uint32_t i = 0; i < side; ++i) put(0x3F800000, 4);
+  for (uint32_t i = 0; i < side; ++i) put(data, 4);
+  const uint32_t fields[][3] = {{256, 1, side},       {257, 1, side}, {258, 1, 32}, {259, 1, 1},
+                                {273, side, offsets}, {277, 1, 1},    {278, 1, 1},  {339, 1, 3}};
+  put(static_cast<uint32_t>(std::size(fields)), 2);
+  for (const auto& [tag, count, value] : fields) put(tag, 2), put(4, 2), put(count, 4), put(value, 4);
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(bytes, "d.tiff", CameraModel(Camera::named("fr1"))); }),
+            "d.tiff: is a broken TIFF (the file is truncated)");
+}
+
 TEST(ImageCodecs, WrongTypesAreCalledByName) {
   const CameraModel camera;
   const std::string ending = "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY";

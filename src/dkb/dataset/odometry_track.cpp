@@ -61,9 +61,9 @@ std::optional<MotionPrior> OdometryTrack::between(double before, double now) con
   const auto from = at(before), to = at(now);
   if (!from || !to) return std::nullopt;
   MotionPrior prior;
-  prior.previous_from_current = from->inverse() * *to;
-  const double variance = drift_variance(drift_, prior.previous_from_current.translation.norm());
-  prior.covariance = Matrix6d::Identity() * (kMinOdometrySd * kMinOdometrySd + variance);
+  const Rigid3 motion = from->inverse() * *to;
+  prior.previous_from_current = motion;
+  prior.covariance = drift_covariance(drift_, motion.translation.norm(), vector_from_rotation(motion.rotation).norm());
   return prior;
 }
 

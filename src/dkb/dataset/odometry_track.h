@@ -22,6 +22,15 @@ inline double drift_variance(double drift, double way) {
   return drift * drift * way * kLength;
 }
 
+// Of a motion by wheels over `distance` [m] and `angle` [rad]: the way and the heading are off by the drift of the way,
+// the heading by the usual drift of the turn as well. ros/common/motion.cpp has the same numbers.
+inline Matrix6d drift_covariance(double drift, double distance, double angle) {
+  Matrix6d covariance = Matrix6d::Identity() * (kMinOdometrySd * kMinOdometrySd);
+  covariance.diagonal().head<3>().array() += drift_variance(drift, distance);
+  covariance.diagonal().tail<3>().array() += drift_variance(drift, distance) + drift_variance(kUsualDrift, angle);
+  return covariance;
+}
+
 // The pose at `share` (0 ... 1) of the way from one to another.
 inline Rigid3 interpolated(const Rigid3& from, const Rigid3& to, double share) {
   return {from.rotation.slerp(share, to.rotation).normalized(),
@@ -32,7 +41,7 @@ inline Rigid3 interpolated(const Rigid3& from, const Rigid3& to, double share) {
 class OdometryTrack {
  public:
   // Poses of the body in a frame of its own; the body's axes are the camera's. `drift`: the share of a way that its
-  // length is off by, and the heading [rad/m]. Stamps must rise.
+  // length is off by, and the heading [rad/m]; a turn is off by 1% as well. Stamps must rise.
   OdometryTrack(Trajectory odom_from_body, double drift);
 
   // Nothing when one of the times [s] lies outside of the track, or in a gap of more than half a second.

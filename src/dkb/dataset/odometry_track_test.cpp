@@ -50,6 +50,16 @@ TEST(OdometryTrack, OverTenMetresTheDriftIsOneStandardDeviation) {
   EXPECT_NEAR(std::sqrt(whole.covariance(0, 0)), drift * 10, 0.02);
 }
 
+TEST(OdometryTrack, ATurnOnTheSpotIsAsUncertainAsItIsLarge) {
+  const OdometryTrack track({pose(1, 0), pose(1.1, 0, 0.1), pose(1.2, 0.3, 0.1)}, 0.01);
+  const Matrix6d turn = track.between(1, 1.1)->covariance, way = track.between(1.1, 1.2)->covariance;
+  // (1 mrad)^2 + 0.01^2 * 10 * (0 m + 0.1 rad), and (0.3 m + 0 rad)
+  EXPECT_NEAR(turn(3, 3), 1e-6 + 1e-4, 1e-9);
+  EXPECT_NEAR(turn(0, 0), 1e-6, 1e-9);
+  EXPECT_NEAR(way(3, 3), 1e-6 + 3e-4, 1e-9);
+  EXPECT_NEAR(way(0, 0), 1e-6 + 3e-4, 1e-9);
+}
+
 TEST(OdometryTrack, AFileSaysHowGoodItIs) {
   const auto folder = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "odometry_track");
   std::filesystem::create_directories(folder);

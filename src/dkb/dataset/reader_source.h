@@ -22,7 +22,8 @@ class ReaderSource : public Source {
   virtual std::vector<int64_t> stamps_ns() const { return {}; }
 
  protected:
-  // To be called once, by the constructor. A camera that tells no frame rate gets that of the first stamps.
+  // To be called once, by the constructor. A camera that tells no frame rate, or one that the first stamps contradict
+  // by a factor of more than 1.4, gets theirs.
   void start(PairStream pairs, const Camera& camera, bool threaded);
   // Ends the thread that calls the stream of pairs, before what the stream needs is gone.
   void end() { reader_.reset(); }

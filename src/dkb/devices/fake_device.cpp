@@ -82,6 +82,8 @@ class FaultySource final : public Source {
 
   const Camera& camera() const override { return source_->camera(); }
   void stop() override { source_->stop(); }
+  std::vector<std::string> take_warnings() override { return source_->take_warnings(); }
+  SourceCounts counts() const override { return source_->counts(); }
   std::string description() const override { return "fake device: " + source_->description(); }
 
   SourceFrame next() override {

@@ -66,6 +66,14 @@ TEST_F(FakeDevice, PlaysAtThePaceOfTheStamps) {
   EXPECT_EQ(seen.counts.late, 0);
 }
 
+TEST_F(FakeDevice, WarnsAsItsFolderDoes) {
+  write_file_atomically(folder / "associations.txt", "1000.5 c.png 1000.5 d.png\n1005.5 c.png 1005.5 d.png\n");
+  const std::vector<std::string> warnings =
+      open_fake_device("fake:" + folder.string() + "?speed=1000", {})->take_warnings();
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("are 5 s apart in the median"), std::string::npos) << warnings[0];
+}
+
 TEST_F(FakeDevice, DroppedFramesNeverCome) {
   const Seen seen = play("drop=0.3&speed=20&seed=7");
   EXPECT_LT(seen.frames.size(), 55u);

@@ -145,6 +145,26 @@ std::string Panel::level(double y, const std::string& text) const {
          label(left_ + width_, top_ - 6, "end", 12, kInk, text);
 }
 
+std::string Projection::axes() const {
+  static constexpr const char* kAxisName[] = {"x [m]", "y [m]", "z [m]"};
+  return panel.axes(kAxisName[across], kAxisName[up]);
+}
+
+std::vector<Projection> widest_projections(const std::array<Range, 3>& range, double top, double height) {
+  constexpr double kLeft = 70, kStep = 470, kSide = 385;  // [px]
+  std::array<size_t, 3> order{0, 1, 2};
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return range[a].length() > range[b].length(); });
+  std::vector<Projection> result;
+  for (size_t side = 0; side < 2; ++side) {
+    const size_t across = order[0], up = order[side + 1];
+    Range x = range[across], y = range[up];
+    frame_equally(kSide, height, &x, &y);
+    result.push_back({across, up, Panel(kLeft + kStep * static_cast<double>(side), top, kSide, height, x, y)});
+  }
+  return result;
+}
+
 std::vector<size_t> stretches(const std::vector<double>& timestamps) {
   std::vector<double> steps;
   for (size_t i = 1; i < timestamps.size(); ++i) steps.push_back(timestamps[i] - timestamps[i - 1]);

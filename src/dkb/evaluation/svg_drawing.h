@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,16 @@ class Panel {
   double left_, top_, width_, height_;
   Range x_, y_;
 };
+
+// Two of the axes x, y, z [m] against each other.
+struct Projection {
+  size_t across = 0, up = 0;
+  Panel panel;
+  std::string axes() const;
+};
+// The axis of the widest extent against each of the other two, the wider first, side by side at the height `top`;
+// shapes are true.
+std::vector<Projection> widest_projections(const std::array<Range, 3>& range, double top, double height);
 
 // Indices at which a stretch without gaps begins; a gap is ten usual steps between stamps.
 std::vector<size_t> stretches(const std::vector<double>& timestamps);

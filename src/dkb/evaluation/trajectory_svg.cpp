@@ -44,21 +44,13 @@ std::string projections(const std::vector<Path>& paths, const std::vector<size_t
       range[axis] = {std::min(range[axis].low, r.low), std::max(range[axis].high, r.high)};
     }
   }
-  std::array<size_t, 3> order{0, 1, 2};
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return range[a].length() > range[b].length(); });
-  static constexpr const char* kAxisName[] = {"x [m]", "y [m]", "z [m]"};
   std::string out;
-  for (size_t panel = 0; panel < 2; ++panel) {
-    const size_t h = order[0], v = order[panel + 1];
-    svg::Range x = range[h], y = range[v];
-    constexpr double kSide = 385, kTall = 340;
-    svg::frame_equally(kSide, kTall, &x, &y);
-    const svg::Panel p(70 + 470 * static_cast<double>(panel), top, kSide, kTall, x, y);
-    out += p.axes(kAxisName[h], kAxisName[v]);
-    for (const Path& path : paths) out += p.path(path.along[h], path.along[v], starts, path.colour, path.width);
+  for (const svg::Projection& p : svg::widest_projections(range, top, 340)) {
+    out += p.axes();
+    for (const Path& path : paths)
+      out += p.panel.path(path.along[p.across], path.along[p.up], starts, path.colour, path.width);
     const Path& last = paths.back();
-    out += p.dot(last.along[h].front(), last.along[v].front(), last.colour);
+    out += p.panel.dot(last.along[p.across].front(), last.along[p.up].front(), last.colour);
   }
   return out;
 }

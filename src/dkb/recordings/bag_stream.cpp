@@ -121,10 +121,17 @@ void BagStream::read_index(uint64_t at) {
 }
 
 void BagStream::add_connection(std::string_view header, std::string_view data) {
+  // Inside a chunk nothing else bounds them.
+  if (header.size() > kMaxHeader || data.size() > kMaxConnection)
+    return warnings_.add(file_->name() + ": the chunk at byte " + std::to_string(chunk_at_) +
+                         " holds a connection that is too large; it is left out");
   const std::optional<uint32_t> id = number<uint32_t>(header, "conn");
   const std::optional<std::string_view> topic = field(header, "topic"), type = field(data, "type");
   if (!id || !topic || !type || topic_of_.count(*id)) return;
   if (topic_of_.size() >= RecordedTopics::kMost) return;
+  if (topic->size() > RecordedTopics::kLongestName || type->size() > RecordedTopics::kLongestName)
+    warnings_.add(file_->name() + ": connection " + std::to_string(*id) +
+                  " has a name that is too long; it is left out");
   if (const auto added = topics_.add(std::string(*topic), std::string(*type), MessageEncoding::ros1))
     topic_of_[*id] = *added;
 }

@@ -12,6 +12,7 @@
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
 #include "dkb/recordings/recorded_image.h"
+#include "dkb/recordings/recorded_pairs.h"
 #include "dkb/recordings/recording_contents.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
@@ -173,6 +174,7 @@ class PairsToFolder {
   }
 
   void add(StampPairing::Kind kind, const RecordedMessage& message) {
+    if (const std::string why = too_large(topic(kind), message.bytes.size()); !why.empty()) return leave_out(why);
     try {
       const int64_t stamp = contents_.stamped ? read(kind, message.bytes).header.stamp_ns : message.recorded_ns;
       if (!pairing_.add(kind, {stamp, std::string(message.bytes)}))

@@ -243,7 +243,7 @@ TEST_F(ConvertTest, ImagesOfAnotherSizeThanTheirCameraAreLeftOutAndTold) {
   // The second pair's depth and the third's colour are larger than their CameraInfo says.
   for (int n = 0; n < 3; ++n) {
     const int64_t stamp = kFirst + n * kInterval;
-    const int colour_scale = n == 2 ? 2 : 1, depth_scale = n == 1 ? 20 : 1;
+    const int colour_scale = n == 2 ? 2 : 1, depth_scale = n == 1 ? 10 : 1;
     const std::string colour = bytes_of(noise_picture(1, 32 * colour_scale, 24 * colour_scale));
     const std::string depth = metres_of(Image<uint16_t>(32 * depth_scale, 24 * depth_scale, 10'000));
     write("/rgb/image", "sensor_msgs/Image", stamp,
@@ -255,9 +255,29 @@ TEST_F(ConvertTest, ImagesOfAnotherSizeThanTheirCameraAreLeftOutAndTold) {
   EXPECT_EQ(convert(scratch / "a.bag", scratch / "out", options).count, 1U);
   ASSERT_EQ(warnings.size(), 2U);
   EXPECT_NE(warnings[0].find("/depth/image"), std::string::npos) << warnings[0];
-  EXPECT_NE(warnings[0].find("is of 640x480 px, the camera of 32x24"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("is of 320x240 px, the camera of 32x24"), std::string::npos) << warnings[0];
   EXPECT_NE(warnings[1].find("/rgb/image"), std::string::npos) << warnings[1];
   EXPECT_NE(warnings[1].find("is of 64x48 px, the camera of 32x24"), std::string::npos) << warnings[1];
+}
+
+TEST_F(ConvertTest, MessagesLargerThanTheirImagesAreLeftOutAndTold) {
+  const auto writer = write_recording(scratch / "a.bag");
+  const size_t info = writer->add_topic("/rgb/camera_info", "sensor_msgs/CameraInfo");
+  const size_t rgb = writer->add_topic("/rgb/image", "sensor_msgs/Image");
+  const size_t depth = writer->add_topic("/depth/image", "sensor_msgs/Image");
+  writer->write(info, kFirst, encode(info_message(small_camera())));
+  const std::string colours = bytes_of(noise_picture(1)), metres = metres_of(noise_depth(1));
+  for (int n = 0; n < 2; ++n) {
+    const int64_t stamp = kFirst + n * kInterval;
+    const std::string more(n == 0 ? 0 : 2 << 20, '\0');
+    writer->write(rgb, stamp, encode(image_message(stamp, "rgb8", 32, 24, colours)) + more);
+    writer->write(depth, stamp, encode(image_message(stamp, "32FC1", 32, 24, metres)));
+  }
+  writer->close();
+  EXPECT_EQ(convert(scratch / "a.bag", scratch / "out", options).count, 1U);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(warnings[0], "/rgb/image: a message of 2 MiB is too large for an image of 32x24 px; it is left out");
+  EXPECT_EQ(warnings[1], "1 images without a partner of their time are left out");
 }
 
 TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {

@@ -21,7 +21,6 @@ enum Op : uint8_t {
   kChunk = 6,
   kMessageIndex = 7,
   kChunkIndex = 8,
-  kAttachment = 9,
   kStatistics = 11,
   kMetadata = 12,
   kMetadataIndex = 13,

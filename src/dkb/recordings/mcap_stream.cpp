@@ -134,18 +134,21 @@ void McapStream::take(uint8_t op, std::string_view bytes) {
   ByteReader in(bytes, "record");
   if (op == mcap::kSchema) {
     const uint16_t id = u16(in);
-    schemas_[id] = text(in);
+    const std::string_view name = text(in);
+    if (name.size() > RecordedTopics::kLongestName) return warn_of_name("schema", id);
+    schemas_[id] = name;
   } else if (op == mcap::kChannel) {
     const uint16_t id = u16(in), schema = u16(in);
-    const std::string topic(text(in)), encoding(text(in));
+    const std::string_view topic = text(in), encoding = text(in);
     if (topic_of_.count(id)) return;
+    if (topic.size() > RecordedTopics::kLongestName) warn_of_name("channel", id);
     if (encoding == "ros1" || encoding == "cdr") {
       const auto type = schemas_.find(schema);
-      topic_of_[id] = topics_.add(topic, type == schemas_.end() ? "" : type->second,
+      topic_of_[id] = topics_.add(std::string(topic), type == schemas_.end() ? "" : type->second,
                                   encoding == "ros1" ? MessageEncoding::ros1 : MessageEncoding::cdr);
     } else {
       topic_of_[id] = std::nullopt;
-      if (foreign_.size() < 5) foreign_.insert(encoding.empty() ? "no name" : encoding);
+      if (foreign_.size() < 5) foreign_.emplace(encoding.empty() ? "no name" : encoding.substr(0, 40));
     }
   } else if (op == mcap::kMetadata) {
     add_metadata(in);
@@ -221,6 +224,11 @@ void McapStream::warn_of_record(uint64_t at, const std::string& what) {
   warnings_.add(file_->name() + ": the record at byte " + std::to_string(at - mcap::kRecordStart) + " " + what);
 }
 
+void McapStream::warn_of_name(const std::string& kind, uint16_t id) {
+  warnings_.add(file_->name() + ": " + kind + " " + std::to_string(id) +
+                " has a name that is too long; it is left out");
+}
+
 void McapStream::tell_cut(uint64_t at) {
   if (!told_cut_)
     warnings_.add(file_->name() + ": is cut off in the record at byte " + std::to_string(at) +
@@ -231,7 +239,7 @@ void McapStream::tell_cut(uint64_t at) {
 void McapStream::tell_foreign() {
   if (told_foreign_ || foreign_.empty() || !topics_.all().empty()) return;
   std::string names;
-  for (const std::string& name : foreign_) names += (names.empty() ? "" : ", ") + name.substr(0, 40);
+  for (const std::string& name : foreign_) names += (names.empty() ? "" : ", ") + name;
   warnings_.add(file_->name() + ": its messages are encoded as " + names + "; ros1 and cdr are read");
   told_foreign_ = true;
 }
@@ -325,7 +333,12 @@ std::optional<RecordedMessage> McapStream::next_in_chunk() {
       if (size > rest_.size() - mcap::kRecordStart) throw InputError("");
       const std::string_view content = rest_.substr(mcap::kRecordStart, static_cast<size_t>(size));
       rest_.remove_prefix(mcap::kRecordStart + content.size());
-      if (op == mcap::kSchema || op == mcap::kChannel) take(op, content);
+      if (op == mcap::kSchema || op == mcap::kChannel) {
+        if (size > kMaxSmall)
+          warn_of_record(chunk_at_ + mcap::kRecordStart, "holds a record that is too large and left out");
+        else
+          take(op, content);
+      }
       if (op != mcap::kMessage) continue;
       ByteReader message(content, "message");
       size_t topic = 0;

@@ -41,6 +41,7 @@ class McapStream final : public MessageStream {
   std::optional<RecordedMessage> next_in_chunk();
   bool wanted(uint16_t channel, size_t* topic) const;
   void warn_of_record(uint64_t at, const std::string& what);
+  void warn_of_name(const std::string& kind, uint16_t id);
   void tell_cut(uint64_t at);
   void tell_foreign();
 

@@ -40,6 +40,7 @@ class MessageList final : public MessageStream {
   std::optional<RecordedMessage> next() override {
     while (at_ < messages_.size()) {
       const Message& m = messages_[at_++];
+      farthest_ = std::max(farthest_, at_);
       while (!indexed_ && topics_.size() <= m.topic) {
         topics_.push_back(all_[topics_.size()]);
         topics_.back().count.reset();
@@ -60,6 +61,7 @@ class MessageList final : public MessageStream {
     std::string bytes;
   };
   std::vector<Message>& messages() { return messages_; }
+  size_t farthest() const { return farthest_; }  // how many have been read
 
  private:
   bool indexed_;
@@ -67,7 +69,7 @@ class MessageList final : public MessageStream {
   std::vector<Message> messages_;
   std::vector<std::string> selected_;
   std::map<std::string, std::string> texts_;
-  size_t at_ = 0;
+  size_t at_ = 0, farthest_ = 0;
 };
 
 constexpr int64_t kFirst = 1'305'031'102'000'000'000;

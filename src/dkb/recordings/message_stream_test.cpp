@@ -9,6 +9,7 @@
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/map/byte_stream.h"
 #include "dkb/recordings/mcap_format.h"
+#include "dkb/recordings/recorded_topics.h"
 #include "dkb/recordings/recording_test_tools.h"
 #include "dkb/util/test_errors.h"
 
@@ -200,6 +201,59 @@ std::string mcap_record(uint8_t op, const std::string& content) {
 }
 std::string mcap_channel(const std::string& id, const std::string& topic, const std::string& encoding) {
   return mcap_record(mcap::kChannel, id + "\x01\x00"s + mcap_text(topic) + mcap_text(encoding) + mcap_text(""));
+}
+
+// A gigabyte of one letter packs into some kilobytes of a chunk.
+TEST(MessageStream, NamesInsideChunksAreBounded) {
+  const TempFolder scratch;
+  const std::string name(1 << 17, 'x');
+  const auto id = [](int i) { return std::string{static_cast<char>(i), '\x01'}; };
+  std::string records;
+  for (int i = 0; i < 20; ++i) {
+    records += mcap_record(mcap::kSchema, id(i) + mcap_text(name) + mcap_text("") + mcap_text(""));
+    records += mcap_channel(id(i), name, "cdr") + mcap_channel(id(i + 100), "/foreign", name);
+  }
+  records += mcap_record(mcap::kSchema, id(30) + mcap_text("a") + mcap_text(std::string(1 << 24, 'x')));
+  records += mcap_channel("\x05\x00"s, "/chatter", "cdr");
+  ByteWriter chunk;
+  chunk.u64(0), chunk.u64(0), chunk.u64(records.size()), chunk.u32(0), chunk.u32(0);
+  chunk.u64(records.size()), chunk.raw(records);
+  write_bytes(scratch / "a.mcap", std::string(mcap::kMagic) + mcap_record(mcap::kChunk, chunk.bytes()));
+
+  const auto connection = [&](int i, const std::string& topic, const std::string& type, size_t definition = 0) {
+    const std::string data = bag_field("type", type) + bag_field("message_definition", std::string(definition, 'x'));
+    return bag_record(bag_field("op", "\x07") + bag_field("conn", id(i) + "\x00\x00"s) + bag_field("topic", topic),
+                      static_cast<uint32_t>(data.size()), data);
+  };
+  std::string connections = connection(98, "/large", "a/A", 1 << 22);
+  for (int i = 0; i < 20; ++i) connections += connection(i, name, "a/A") + connection(i + 100, "/a", name);
+  connections += connection(99, "/chatter", "a/A");
+  write_bytes(scratch / "a.bag", "#ROSBAG V2.0\n" + bag_record(bag_field("op", "\x03"), 0, "") +
+                                     bag_record(bag_field("op", "\x05") + bag_field("compression", "none"),
+                                                static_cast<uint32_t>(connections.size()), connections));
+  for (const char* file : {"a.mcap", "a.bag"}) {
+    SCOPED_TRACE(file);
+    const auto stream = open_messages(scratch / file);
+    EXPECT_TRUE(read_all(*stream).empty());
+    ASSERT_EQ(stream->topics().size(), 1u);
+    EXPECT_EQ(stream->topics()[0].name, "/chatter");
+    const std::vector<std::string> warnings = stream->take_warnings();
+    ASSERT_EQ(warnings.size(), 10u);
+    EXPECT_NE(warnings[5].find(" that is too l"), std::string::npos) << warnings[5];
+  }
+}
+
+TEST(RecordedTopics, AreBoundedInNumberAndLength) {
+  RecordedTopics topics;
+  EXPECT_FALSE(topics.add(std::string(1025, 'x'), "a/A", MessageEncoding::cdr));
+  EXPECT_FALSE(topics.add("/a", std::string(1025, 'x'), MessageEncoding::cdr));
+  const std::string filling(1000, 'x');
+  size_t added = 0;
+  for (int i = 0; i < 20'000; ++i)
+    added += topics.add(filling + std::to_string(i), "", MessageEncoding::cdr).has_value();
+  EXPECT_LE(added * filling.size(), size_t{1} << 24);
+  EXPECT_GT(added, 16'000u);
+  EXPECT_EQ(topics.add(filling + "0", "", MessageEncoding::cdr), 0u) << "known";
 }
 
 // A channel, a message and no chunk, byte by byte as the format's specification has it; without a summary, unless one

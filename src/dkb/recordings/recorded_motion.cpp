@@ -114,16 +114,14 @@ std::optional<MotionPrior> RecordedMotion::by_poses(int64_t from_ns, int64_t to_
   const Eigen::Matrix3d body_from_world = to->pose.matrix3().transpose();
   Vector6d growth = to->pose_variance - from->pose_variance;
   growth << turned(body_from_world, growth.head<3>()), turned(body_from_world, growth.tail<3>());
-  Matrix6d covariance = Matrix6d::Zero();
+  Matrix6d covariance = drift_covariance(kUsualDrift, distance, angle);
   for (int i = 0; i < 6; ++i) {
-    const bool rotation = i >= 3;
-    double variance = drift_variance(kUsualDrift, rotation ? distance + angle : distance);
     if (tells(growth[i]))
-      variance = growth[i];
+      covariance(i, i) = growth[i] + square(kMinOdometrySd);
     else if (tells(to->twist_variance[i]))
-      variance = to->twist_variance[i] * square(duration);
+      covariance(i, i) = to->twist_variance[i] * square(duration) + square(kMinOdometrySd);
     // Directions that a driver does not know carry huge numbers; a metre and a radian a frame are as good as unknown.
-    covariance(i, i) = std::min(variance, 1.0) + square(kMinOdometrySd);
+    covariance(i, i) = std::min(covariance(i, i), 1.0);
   }
   return in_camera_axes(motion, covariance);
 }

@@ -26,6 +26,14 @@ int64_t read_stamp(std::string_view bytes, MessageEncoding encoding) {
 
 }  // namespace
 
+std::string too_large(const RecordedImageTopic& topic, size_t bytes) {
+  constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
+  if (bytes <= kMostPerPixel * static_cast<size_t>(topic.width) * static_cast<size_t>(topic.height) + kMostElse)
+    return "";
+  return topic.name + ": a message of " + std::to_string(bytes >> 20) + " MiB is too large for an image of " +
+         std::to_string(topic.width) + "x" + std::to_string(topic.height) + " px";
+}
+
 RecordedImage RecordedPairs::Channel::read(const StampPairing::Stored& message) const {
   RecordedImage image = read_recorded_image(message.bytes, topic.type, encoding, topic.name);
   // Where headers carry no stamps, messages are told by the time that stands in.
@@ -144,16 +152,11 @@ void RecordedPairs::read_message() {
   counts_.unpaired = pairing_.unpaired() + broken_;
 }
 
-// Pixels of any encoding and padding fit, so that it holds no image of its topic's size, whatever it says.
 bool RecordedPairs::is_too_large(const Channel& channel, const RecordedMessage& message) {
-  constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
-  const size_t pixels = static_cast<size_t>(channel.topic.width) * static_cast<size_t>(channel.topic.height);
-  if (message.bytes.size() <= kMostPerPixel * pixels + kMostElse) return false;
+  const std::string why = too_large(channel.topic, message.bytes.size());
+  if (why.empty()) return false;
   ++broken_;
-  warn_once("large", name_ + ": " + channel.topic.name + ": a message of " +
-                         std::to_string(message.bytes.size() >> 20) + " MiB is too large for an image of " +
-                         std::to_string(channel.topic.width) + "x" + std::to_string(channel.topic.height) +
-                         " px; such are left out");
+  warn_once("large", name_ + ": " + why + "; such are left out");
   return true;
 }
 

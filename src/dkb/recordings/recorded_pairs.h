@@ -17,6 +17,10 @@
 
 namespace dkb {
 
+// Why a message of so many bytes holds no image of its topic's size, whatever it says; empty when it may: pixels of any
+// encoding and padding fit.
+std::string too_large(const RecordedImageTopic& topic, size_t bytes);
+
 // The pairs of images in a stream of messages. One thread at a time calls next(), any thread the rest.
 class RecordedPairs {
  public:

@@ -6,13 +6,16 @@
 namespace dkb {
 
 std::optional<size_t> RecordedTopics::add(std::string name, std::string type, MessageEncoding encoding) {
+  if (name.size() > kLongestName || type.size() > kLongestName) return std::nullopt;
   if (const size_t layer = type.find("/msg/"); layer != std::string::npos) type.erase(layer, 4);
   if (type == "tf/tfMessage") type = "tf2_msgs/TFMessage";  // its older name
-  std::vector<size_t>& same = by_name_[{name, type}];
-  for (const size_t i : same)
-    if (topics_[i].encoding == encoding) return i;
-  if (topics_.size() >= kMost) return std::nullopt;
-  same.push_back(topics_.size());
+  const std::pair<std::string, std::string> both(name, type);
+  if (const auto same = by_name_.find(both); same != by_name_.end())
+    for (const size_t i : same->second)
+      if (topics_[i].encoding == encoding) return i;
+  if (topics_.size() >= kMost || text_size_ + name.size() + type.size() > kMostText) return std::nullopt;
+  text_size_ += name.size() + type.size();
+  by_name_[both].push_back(topics_.size());
   wanted_.push_back(!selected_ || selected_->count(name) > 0);
   topics_.push_back({std::move(name), std::move(type), encoding, std::nullopt});
   return topics_.size() - 1;

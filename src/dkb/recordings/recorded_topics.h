@@ -14,9 +14,12 @@ namespace dkb {
 class RecordedTopics {
  public:
   static constexpr size_t kMost = 65536;
+  static constexpr size_t kLongestName = 1024;          // [bytes] of a topic or a type
+  static constexpr size_t kMostText = size_t{1} << 24;  // [bytes] of all names together
 
   const std::vector<RecordedTopic>& all() const { return topics_; }
-  // The same name, type and encoding is the same topic, however many wrote to it. Nothing when there are too many.
+  // The same name, type and encoding is the same topic, however many wrote to it. Nothing when there are too many, and
+  // for names that are too long.
   std::optional<size_t> add(std::string name, std::string type, MessageEncoding encoding);
   void add_count(size_t topic, int64_t count);
   void count_rest();  // an index that is whole names no messages of the others: they have none
@@ -29,6 +32,7 @@ class RecordedTopics {
   std::vector<bool> wanted_;
   std::map<std::pair<std::string, std::string>, std::vector<size_t>> by_name_;
   std::optional<std::set<std::string>> selected_;
+  size_t text_size_ = 0;
 };
 
 // A line each, the first few of them: a file that is broken all over says so briefly.

@@ -28,6 +28,19 @@ std::string names_of(const std::map<std::string, std::string>& topics) {
   return text;
 }
 
+// A topic that nothing would be read from is refused.
+void check_motion_topics(const SourceOptions& options) {
+  const bool odom = !options.odom_topic.empty(), imu = !options.imu_topic.empty();
+  const auto refuse = [](const std::string& option, const std::string& why) {
+    throw InputError(option + ": " + why + "; leave one of them out");
+  };
+  if (odom && imu) refuse("--odom-topic " + options.odom_topic, "--imu-topic names another motion, and one is used");
+  const std::string given = odom ? "--odom-topic " + options.odom_topic : "--imu-topic " + options.imu_topic;
+  if (options.prior == PriorKind::none && (odom || imu)) refuse(given, "--prior none reads no topic");
+  if (options.prior == PriorKind::odometry && imu) refuse(given, "--prior odom reads no inertial unit");
+  if (options.prior == PriorKind::imu && odom) refuse(given, "--prior imu reads no odometry");
+}
+
 class Chooser {
  public:
   Chooser(const RecordingSurvey& survey, const SourceOptions& options, const std::string& name)
@@ -105,10 +118,11 @@ class Chooser {
     if (!options_.camera.empty()) {
       const CameraChoice choice = dkb::choose_camera(options_.camera, "");
       made_.camera = choice.camera, made_.camera_origin = choice.origin;
+      if (!options_.info_topic.empty()) colour_info_topic();  // depth is compared with it; it must be there
       if (!choice.doubt.empty()) made_.warnings.push_back(choice.doubt);
       return;
     }
-    if (survey_.camera_file) {
+    if (survey_.camera_file && options_.info_topic.empty()) {
       made_.camera_origin = "of " + survey_.camera_file_origin;
       made_.camera = parse_camera(*survey_.camera_file, name_ + ": " + survey_.camera_file_origin);
       return;
@@ -192,9 +206,7 @@ class Chooser {
   void choose_motion() {
     const PriorKind prior = options_.prior;
     if (prior == PriorKind::none) return;
-    const bool inertial_picked =
-        prior == PriorKind::automatic && options_.odom_topic.empty() && !options_.imu_topic.empty();
-    if (prior != PriorKind::imu && !inertial_picked)
+    if (prior != PriorKind::imu && options_.imu_topic.empty())
       take_motion(motion_topic(survey_.odometries, options_.odom_topic, "--odom-topic", "nav_msgs/Odometry",
                                prior == PriorKind::odometry),
                   false);
@@ -235,6 +247,7 @@ class Chooser {
 }  // namespace
 
 RecordingContents look_into(MessageStream& stream, const SourceOptions& options, const std::string& name) {
+  check_motion_topics(options);
   RecordingSurvey survey;
   survey.read(stream, options);
   RecordingContents contents;

@@ -93,6 +93,50 @@ TEST(RecordingContents, WhatIsMissingIsNamed) {
             "--info-topic /no/camera_info: r.bag has no CameraInfo there; it has /other/camera_info");
 }
 
+// All of a recording of a hundred pairs would be read, where the index and its first messages tell.
+TEST(RecordingContents, WhatTheIndexTellsToBeMissingIsNotLookedFor) {
+  MessageList no_depth;
+  for (int n = 0; n < 100; ++n) add_colour(no_depth, n);
+  EXPECT_THROW(look_into(no_depth, {}, "r.bag"), InputError);
+  EXPECT_EQ(no_depth.farthest(), 1u);
+  MessageList without_index(false);
+  for (int n = 0; n < 100; ++n) add_colour(without_index, n);
+  add_depth(without_index, 99), add_info(without_index, "/rgb/camera_info", info_message(small_camera()));
+  EXPECT_NO_THROW(look_into(without_index, {}, "r.bag"));
+
+  MessageList misspelt;
+  add_pairs(misspelt, 0, 400);
+  add_info(misspelt, "/rgb/camera_info", info_message(small_camera()));
+  SourceOptions options;
+  options.depth_topic = "/dpeth/image";
+  EXPECT_EQ(input_error_of([&] { look_into(misspelt, options, "r.bag"); }),
+            "--depth-topic /dpeth/image: r.bag has no depth images there; it has images on /rgb/image (rgb8), "
+            "/depth/image (32FC1)");
+  EXPECT_EQ(misspelt.farthest(), 2u);
+  // One that is silent until late, or broken, is not waited for.
+  misspelt.add_bytes("/ir/image", "sensor_msgs/Image", kFirst, "x");
+  MessageList again = misspelt;
+  again.rewind();
+  EXPECT_THROW(look_into(again, options, "r.bag"), InputError);
+  EXPECT_EQ(again.farthest(), 300u);
+}
+
+TEST(RecordingContents, AnInfoTopicGoesBeforeTheRecordingsTextAndMustBeThere) {
+  MessageList list = usual();
+  Camera own = small_camera();
+  own.fx = 31;
+  list.add_bytes("/dkb_slam/camera", "std_msgs/String", kFirst, encode_string(own.to_yaml()));
+  SourceOptions options;
+  options.info_topic = "/rgb/camera_info";
+  EXPECT_EQ(contents_of(list, options).camera_origin, "of /rgb/camera_info");
+  EXPECT_EQ(contents_of(list, options).camera.fx, small_camera().fx);
+  options.info_topic = "/no/camera_info";
+  const std::string error = "--info-topic /no/camera_info: r.bag has no CameraInfo there; it has /rgb/camera_info";
+  EXPECT_EQ(refused(list, options), error);
+  options.camera = "fr1";
+  EXPECT_EQ(refused(list, options), error);
+}
+
 TEST(RecordingContents, ACameraIsFoundByItsFrame) {
   MessageList list;
   add_pairs(list, 0, 2, "/camera");
@@ -281,6 +325,22 @@ TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
   EXPECT_EQ(contents_of(list, options).motion->name, "/wheels");
   options.odom_topic = "/no";
   EXPECT_EQ(refused(list, options), "--odom-topic /no: r.bag has no nav_msgs/Odometry there; it has /odom, /wheels");
+}
+
+TEST_F(MotionOfARecording, ATopicThatWouldNotBeReadIsRefused) {
+  const auto error = [&](PriorKind prior, const std::string& odom, const std::string& imu) {
+    SourceOptions options = with(prior);
+    options.odom_topic = odom, options.imu_topic = imu;
+    return refused(list, options);
+  };
+  EXPECT_EQ(error(PriorKind::odometry, "", "/imu"),
+            "--imu-topic /imu: --prior odom reads no inertial unit; leave one of them out");
+  EXPECT_EQ(error(PriorKind::imu, "/odom", ""),
+            "--odom-topic /odom: --prior imu reads no odometry; leave one of them out");
+  EXPECT_EQ(error(PriorKind::none, "/odom", ""),
+            "--odom-topic /odom: --prior none reads no topic; leave one of them out");
+  EXPECT_EQ(error(PriorKind::automatic, "/odom", "/imu"),
+            "--odom-topic /odom: --imu-topic names another motion, and one is used; leave one of them out");
 }
 
 TEST(RecordingContents, AnInertialUnitWithoutAGyroscopeIsNoMotion) {

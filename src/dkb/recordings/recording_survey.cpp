@@ -10,6 +10,19 @@
 namespace dkb {
 namespace {
 
+bool is_indexed(const std::vector<RecordedTopic>& topics) {
+  return std::all_of(topics.begin(), topics.end(), [](const RecordedTopic& t) { return t.count.has_value(); });
+}
+
+// A name was picked that an index does not have.
+bool is_hopeless(const std::vector<RecordedTopic>& topics, const SourceOptions& options) {
+  const auto missing = [&](const std::string& picked) {
+    return !picked.empty() &&
+           std::none_of(topics.begin(), topics.end(), [&](const RecordedTopic& t) { return t.name == picked; });
+  };
+  return !topics.empty() && is_indexed(topics) && (missing(options.colour_topic) || missing(options.depth_topic));
+}
+
 bool is_image(const std::string& type) {
   return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";
 }
@@ -46,6 +59,15 @@ bool RecordingSurvey::complete(const std::vector<RecordedTopic>& topics, const S
     if (is_of_use(topic, options) && topic.count != 0 && !shown(topic)) return false;
   }
   return true;
+}
+
+// By an index, and of each topic of images by its first message: then no other kind of image can come.
+bool RecordingSurvey::images_known(const std::vector<RecordedTopic>& topics) {
+  for (; known_topics_ < topics.size(); ++known_topics_) {
+    const RecordedTopic& topic = topics[known_topics_];
+    if (!topic.count || (is_image(topic.type) && *topic.count > 0 && !shown_images_.contains(topic.name))) return false;
+  }
+  return !topics.empty();
 }
 
 // A recording may begin at zero. One whose second stamp is zero as well has none.
@@ -99,6 +121,7 @@ void RecordingSurvey::read(MessageStream& stream, const SourceOptions& options) 
   const auto fits = [](const RecordedImageTopic& topic, ImageContent content, const std::string& picked) {
     return picked.empty() ? topic.content == content : topic.name == picked;
   };
+  const bool hopeless = is_hopeless(stream.topics(), options);
   bool colour = false, depth = false;
   for (size_t looked_at = 0, further_images = 0, further = 0;;) {
     for (; looked_at < images.size(); ++looked_at) {
@@ -106,18 +129,15 @@ void RecordingSurvey::read(MessageStream& stream, const SourceOptions& options) 
       depth = depth || fits(images[looked_at], ImageContent::depth, options.depth_topic);
     }
     const bool both = colour && depth;
-    if (both) {
-      const std::vector<RecordedTopic>& topics = stream.topics();
-      const auto indexed = [&] {
-        return std::all_of(topics.begin(), topics.end(), [](const RecordedTopic& t) { return t.count.has_value(); });
-      };
-      if (complete(topics, options) && (further >= kMinMessages || indexed())) return;
-      if (further_images >= kMaxImages || further >= kMaxMessages) return;
-    }
+    const std::vector<RecordedTopic>& topics = stream.topics();
+    if (both && complete(topics, options) && (further >= kMinMessages || is_indexed(topics))) return;
+    if (!both && images_known(topics)) return;
+    if (further_images >= kMaxImages || further >= kMaxMessages) return;
     const std::optional<RecordedMessage> message = stream.next();
     if (!message) return;
     const RecordedTopic& topic = stream.topics()[message->topic];
-    further += both, further_images += both && is_image(topic.type);
+    const bool rest = both || hopeless;
+    further += rest, further_images += rest && is_image(topic.type);
     try {
       take(topic, *message);
     } catch (const InputError& e) {  // perhaps its next one is sound

@@ -36,10 +36,11 @@ class RecordingSurvey {
   void take(const RecordedTopic& topic, const RecordedMessage& message);
   void take_image(const RecordedTopic& topic, const RecordedMessage& message);
   bool complete(const std::vector<RecordedTopic>& topics, const SourceOptions& options);
+  bool images_known(const std::vector<RecordedTopic>& topics);
   bool shown(const RecordedTopic& topic) const;
 
-  std::map<std::string, Shown> shown_images_;  // by topic
-  size_t shown_topics_ = 0;                    // the stream's first ones, which need not be looked at again
+  std::map<std::string, Shown> shown_images_;   // by topic
+  size_t shown_topics_ = 0, known_topics_ = 0;  // the stream's first ones, which need not be looked at again
   int64_t transform_messages_ = 0;
 };
 

@@ -7,7 +7,6 @@
 #include "dkb/simulator/scene.h"
 
 namespace dkb::sim {
-namespace {}  // namespace
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;

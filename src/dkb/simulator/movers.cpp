@@ -92,13 +92,15 @@ class Planner {
     return p;
   }
   Stretch choose(const Eigen::Vector2d& here, double t, bool walk_off) {
-    if (!walk_off && random_.uniform() < area_.pause_chance) {
-      Stretch stand{here, here, t, t + random_.uniform(0.4, std::max(0.5, area_.pause_max))};
+    constexpr double kSlowest = 0.7, kFastest = 1.4;                               // [m/s]
+    constexpr double kPauseChance = 0.4, kShortestPause = 0.4, kLongestPause = 2;  // [s] between two walks
+    if (!walk_off && random_.uniform() < kPauseChance) {
+      Stretch stand{here, here, t, t + random_.uniform(kShortestPause, kLongestPause)};
       if (clear(stand)) return stand;
     }
     for (int i = 0; i < 60; ++i) {
       const Eigen::Vector2d target = propose();
-      const double distance = (target - here).norm(), speed = random_.uniform(area_.speed_min, area_.speed_max);
+      const double distance = (target - here).norm(), speed = random_.uniform(kSlowest, kFastest);
       if (distance < 0.8 || !may_stand(target)) continue;
       Stretch walk{here, target, t, t + distance / speed + 0.35};
       if (clear(walk)) return walk;

@@ -66,8 +66,6 @@ struct WalkArea {
   double camera_distance = 0.8;                         // [m] they keep from it
   std::vector<Footprint> no_stop;                       // where they walk through, but do not stand
   std::function<Eigen::Vector2d(Random&)> next_target;  // proposes where to go; may be empty: anywhere
-  double speed_min = 0.7, speed_max = 1.4;              // [m/s]
-  double pause_chance = 0.4, pause_max = 2.0;           // [s] stand between two walks
   double stand_still = 0;                               // [s] all stand from the start, then walk off
   // Where every second one of those stands, so that the camera sees it; the others as by `next_target`.
   std::function<Eigen::Vector2d(Random&)> first_place;

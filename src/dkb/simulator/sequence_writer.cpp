@@ -28,9 +28,10 @@ struct FrameRecord {
   std::vector<SimulatedMover> movers;
 };
 
-FrameRecord write_frame(const Simulator& simulator, int index, const std::filesystem::path& folder, int jpeg_quality) {
+FrameRecord write_frame(const Simulator& simulator, int index, const std::filesystem::path& folder) {
+  constexpr int kQuality = 95;
   const SimulatedFrame f = simulator.render_without_true_depth(index);
-  write_image_file(folder / "rgb" / (f.stamp + ".jpg"), encode_jpeg(f.image.colour, jpeg_quality));
+  write_image_file(folder / "rgb" / (f.stamp + ".jpg"), encode_jpeg(f.image.colour, kQuality));
   Image<uint16_t> depth(f.image.depth.width(), f.image.depth.height());
   for (size_t i = 0; i < depth.size(); ++i)
     depth.data()[i] = static_cast<uint16_t>(
@@ -102,7 +103,6 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
 
 void SequenceWriterOptions::check() const {
   require_option(threads >= 1 && threads <= 64, "threads", threads, "1 ... 64");
-  require_option(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", jpeg_quality, "1 ... 100");
 }
 
 void write_sequence(const Simulator& simulator, const std::filesystem::path& folder,
@@ -129,7 +129,7 @@ void write_sequence(const Simulator& simulator, const std::filesystem::path& fol
       FrameRecord record;
       std::exception_ptr error;
       try {
-        record = write_frame(simulator, index, folder, options.jpeg_quality);
+        record = write_frame(simulator, index, folder);
       } catch (...) {
         error = std::current_exception();
       }

@@ -9,9 +9,8 @@
 namespace dkb {
 
 struct SequenceWriterOptions {
-  int threads = 2;        // frames drawn at the same time, 1 ... 64; the files do not depend on it
-  int jpeg_quality = 95;  // 1 ... 100
-  void check() const;     // throws InvalidOption
+  int threads = 2;     // frames drawn at the same time, 1 ... 64; the files do not depend on it
+  void check() const;  // throws InvalidOption
 };
 
 // Writes the whole sequence in TUM layout to `folder` (made if missing; files of the same names are replaced):

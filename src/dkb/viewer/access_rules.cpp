@@ -13,6 +13,12 @@
 namespace dkb {
 namespace {
 
+std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
 // The name of `name`, `name:port` or `[address]:port`, in lower case; empty when it is none of these.
 std::string host_of(std::string_view authority) {
   size_t end = authority.starts_with('[') ? authority.find(']') : authority.find(':');
@@ -25,9 +31,7 @@ std::string host_of(std::string_view authority) {
   if (!port.empty() && (port.size() < 2 || port.size() > 6 || port[0] != ':' ||
                         !std::all_of(port.begin() + 1, port.end(), [](char c) { return c >= '0' && c <= '9'; })))
     return {};
-  std::string host(authority.substr(0, end));
-  for (char& c : host) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return host;
+  return lower(authority.substr(0, end));
 }
 
 bool is_numeric_address(const std::string& host) {
@@ -60,6 +64,20 @@ int AccessRules::refusal(const HttpRequest& request) const {
       !equal_in_constant_time(request.header("x-dkb-token"), token))
     return 401;
   return 0;
+}
+
+AccessRules access_rules_of(const std::string& host, const std::string& machine) {
+  AccessRules rules;
+  if (is_loopback_name(host)) return rules;
+  rules.any_address = host == "0.0.0.0" || host == "::";
+  const std::string name = lower(host), own = lower(machine), first = own.substr(0, own.find('.'));
+  rules.host_names = {name.find(':') == std::string::npos ? name : "[" + name + "]"};
+  if (rules.any_address && !first.empty()) {
+    rules.host_names.insert(rules.host_names.end(), {first, first + ".local"});
+    if (own != first) rules.host_names.push_back(own);
+  }
+  rules.token = random_token();
+  return rules;
 }
 
 bool equal_in_constant_time(std::string_view given, std::string_view expected) {

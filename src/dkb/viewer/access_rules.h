@@ -19,6 +19,11 @@ struct AccessRules {
   int refusal(const HttpRequest& request) const;
 };
 
+// Of a server that is bound to `host` on a machine of the name `machine`, which may be empty: by a random token for all
+// but loopback names. One that listens on all addresses answers to that name and to NAME.local as well; of a full name
+// to its first part, too. Nobody else can have such a name resolved to another place here. Throws as random_token().
+AccessRules access_rules_of(const std::string& host, const std::string& machine);
+
 // Takes as long for every `given` of the same length.
 bool equal_in_constant_time(std::string_view given, std::string_view expected);
 

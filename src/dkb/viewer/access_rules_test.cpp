@@ -30,6 +30,26 @@ TEST(AccessRules, LetInLoopbackNamesAndThoseNamed) {
   EXPECT_EQ(of_host(everywhere, "evil.example"), 403);
 }
 
+TEST(AccessRules, LetTheMachinesOwnNameInWhereAllAddressesAre) {
+  const auto admitted = [](const std::string& host, const std::string& machine, const std::string& name) {
+    AccessRules rules = access_rules_of(host, machine);
+    EXPECT_EQ(rules.token.empty(), host == "localhost");
+    rules.token = "";
+    return of_host(rules, name + ":8090") == 0;
+  };
+  for (const char* name : {"robot", "ROBOT.local", "192.168.0.7"})
+    EXPECT_TRUE(admitted("0.0.0.0", "Robot", name)) << name;
+  for (const char* name : {"evil.example", "robot.evil.example", "robot.lan", "local", ".local"})
+    EXPECT_FALSE(admitted("0.0.0.0", "Robot", name)) << name;
+  for (const char* name : {"robot", "robot.local", "robot.lan"}) {
+    EXPECT_TRUE(admitted("::", "robot.lan", name)) << name;
+    EXPECT_FALSE(admitted("192.168.0.7", "robot.lan", name)) << name;
+    EXPECT_FALSE(admitted("localhost", "robot.lan", name)) << name;
+    EXPECT_FALSE(admitted("0.0.0.0", "", name)) << name;
+  }
+  EXPECT_FALSE(admitted("0.0.0.0", "", ".local"));
+}
+
 TEST(AccessRules, KeepPagesOfOtherSitesOut) {
   const AccessRules rules;
   const auto from = [&](const std::string& path, const std::string& name, const std::string& value) {

@@ -14,6 +14,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <system_error>
 #include <vector>
 
 #include "dkb/util/errors.h"
@@ -114,10 +115,16 @@ HttpServer::HttpServer(const std::string& host, int port, AccessRules rules, Htt
 }
 
 HttpServer::~HttpServer() {
+  close_all();
+  close(wake_fd_);
+}
+
+void HttpServer::close_all() {
+  if (listener_ >= 0) close(listener_);
+  listener_ = -1;
   for (const Connection& c : connections_)
     if (!c.closed) close(c.fd);
-  close(listener_);
-  close(wake_fd_);
+  connections_.clear();
 }
 
 void HttpServer::wake() {
@@ -132,6 +139,16 @@ void HttpServer::stop() {
 }
 
 void HttpServer::run() {
+  try {
+    serve();
+  } catch (...) {
+    close_all();
+    throw;
+  }
+  close_all();
+}
+
+void HttpServer::serve() {
   std::vector<pollfd> fds;
   std::vector<Connection*> polled;
   while (!stopping_) {
@@ -150,7 +167,8 @@ void HttpServer::run() {
     if (news_) until = std::min(until, next_tick_);
     if (streams) until = std::min(until, next_tick_ + kHeartbeat);
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
-    if (poll(fds.data(), fds.size(), static_cast<int>(std::clamp<long>(wait, 0, 5000))) < 0 && errno != EINTR) return;
+    if (poll(fds.data(), fds.size(), static_cast<int>(std::clamp<long>(wait, 0, 5000))) < 0 && errno != EINTR)
+      throw std::system_error(errno, std::generic_category(), "poll");
     if (fds[1].revents != 0) {
       uint64_t count = 0;
       if (::read(wake_fd_, &count, sizeof count) > 0) {

@@ -60,7 +60,8 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const { return port_; }
-  void run();   // until stop()
+  // Until stop(), or until it cannot go on, which throws. Nobody can connect any more after either.
+  void run();
   void wake();  // any thread: there is something new
   void stop();  // any thread
 
@@ -79,6 +80,8 @@ class HttpServer {
     bool closed = false;
   };
 
+  void serve();
+  void close_all();
   void accept_all();
   bool make_room();  // whether one went
   void read(Connection& c);

@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "dkb/viewer/page_server.h"
+
 namespace dkb {
 namespace {
 
@@ -28,6 +30,7 @@ class Service final : public HttpService {
   };
   HttpAnswer answer(const HttpRequest& request) override {
     HttpAnswer answer;
+    if (request.path == "/throw") throw std::bad_alloc();
     if (request.path == "/stream")
       answer.stream = std::make_unique<Parts>();
     else
@@ -36,6 +39,41 @@ class Service final : public HttpService {
   }
   void tick(size_t) override {}
 };
+
+sockaddr_in loopback(uint16_t port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  return address;
+}
+
+int connect_at(int port) {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  const sockaddr_in address = loopback(static_cast<uint16_t>(port));
+  EXPECT_EQ(connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  const timeval patience{10, 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  return fd;
+}
+
+std::string all_of(int fd) {
+  std::string all;
+  char buffer[65536];
+  for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) all.append(buffer, static_cast<size_t>(n));
+  close(fd);
+  return all;
+}
+
+std::string ask_at(int port, const std::string& bytes) {
+  const int fd = connect_at(port);
+  send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  return all_of(fd);
+}
+
+std::string get_request(const std::string& path) {
+  return "GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+}
 
 class HttpServerTest : public testing::Test {
  protected:
@@ -47,30 +85,9 @@ class HttpServerTest : public testing::Test {
     server_.stop();
     thread_.join();
   }
-  int connect_to() const {
-    const int fd = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<uint16_t>(server_.port()));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    const timeval patience{10, 0};
-    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    return fd;
-  }
-  static std::string all_of(int fd) {
-    std::string all;
-    char buffer[65536];
-    for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) all.append(buffer, static_cast<size_t>(n));
-    close(fd);
-    return all;
-  }
-  std::string ask(const std::string& bytes) const {
-    const int fd = connect_to();
-    send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    return all_of(fd);
-  }
-  std::string get(const std::string& path) const { return ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n"); }
+  int connect_to() const { return connect_at(server_.port()); }
+  std::string ask(const std::string& bytes) const { return ask_at(server_.port(), bytes); }
+  std::string get(const std::string& path) const { return ask(get_request(path)); }
 
   Service service_;
   HttpServer server_{"127.0.0.1", 0, {}, service_, limits()};
@@ -136,10 +153,7 @@ TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
     return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
   };
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<uint16_t>(server_.port()));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const sockaddr_in address = loopback(static_cast<uint16_t>(server_.port()));
   rlimit before{};
   getrlimit(RLIMIT_NOFILE, &before);
   rlimit few = before;
@@ -147,7 +161,7 @@ TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
   std::vector<int> taken;
   for (int copy = 0; (copy = dup(fd)) >= 0;) taken.push_back(copy);
-  const int connected = connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address);
+  const int connected = connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address);
   const double at_first = busy_ms();
   poll(nullptr, 0, 300);
   const double busy = busy_ms() - at_first;
@@ -158,6 +172,22 @@ TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {
   const std::string request = "GET /b HTTP/1.1\r\nHost: localhost\r\n\r\n";
   send(fd, request.data(), request.size(), MSG_NOSIGNAL);
   EXPECT_TRUE(all_of(fd).starts_with("HTTP/1.1 200 "));
+}
+
+TEST(PageServer, ThatCannotGoOnLetsNobodyInAndSaysWhy) {
+  Service service;
+  PageServer page("127.0.0.1", 0, service);
+  page.start();
+  const std::string url = page.url();
+  const auto port = static_cast<uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
+  EXPECT_EQ(ask_at(port, get_request("/throw")), "");
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  const sockaddr_in address = loopback(port);
+  EXPECT_NE(connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  close(fd);
+  std::vector<std::string> warnings;
+  while (warnings.empty()) warnings = page.take_warnings();
+  EXPECT_EQ(warnings, std::vector<std::string>{"the page has ended (std::bad_alloc); the run goes on without it"});
 }
 
 TEST_F(HttpServerTest, HasAQuotaForStreams) {

@@ -2,40 +2,42 @@
 #include "dkb/viewer/page_server.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <exception>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "dkb/util/thread_priority.h"
 
 namespace dkb {
 namespace {
 
-AccessRules rules_of(const std::string& host) {
-  AccessRules rules;
-  if (is_loopback_name(host)) return rules;
-  rules.any_address = host == "0.0.0.0" || host == "::";
-  std::string name = host;
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  rules.host_names = {name.find(':') == std::string::npos ? name : "[" + name + "]"};
-  rules.token = random_token();
-  return rules;
+std::string machine_name() {
+  char name[256] = {};
+  return gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
 }  // namespace
 
 PageServer::PageServer(const std::string& host, int port, HttpService& service)
-    : host_(host), rules_(rules_of(host)), server_(host, port, rules_, service) {}
+    : host_(host), rules_(access_rules_of(host, machine_name())), server_(host, port, rules_, service) {}
 
 void PageServer::start() {
   thread_ = std::thread([this] {
     set_thread_priority(ThreadPriority::background);
     try {
       server_.run();
-    } catch (const std::exception&) {
-      // Out of memory, most likely: the page ends, the run goes on.
+    } catch (const std::exception& e) {  // out of memory, most likely
+      const std::lock_guard lock(mutex_);
+      warnings_.push_back(fmt::format("the page has ended ({}); the run goes on without it", e.what()));
     }
   });
+}
+
+std::vector<std::string> PageServer::take_warnings() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(warnings_, {});
 }
 
 PageServer::~PageServer() {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "dkb/viewer/http_server.h"
 
@@ -19,11 +21,14 @@ class PageServer {
 
   std::string url() const;  // to open; holds the token where one is asked for
   void wake() { server_.wake(); }
+  std::vector<std::string> take_warnings();  // why it ended by itself
 
  private:
   const std::string host_;
   const AccessRules rules_;
   HttpServer server_;
+  std::mutex mutex_;  // guards the next one
+  std::vector<std::string> warnings_;
   std::thread thread_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "dkb/dataset/image_codecs.h"
+#include "dkb/dataset/reduced_jpeg.h"
 
 namespace dkb {
 namespace {
@@ -15,35 +16,11 @@ int step_of(const ImageView& view) {
   return std::max(1, view.width / kWidth);
 }
 
-// Mean of each square of step x step pixels of one channel.
-uint8_t mean(const ImageView& view, int x, int y, int step, int channels, int channel) {
-  int sum = 0;
-  for (int dy = 0; dy < step; ++dy) {
-    const uint8_t* row = view.row(y * step + dy) + x * step * channels + channel;
-    for (int dx = 0; dx < step; ++dx) sum += row[dx * channels];
-  }
-  return static_cast<uint8_t>(sum / (step * step));
-}
-
 }  // namespace
 
 std::string reduced_picture(const Frame& frame) {
   if (frame.empty()) return {};
-  if (const ImageView colour = frame.colour(); !colour.empty()) {
-    const int step = step_of(colour);
-    ColourImage small(colour.width / step, colour.height / step);
-    for (int y = 0; y < small.height(); ++y)
-      for (int x = 0; x < small.width(); ++x)
-        small(x, y) = {mean(colour, x, y, step, 3, 0), mean(colour, x, y, step, 3, 1), mean(colour, x, y, step, 3, 2)};
-    return encode_jpeg(small, kQuality);
-  }
-  const ImageView grey = frame.grey();
-  if (grey.empty()) return {};
-  const int step = step_of(grey);
-  GreyImage small(grey.width / step, grey.height / step);
-  for (int y = 0; y < small.height(); ++y)
-    for (int x = 0; x < small.width(); ++x) small(x, y) = mean(grey, x, y, step, 1, 0);
-  return encode_jpeg(small, kQuality);
+  return reduced_jpeg(frame, step_of(frame.colour().empty() ? frame.grey() : frame.colour()), kQuality);
 }
 
 std::string reduced_depth(const Frame& frame) {

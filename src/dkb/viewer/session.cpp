@@ -94,7 +94,10 @@ void Session::ended(MapSnapshot map) {
 }
 
 std::vector<std::string> Session::take_warnings() {
-  return recorder_ ? recorder_->take_warnings() : std::vector<std::string>();
+  std::vector<std::string> warnings = recorder_ ? recorder_->take_warnings() : std::vector<std::string>();
+  if (page_)
+    for (std::string& line : page_->take_warnings()) warnings.push_back(std::move(line));
+  return warnings;
 }
 
 bool Session::wants_dense_map() const {
