@@ -16,11 +16,8 @@ namespace {
 // each map around its newest one, the map of the newest of all first.
 std::vector<KeyframeId> keyframes_around(const Map& map, KeyframeId start, size_t most_neighbours) {
   std::vector<KeyframeId> taken;
-  std::vector<std::vector<KeyframeId>> children(static_cast<size_t>(map.keyframe_count()));
+  const std::vector<std::vector<KeyframeId>> children = map.children_of_each();
   std::vector<KeyframeId> starts = map.live_keyframes();
-  for (KeyframeId k : starts)
-    if (const KeyframeId parent = map.keyframe(k)->parent; parent != kNoKeyframe)
-      children[static_cast<size_t>(parent)].push_back(k);
   std::reverse(starts.begin(), starts.end());
   if (start != kNoKeyframe) starts = {map.live_ancestor(start).id};
 
