@@ -82,7 +82,7 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
     for (const Observation& o : map.point(p)->observations) observed += takes_part[static_cast<size_t>(o.keyframe)];
     return observed < 2;
   });
-  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics);
+  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics, local.planes);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;
   ba.rounds = {5, 10};  // [steps] before and after outliers are told apart

@@ -63,7 +63,8 @@ std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const 
     fixed.push_back(1);
   }
   if (std::none_of(fixed.begin(), fixed.end(), [](uint8_t f) { return f != 0; })) fixed[0] = 1;
-  BaWindow window = make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), optics);
+  BaWindow window =
+      make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), optics, options.planes);
   BaProblem& problem = window.problem;
   if (options.weighted) set_geometric_weights(problem, options.weights);
 

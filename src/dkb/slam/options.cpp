@@ -140,7 +140,7 @@ void bind_experiments(Settings& s, SlamOptions& o) {
          Range{0, 10, true});
   s.bind("experiment.mapping.ba.adaptive_weight", &w.adaptive, "estimate the weight from the residuals");
 
-  s.bind("experiment.mapping.planes", &o.mapping.planes, "flat surfaces take part in bundle adjustment");
+  s.bind("experiment.mapping.planes", &o.mapping.ba.planes, "flat surfaces take part in bundle adjustment");
 
   PaperFilterOptions& paper = o.dynamics.paper;
   s.bind("experiment.dynamics.paper.flow_threshold", &paper.flow_threshold, "[px] d_th (DKB eq. 9)", above(0));
@@ -224,7 +224,7 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   o.dynamics.filter = FilterKind::paper;
   o.adaptive_keyframes = paper_keyframe_options();
   o.mapping.ba.weights.adaptive = false;
-  o.mapping.planes = false;
+  o.mapping.ba.planes = false;
   if (name == "orb") {
     o.dynamics.filter = FilterKind::none;
     o.keyframe_policy = KeyframePolicyKind::baseline;
