@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dkb/image/given_motion.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
@@ -245,6 +246,7 @@ SlamOptions expand(const Options& options) {
   o.pipeline.realtime = options.realtime;
   o.dense_map = options.dense_map;
   o.base_from_cam = options.base_from_cam;
+  o.base_from_cam.rotation.normalize();
   return o;
 }
 
@@ -258,8 +260,11 @@ std::string settings_table() {
   return table;
 }
 
+Options::Options() {
+  start_from("default", "preset");
+}
 Options::Options(const std::string& preset) {
-  start_from(preset, "--preset");
+  start_from(preset, "preset");
 }
 
 void Options::start_from(const std::string& preset, const std::string& where) {
@@ -300,7 +305,7 @@ void Options::load(const std::filesystem::path& path) {
   for (const SettingLine& line : lines) set(line.key, line.value, line.where);
 }
 
-void Options::disable(const std::string& list) {
+void Options::disable(const std::string& list, const std::string& where) {
   const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
   std::istringstream names(list);
   for (std::string name; std::getline(names, name, ',');) {
@@ -313,8 +318,8 @@ void Options::disable(const std::string& list) {
     else if (name == "loop")
       loop.enabled = false;
     else
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
-                       "; parts: dr, kf, ba, loop");
+      throw InputError((where.empty() ? "disable" : where) + ": there is no part \"" + name + "\"" +
+                       did_you_mean(name, known) + "; parts: dr, kf, ba, loop");
   }
 }
 
@@ -349,6 +354,11 @@ void Options::check() const {
                  "at least 2 times dense.voxel");
   require_option(dense.obstacle_high > dense.obstacle_low, "dense.obstacle_high", dense.obstacle_high,
                  "above dense.obstacle_low");
+  constexpr double kMountNorm = 1e-2;  // mounts are written by hand, to three digits
+  if (!is_rigid(base_from_cam, kMountNorm))
+    throw InvalidOption("base_from_cam",
+                        "a motion with a quaternion of length " + std::to_string(base_from_cam.rotation.norm()),
+                        "of finite numbers, with a quaternion of length 1; normalise it");
 }
 
 }  // namespace dkb
