@@ -98,6 +98,7 @@ def test_trajectory_keyframes_and_map_are_arrays(whole):
     snapshot = slam.map()
     points = snapshot.points()
     assert snapshot.point_count == len(points.ids) == len(xyz) and (np.diff(points.ids.astype(int)) > 0).all()
+    assert points.maps.dtype == np.int32 and points.maps.shape == points.ids.shape and (points.maps == 0).all()
     keyframes = snapshot.keyframes()
     assert len(keyframes) == snapshot.keyframe_count and keyframes[1].world_from_cam.shape == (4, 4)
     assert snapshot.loops() == []
