@@ -114,7 +114,7 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundEachOfTheGivenKeyframes) {
   RoundTrip world;
   world.go(RoundTrip::kRound - 4);
   std::vector<KeyframeId> moved;
-  for (const MapCorrection::Pose& p : adjust_globally(world.map, world.optics(), {}, {12, 36}, 300).poses)
+  for (const MapCorrection::Pose& p : adjust_globally(world.map, world.optics(), {}, {12, 36}, 200).poses)
     if (p.before.translation != p.after.translation) moved.push_back(p.keyframe);
   const auto near = [&](KeyframeId k) {
     return std::count_if(moved.begin(), moved.end(), [k](KeyframeId m) { return std::abs(m - k) < 6; });
