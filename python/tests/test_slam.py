@@ -212,7 +212,10 @@ def test_no_frame_is_refused_while_another_thread_saves(sequence, tmp_path, save
             except BaseException as error:
                 wrong.append(error)
 
-    slam.process(next(source))
+    before = 0
+    while slam.map().keyframe_count == 0:  # a map without one is not saved
+        slam.process(next(source))
+        before += 1
     thread = threading.Thread(target=keep_saving)
     thread.start()
     try:
@@ -220,7 +223,7 @@ def test_no_frame_is_refused_while_another_thread_saves(sequence, tmp_path, save
     finally:
         done.set()
         thread.join()
-    assert len(results) == 39 and saved and not wrong
+    assert len(results) == 40 - before > 20 and saved and not wrong
 
 
 def test_a_trajectory_is_saved_while_a_frame_is_tracked(frames, camera, tmp_path):
