@@ -94,11 +94,12 @@ std::string place_of(const RunArguments& args, const std::string& message) {
 }
 
 Options options_of(const RunArguments& args) {
-  Options options(args.preset);
+  Options options;
+  options.set("preset", args.preset, "--preset");
   if (!args.config.empty()) options.load(args.config);
   for (const std::string& assignment : args.set) options.assign(assignment, "--set");
   if (!args.filter.empty()) options.set("dynamics.filter", args.filter, "--filter");
-  options.disable(args.disable);
+  options.disable(args.disable, "--disable");
   if (args.has_seed) options.set("seed", std::to_string(args.seed), "--seed");
   if (args.final_ba) options.set("global_ba.final", "true", "--final-ba");
   options.threaded = args.threads != 1;

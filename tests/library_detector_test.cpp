@@ -283,6 +283,63 @@ TEST_F(LibraryDetectors, NonsenseIsLeftOutWithAWarning) {
   }
 }
 
+TEST_F(LibraryDetectors, ANullIsRefused) {
+  Detectors detectors;
+  detectors.prompt.push_back(nullptr);
+  EXPECT_EQ(error_of([&] { slam_with(detectors); }), "detectors: one of `prompt` is null; leave it out");
+}
+
+TEST_F(LibraryDetectors, WhatADetectorThrowsIsToldInOneLine) {
+  Detectors detectors = Detectors::none();
+  detectors.prompt.push_back(std::make_shared<FunctionDetector>(
+      [](const DetectorInput&) -> Detections { throw std::runtime_error("Traceback:\n  line 3\r\nno memory\n"); }));
+  Slam slam = slam_with(detectors);
+  slam.process(people[0]);
+  const auto warnings = warnings_of(slam);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].text, "detector function failed: Traceback:  line 3 no memory");
+}
+
+TEST_F(LibraryDetectors, ThatTheyTakeAllFeaturesIsToldWhereTrackingCannotBegin) {
+  Detectors detectors = Detectors::none();
+  detectors.prompt.push_back(std::make_shared<FunctionDetector>([](const DetectorInput& image) {
+    Detections everything;
+    everything.mask = GreyImage(image.depth.width, image.depth.height, 255);
+    return everything;
+  }));
+  Slam slam = slam_with(detectors);
+  feed(slam, people);
+  const auto warnings = warnings_of(slam);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].text.find("100% of them lie on what the detector (function) takes for movers"),
+            std::string::npos)
+      << warnings[0].text;
+}
+
+TEST_F(LibraryDetectors, FromWithinADetectorOrAKeyframeRuleNothingIsFed) {
+  Slam* self = nullptr;
+  Detectors detectors = Detectors::none();
+  detectors.prompt.push_back(std::make_shared<FunctionDetector>([&](const DetectorInput&) {
+    self->process(people[9]);
+    return Detections();
+  }));
+  Slam slam = slam_with(detectors);
+  self = &slam;
+  EXPECT_TRUE(slam.process(people[0]).tracked());
+  const auto warnings = warnings_of(slam);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].text.find("it is at work for another call"), std::string::npos) << warnings[0].text;
+
+  const auto rule = std::make_shared<EveryNth>(3);
+  Slam ruled(world.camera(), Options(), Detectors::none(), rule);
+  feed(ruled, {people[0], people[1]});
+  rule->throws = [&] { ruled.reset(); };
+  EXPECT_NE(error_of([&] { ruled.process(people[2]); }).find("it is at work"), std::string::npos);
+  rule->throws = nullptr;
+  ruled.reset();
+  EXPECT_TRUE(ruled.process(people[0]).tracked());
+}
+
 TEST_F(LibraryDetectors, AResetThatFailsIsAnErrorAndTheNextOneMayWork) {
   bool broken = true;
   const auto detector = std::make_shared<FunctionDetector>([](const DetectorInput&) { return Detections(); });

@@ -109,6 +109,28 @@ TEST_F(LibraryEvents, ACallbackMaySetAnother) {
   EXPECT_EQ(second, 1);
 }
 
+TEST_F(LibraryEvents, ANewMapSaysWhatIsNotKnownOfIt) {
+  Slam slam = slam_with(std::make_shared<EveryNth>(4));
+  feed(slam, eventful(world));
+  std::vector<std::string> texts;
+  for (const Event& e : slam.take_events())
+    if (e.kind == Kind::new_map) texts.push_back(e.text);
+  EXPECT_EQ(texts, (std::vector<std::string>{
+                       "map 0 begins",
+                       "map 1 begins; how its world lies to that of map 0 is not known until they are joined"}));
+}
+
+TEST_F(LibraryEvents, ACallbackMayFeed) {
+  Slam slam = slam_with();
+  slam.on_event([&](const Event& e) {
+    if (e.kind == Kind::lost) slam.reset();
+  });
+  for (int i = 0; i < 4; ++i) slam.process(world.frame(i, {.shift = i}));
+  EXPECT_EQ(slam.process(world.frame(4, {.dark = true})).state, TrackingState::lost);
+  EXPECT_EQ(slam.statistics().frames, 0);
+  EXPECT_TRUE(slam.process(world.frame(0, {})).tracked());
+}
+
 TEST_F(LibraryEvents, WhatACallbackThrowsCostsNoOtherEvent) {
   Slam polled = slam_with(), called = slam_with();
   std::vector<Event> seen;

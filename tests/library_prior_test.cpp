@@ -83,6 +83,18 @@ TEST_F(LibraryPriors, APriorThatIsNoNumberIsRefusedAndHarmsNothing) {
   EXPECT_EQ(bytes_of(slam), bytes_of(undisturbed));
 }
 
+TEST_F(LibraryPriors, ACovarianceThatIsNotSymmetricIsRefused) {
+  Matrix6d half = Matrix6d::Identity();
+  half(0, 4) = 0.5;  // as who fills in one triangle
+  Frame frame = world.frame(0, {});
+  EXPECT_NE(error_of([&] { frame.set_prior(MotionPrior{{}, false, half}); }).find("not symmetric"), std::string::npos);
+  Slam slam(world.camera(), Options(), Detectors::none());
+  EXPECT_NE(error_of([&] { slam.suggest_pose({}, half); }).find("not symmetric"), std::string::npos);
+  half(4, 0) = 0.5 * (1 + 1e-9);  // as rounding leaves it
+  EXPECT_EQ(error_of([&] { frame.set_prior(MotionPrior{{}, false, half}); }), "no error");
+  EXPECT_EQ(error_of([&] { slam.suggest_pose({}, half); }), "no error");
+}
+
 TEST_F(LibraryPriors, InTheDarkThePoseGoesOnAndItsCovarianceGrows) {
   Slam slam(world.camera(), Options(), Detectors::none());
   double last_sd = 0;

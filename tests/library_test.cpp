@@ -173,6 +173,23 @@ TEST_F(Library, LocaliseOnlyMakesNoKeyframesAndNoMaps) {
   EXPECT_GT(slam.map().keyframe_count(), keyframes);
 }
 
+// It would take the place of a good one, and nobody could load it.
+TEST_F(Library, AnEmptyMapIsNotWritten) {
+  Slam slam = slam_with();
+  std::ofstream(folder / "a.dkb") << "of yesterday";
+  for (const char* name : {"a.dkb", "new.dkb"}) {
+    EXPECT_NE(error_of([&] { slam.save_map(folder / name); }).find("no keyframe yet"), std::string::npos);
+    EXPECT_NE(error_of([&] { slam.save_map_task()(folder / name); }).find(name), std::string::npos);
+  }
+  EXPECT_EQ(fs::file_size(folder / "a.dkb"), 12U);
+  EXPECT_FALSE(fs::exists(folder / "new.dkb"));
+  feed(slam, world.walk(0, 8));
+  slam.finish();
+  EXPECT_EQ(error_of([&] { slam.save_map(""); }), "save_map: the path is empty; give the name of a file, as map.dkb");
+  EXPECT_EQ(error_of([&] { slam.save_map(folder / "a.dkb"); }), "no error");
+  EXPECT_GT(fs::file_size(folder / "a.dkb"), 1000U);
+}
+
 TEST_F(Library, AMapTaskWritesTheMapOfItsMoment) {
   Slam slam = slam_with(std::make_shared<EveryNth>(3));
   feed(slam, world.walk(0, 10));
@@ -395,6 +412,38 @@ TEST_F(Library, StampsMayBeNegativeAndFarApart) {
   EXPECT_EQ(error_of([&] { slam.process(later); }), "no error");
 }
 
+// Frames before it are refused from then on.
+TEST_F(Library, AStampThatLeapsIsTold) {
+  Slam slam = slam_with();
+  feed(slam, world.walk(0, 6));
+  slam.take_events();
+  const Frame late = world.frame(306, {.shift = 6});
+  EXPECT_TRUE(slam.process(late).frame == 6);
+  EXPECT_NE(error_of([&] { slam.process(world.frame(7, {.shift = 7})); }), "no error");
+  std::string told;
+  for (const Event& e : slam.take_events())
+    if (e.kind == Kind::warning) told += e.text;
+  EXPECT_EQ(
+      told,
+      "the stamp is 10 s after the one before it; if the clock leapt, call reset(): frames with earlier stamps are "
+      "refused");
+}
+
+TEST_F(Library, WhatIsSkippedInAPauseIsNoLeapOfTheStamps) {
+  Slam slam = slam_with();
+  feed(slam, world.walk(0, 6));
+  slam.pause(true);
+  for (int i = 6; i < 400; i += 50) slam.process(world.frame(i, {.shift = 6}));
+  slam.pause(false);
+  feed(slam, {world.frame(400, {.shift = 6}), world.frame(401, {.shift = 7})});
+  for (const Event& e : slam.take_events()) EXPECT_NE(e.kind, Kind::warning) << e.text;
+}
+
+TEST_F(Library, EmptyBracesAreTheDefaultOptions) {
+  Slam slam(world.camera(), {}, Detectors::none());
+  EXPECT_EQ(slam.options().preset(), "default");
+}
+
 TEST_F(Library, SettingsOutOfRangeAreRefused) {
   Camera camera = world.camera();
   camera.width = 3;
@@ -402,6 +451,31 @@ TEST_F(Library, SettingsOutOfRangeAreRefused) {
   Detectors detectors = Detectors::none();
   detectors.schedule.every = 0;
   EXPECT_THROW(Slam(world.camera(), Options(), detectors), InvalidOption);
+  Options options;
+  options.base_from_cam.rotation.coeffs() *= 2;
+  EXPECT_NE(error_of([&] { Slam(world.camera(), options); }).find("base_from_cam: "), std::string::npos);
+}
+
+// Maps that are not joined.
+
+TEST_F(Library, TheDenseMapIsThatOfTheLastPosesWorld) {
+  Options options;
+  options.dense_map = true;
+  options.tracking.new_map_after = 0.3;
+  Slam slam = slam_with(std::make_shared<EveryNth>(4), options);
+  int views = 0;
+  for (int i = 0; i < 60; ++i) {
+    const FrameResult r = slam.process(world.frame(i, {.shift = i, .picture = i < 10 ? 1U : 9U}));
+    views += r.keyframe && r.map == 1;
+  }
+  slam.finish();
+  ASSERT_EQ(slam.statistics().maps, 2);
+  ASSERT_GT(views, 5);
+  EXPECT_EQ(slam.dense_map().views, views);
+  std::vector<int> of_map(2);
+  for (const PointInfo& p : slam.map().points()) ++of_map.at(static_cast<size_t>(p.map));
+  EXPECT_GT(of_map[0], 100);
+  EXPECT_GT(of_map[1], 100);
 }
 
 }  // namespace

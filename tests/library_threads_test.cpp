@@ -35,6 +35,33 @@ class LibraryThreads : public ::testing::Test {
   fs::path file;
 };
 
+// The one that comes while another is at work is refused, whole.
+TEST_F(LibraryThreads, TwoThreadsThatFeedHarmNothing) {
+  Slam slam = make(1);
+  std::atomic<bool> ended = false;
+  std::thread other([&] {
+    while (!ended) {
+      error_of([&] { slam.localize_only(false); });
+      error_of([&] { slam.save_map_task(); });
+      slam.on_event({});
+      std::this_thread::yield();
+    }
+  });
+  for (const Frame& frame : frames) {
+    std::string error;
+    do {
+      error = error_of([&] { slam.process(frame); });
+    } while (error.find("it is at work") != std::string::npos);
+    EXPECT_EQ(error, "no error");
+  }
+  ended = true;
+  other.join();
+  slam.finish();
+  Slam alone = make(1);
+  run(alone, frames);
+  EXPECT_EQ(bytes_of(slam), bytes_of(alone));
+}
+
 TEST_F(LibraryThreads, AThousandStartsStopsResetsAndLoads) {
   {
     Slam mapper = make(1);

@@ -56,7 +56,8 @@ class DKB_SLAM_API Frame {
   int64_t depth_stamp_ns() const { return depth_stamp_ns_; }  ///< of the depth image
   const std::optional<MotionPrior>& prior() const { return prior_; }
   /// Throws InputError, and leaves the prior as it was, when one of its numbers is not finite, the length of its
-  /// quaternion is more than 1e-3 off 1, or its covariance has a negative variance in some direction.
+  /// quaternion is more than 1e-3 off 1, or its covariance is not symmetric or has a negative variance in some
+  /// direction.
   void set_prior(const std::optional<MotionPrior>& prior);
   ImageView colour() const;  ///< rgb8; empty for grey cameras. Valid as long as a copy of the frame lives
   ImageView grey() const;    ///< grey8, likewise

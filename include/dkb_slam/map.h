@@ -24,6 +24,7 @@ struct PointInfo {
   Eigen::Vector3d position_in_world{0, 0, 0};  ///< [m]
   Rgb colour;                                  ///< as the keyframe that made it sees it; grey for grey cameras
   int observations = 0;                        ///< keyframes that see it
+  int map = 0;                                 ///< as KeyframeInfo::map: in whose world its position is
 };
 
 /// A neighbour in the covisibility graph.
@@ -74,7 +75,9 @@ struct SurfaceMesh {
   std::vector<std::array<int32_t, 3>> triangles;  ///< three indices into `vertices` each
 };
 
-/// Where a robot can drive: cells of the floor, seen from above.
+/// Where a robot can drive: cells of the floor, seen from above. Its axes are the floor's, not the world's: x along the
+/// first view, z up, the origin below that of the world. A place of the world is at floor_from_world * place; the point
+/// (x, y) of the grid is at floor_from_world.inverse() * (x, y, 0) in the world.
 struct OccupancyGrid {
   static constexpr uint8_t kOccupied = 0, kUnknown = 205, kFree = 254;  ///< as ROS' map_saver writes them
 
@@ -87,8 +90,9 @@ struct OccupancyGrid {
 /// The dense map of the still world: people and what they moved are left out.
 struct DenseMap {
   SurfaceMesh mesh;
-  std::optional<OccupancyGrid> grid;  ///< nothing when no floor was found
-  int views = 0;                      ///< keyframes that were fused
+  /// Nothing when no floor was found. It is the lowest large level surface seen so far: early on that may be a table.
+  std::optional<OccupancyGrid> grid;
+  int views = 0;  ///< keyframes that were fused
 };
 
 /// Files of a dense map: Stanford PLY (binary), and the two files that ROS' map_server reads. `image` is the name of

@@ -114,11 +114,14 @@ class DKB_SLAM_API Options {
   bool threaded = true;  ///< mapping, detection and loop search on threads of their own; false: the same bytes from one
   bool realtime = false;   ///< never wait for them but for the first detection; results may differ from run to run
   bool dense_map = false;  ///< keep what Slam::dense_map() needs: about 0.5 MB per keyframe
-  Rigid3 base_from_cam;    ///< mount: the world is the robot's base at the first tracked frame (a loaded map's stays)
+  /// Mount: the world is the robot's base at the first tracked frame (a loaded map's stays). Of finite numbers; the
+  /// length of its quaternion may be 1e-2 off 1, and is made 1.
+  Rigid3 base_from_cam;
 
-  /// Starts from "default", our best; "paper", DKB-SLAM as printed; or "orb", that without its three contributions.
-  /// Throws InputError naming the nearest one.
-  explicit Options(const std::string& preset = "default");
+  Options();  ///< starts from "default", our best
+  /// Starts from "default"; "paper", DKB-SLAM as printed; or "orb", that without its three contributions. Throws
+  /// InputError naming the nearest one.
+  explicit Options(const std::string& preset);
   const std::string& preset() const { return preset_; }
 
   /// Sets one setting from text ("features.count", "1200"), or "preset", which sets all of them. Keys that begin with
@@ -131,8 +134,8 @@ class DKB_SLAM_API Options {
   /// Sets what a YAML file holds, as written by to_yaml(), its preset first. Throws InputError with file and line.
   void load(const std::filesystem::path& path);
   /// Switches parts off, by comma: dr (rejecting what moves), kf (adaptive keyframes), ba (weighted bundle adjustment),
-  /// loop (loop closing).
-  void disable(const std::string& parts);
+  /// loop (loop closing). Throws InputError for any other, which `where` opens.
+  void disable(const std::string& parts, const std::string& where = "");
   /// The preset and every setting, a line each with its unit, meaning, range and default; experiments that were set.
   std::string to_yaml() const;
   /// Throws InvalidOption naming the whole key.

@@ -35,7 +35,8 @@ struct Event {
   int frame = 0;         ///< index of the frame it came with, as in FrameResult
   int64_t stamp_ns = 0;  ///< of that frame
   int keyframe = -1;     ///< of keyframe, loop and merge
-  std::string text;      ///< one line for people, may be empty; of warnings what is wrong, of keyframes the rule
+  /// One line for people, may be empty: of warnings what is wrong, of keyframes the rule, of a new map its number.
+  std::string text;
 };
 DKB_SLAM_API const char* name_of(Event::Kind kind);
 
@@ -78,8 +79,10 @@ struct Statistics {
 };
 
 /// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), save_map_task(), dense_map(),
-/// dense_map_task(), suggest_pose(), on_event() and the switches.
-/// Any thread reads meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events().
+/// dense_map_task(), suggest_pose() and the switches. Each of these throws InputError, and does nothing, while another is
+/// at work: on another thread, or because a detector or a keyframe rule calls it. Callbacks of on_event() may call them.
+/// Any thread calls meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events(),
+/// on_event().
 /// Several systems may live in one process and know nothing of each other.
 ///
 /// Deterministic: the same frames and options give the same poses and map to the last bit, with or without threads,
@@ -96,7 +99,8 @@ class DKB_SLAM_API Slam {
   Slam(Slam&&) noexcept;
   Slam& operator=(Slam&&) noexcept;
 
-  /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise.
+  /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise. A stamp that is
+  /// far ahead of the one before it is taken, and told as a warning: whatever comes before it is refused from then on.
   FrameResult process(const FrameInput& input);
   FrameResult process(const Frame& frame);  ///< likewise
 
@@ -111,21 +115,24 @@ class DKB_SLAM_API Slam {
   void localize_only(bool on);
   /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new
   /// map begins, at that place. The pose is in the world of the map, the covariance a right perturbation,
-  /// [translation m, rotation rad], camera axes.
-  /// Throws InputError when a number is not finite or the covariance is not positive.
+  /// [translation m, rotation rad], camera axes. It takes the place of what tracking knows: while the camera is tracked
+  /// well, that pose is given up, and the frames are lost until one is found.
+  /// Throws InputError when a number is not finite or the covariance is not symmetric and positive.
   void suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance);
   /// Every frame's result then says which of the keyframe tests said what, with their numbers.
   void explain_keyframes(bool on);
 
   /// Writes the map as it is now, by a temporary file and a rename. A real-time run waits for what mapping should have
-  /// done by now. Throws InputError when it cannot.
+  /// done by now. Throws InputError, and leaves a file that is there as it is, when it cannot or the map has no keyframe
+  /// yet.
   void save_map(const std::filesystem::path& path) const;
   /// The same, to be called on any thread and at any time: it writes the map of the moment of this call. For robots that
   /// save it while they go on tracking.
   std::function<void(const std::filesystem::path& path)> save_map_task() const;
   /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Poses are in
-  /// the world that the map was made with, whatever Options::base_from_cam says now. Throws InputError, and leaves all as
-  /// it is, when the file is broken or was made with another camera or pyramid.
+  /// the world that the map was made with, whatever Options::base_from_cam says now. The file holds no surfaces: the
+  /// dense map begins anew. Throws InputError, and leaves all as it is, when the file is broken or was made with another
+  /// camera or pyramid.
   void load_map(const std::filesystem::path& path);
 
   /// The map as tracking knows it.
@@ -139,7 +146,9 @@ class DKB_SLAM_API Slam {
   std::vector<TrajectoryFrame> keyframes() const;
   Statistics statistics() const;  ///< stages of other threads are complete after finish()
 
-  /// The still world from the keyframes so far; takes seconds. Throws InputError when Options::dense_map is off.
+  /// The still world from the keyframes so far; takes seconds. Of maps that are not joined, that of the last frame with a
+  /// pose. A map that was loaded has no images: only keyframes made since then are in it, and without new ones there is
+  /// no grid. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
   /// The same, to be called on any thread and at any time: it makes the map of the moment of this call, which itself
   /// takes no time. For robots that want a grid while they go on tracking.

@@ -23,6 +23,7 @@ struct Points {
     rgb = py::array_t<uint8_t>({n, py::ssize_t{3}});
     ids = py::array_t<uint32_t>(n);
     observations = py::array_t<int32_t>(n);
+    maps = py::array_t<int32_t>(n);
     double* position = xyz.mutable_data();
     uint8_t* colour = rgb.mutable_data();
     for (py::ssize_t i = 0; i < n; ++i) {
@@ -31,12 +32,13 @@ struct Points {
       for (const uint8_t channel : {point.colour.r, point.colour.g, point.colour.b}) *colour++ = channel;
       ids.mutable_at(i) = point.id;
       observations.mutable_at(i) = point.observations;
+      maps.mutable_at(i) = point.map;
     }
   }
   py::array_t<double> xyz;
   py::array_t<uint8_t> rgb;
   py::array_t<uint32_t> ids;
-  py::array_t<int32_t> observations;
+  py::array_t<int32_t> observations, maps;
 };
 
 py::tuple keyframe_neighbours(const KeyframeInfo& keyframe) {
@@ -126,7 +128,8 @@ void bind_map(py::module_& module) {
       .def_readonly("xyz", &Points::xyz, "float64 [M, 3], [m] in the world.")
       .def_readonly("rgb", &Points::rgb, "uint8 [M, 3], as the keyframe that made the point sees it.")
       .def_readonly("ids", &Points::ids, "uint32 [M], lasting.")
-      .def_readonly("observations", &Points::observations, "int32 [M]: keyframes that see the point.");
+      .def_readonly("observations", &Points::observations, "int32 [M]: keyframes that see the point.")
+      .def_readonly("maps", &Points::maps, "int32 [M], as Keyframe.map: in whose world its position is.");
   py::class_<MapSnapshot>(module, "MapSnapshot",
                           "The map at one moment, unchanged from then on however tracking goes on.")
       .def_property_readonly("point_count", &MapSnapshot::point_count)

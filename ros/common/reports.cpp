@@ -83,14 +83,23 @@ void SlamCore::run_grids() {
       std::promise<Answer> answered;
       std::function<dkb::DenseMap()> make_dense_map;
       int64_t stamp_ns = 0;
+      bool beside_loaded = false;
       request(
           [&](dkb::Slam& slam) {
+            // The dense map is of the world of the last pose.
+            beside_loaded = loaded_maps_ > 0 && last_map_.value_or(0) >= loaded_maps_;
+            if (beside_loaded) return Answer{false, ""};
             make_dense_map = slam.dense_map_task();
             stamp_ns = last_stamp_ns_.value_or(0);
             return Answer{true, ""};
           },
           [&](const Answer& answer) { answered.set_value(answer); });
-      if (answered.get_future().get().success) try {
+      const bool has_task = answered.get_future().get().success;
+      const auto tell = [&](const std::string& why) {
+        if (std::exchange(said, why) != why) middleware_.log(LogLevel::warning, "no grid: " + why);
+      };
+      if (beside_loaded) tell("the map that was begun beside the loaded one has no place in it yet");
+      if (has_task) try {
           const dkb::DenseMap dense = make_dense_map();
           if (dense.grid) {
             GridOutput grid = grid_in_map(*dense.grid);
@@ -101,7 +110,7 @@ void SlamCore::run_grids() {
             const std::string why = dense.views > 0             ? "the floor has not been seen"
                                     : parameters_.localize_only ? "localize_only makes no keyframes"
                                                                 : "no keyframes yet";
-            if (std::exchange(said, why) != why) middleware_.log(LogLevel::warning, "no grid: " + why);
+            tell(why);
           }
         } catch (const std::exception& error) {
           middleware_.log(LogLevel::warning, error.what());

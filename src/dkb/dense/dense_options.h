@@ -10,7 +10,6 @@ struct DenseOptions {
   double max_depth = 4.0;       // [m] depths beyond tell of free space only, 0.5 ... 16
   int pixel_step = 2;           // [px] every how many pixels, in x and y, depth is kept of a keyframe, 1 ... 8
   int mover_margin = 10;        // [px] around movers that is left out as well, 0 ... 100
-  double edge_fraction = 0.05;  // [1] depths beside a step of this share are left out, > 0
   double grid_cell = 0.05;      // [m] side of a cell of the occupancy grid, 0.01 ... 1, >= 2 voxels
   double obstacle_low = 0.10;   // [m] above the floor: what is lower can be driven over, > 0
   double obstacle_high = 1.50;  // [m] what is higher can be driven under, > obstacle_low

@@ -8,9 +8,11 @@
 namespace dkb {
 namespace {
 
+constexpr double kEdgeShare = 0.05;  // depths beside a step of this share are left out
+
 // Whether the 3 x 3 pixels around (x, y) are on one surface with it. Pixels without depth say nothing.
-bool on_one_surface(const DepthImage& depth, int x, int y, float fraction) {
-  const float z = depth(x, y), step = fraction * z;
+bool on_one_surface(const DepthImage& depth, int x, int y) {
+  const float z = depth(x, y), step = static_cast<float>(kEdgeShare) * z;
   for (int v = std::max(0, y - 1); v <= std::min(depth.height() - 1, y + 1); ++v)
     for (int u = std::max(0, x - 1); u <= std::min(depth.width() - 1, x + 1); ++u)
       if (depth(u, v) > 0 && std::abs(depth(u, v) - z) > step) return false;
@@ -74,7 +76,7 @@ DepthView DepthViewMaker::make(FrameIndex frame, const RgbdImage& image, const M
     const float z = image.depth.data()[s];
     if (!(z > 0)) continue;
     const int u = source_[i] % camera_.width, v = source_[i] / camera_.width;
-    if (on_one_surface(image.depth, u, v, static_cast<float>(options_.edge_fraction)))
+    if (on_one_surface(image.depth, u, v))
       view.depth.data()[i] = static_cast<uint16_t>(std::min(z * DepthView::kUnitsPerMetre + 0.5F, 65535.0F));
   }
   remove(movers, &view);

@@ -31,13 +31,16 @@ std::vector<VoxelIndex> blocks_at_surface(const PlacedView& placed, const ViewCa
   const Rigid3 world_from_cam = placed.cam_from_world.inverse();
   const Eigen::Matrix3d r = world_from_cam.matrix3();
   const double block = options.voxel * VoxelBlock::kSide;
+  // Places on a ray are no further apart than a block's side, or it would pass blocks unseen.
+  const int steps = std::max(2, static_cast<int>(std::ceil(2 * options.truncation / block)));
   std::vector<VoxelIndex> result;
   for (int y = 0; y < view.depth.height(); y += kAllocationStride)
     for (int x = 0; x < view.depth.width(); x += kAllocationStride) {
       const double z = static_cast<double>(view.metres(x, y));
       if (!(z > 0) || z > options.max_depth) continue;
       const Eigen::Vector3d ray = r * camera.ray(x, y);
-      for (const double along : {z - options.truncation, z, z + options.truncation}) {
+      for (int i = 0; i <= steps; ++i) {
+        const double along = z + options.truncation * (2.0 * i / steps - 1);
         const Eigen::Vector3d p = (world_from_cam.translation + along * ray) / block;
         const VoxelIndex index{static_cast<int32_t>(std::floor(p.x())), static_cast<int32_t>(std::floor(p.y())),
                                static_cast<int32_t>(std::floor(p.z()))};

@@ -76,6 +76,25 @@ TEST(TsdfVolume, WhatWasSeenForAMomentIsNotKnown) {
   EXPECT_FALSE(near_surface(fuse(make_views(3, {}, scene_options(), 0.15))).empty());
 }
 
+// Blocks have 8 voxels a side: distances are kept up to two of them from the surface, and the ones between count too.
+TEST(TsdfVolume, NoBlockWithinTheTruncationIsMissing) {
+  DenseOptions options = scene_options();
+  options.truncation = 20 * options.voxel;
+  const Views v = make_views(2, {}, options);
+  const TsdfVolume volume = fuse(v, options);
+  const DepthView& view = v.views[0];
+  const int x = view.depth.width() / 2 & ~1, y = view.depth.height() / 2 & ~1;  // of those that blocks are asked for
+  const double z = static_cast<double>(view.metres(x, y)), block = options.voxel * VoxelBlock::kSide;
+  ASSERT_GT(z, 0);
+  int looked = 0;
+  for (double along = -options.truncation; along <= options.truncation; along += options.voxel, ++looked) {
+    const Eigen::Vector3d p = scene_pose(0) * ((z + along) * v.camera.ray(x, y)) / block;
+    const auto side = [](double d) { return static_cast<int32_t>(std::floor(d)); };
+    EXPECT_GE(volume.find({side(p.x()), side(p.y()), side(p.z())}), 0) << along;
+  }
+  EXPECT_GE(looked, 40);
+}
+
 TEST(TsdfVolume, SurfacesLieWhereTheyAre) {
   const DenseScene scene;
   const auto points = near_surface(fuse(make_views(6, {})));

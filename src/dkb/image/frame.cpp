@@ -7,6 +7,7 @@
 #include "dkb/geometry/decompositions.h"
 #include "dkb/geometry/motion_model.h"
 #include "dkb/geometry/rigid3.h"
+#include "dkb/image/given_motion.h"
 #include "dkb/image/image.h"
 #include "dkb/image/pixel_views.h"
 #include "dkb/image/rgbd_image.h"
@@ -48,8 +49,9 @@ void check_prior(const MotionPrior& prior) {
   const Rigid3& m = prior.previous_from_current;
   if (!m.translation.allFinite() || !m.rotation.coeffs().allFinite() || !prior.covariance.allFinite())
     throw InputError("motion prior: one of its numbers is not finite; leave the prior out of this frame");
-  if (std::abs(m.rotation.norm() - 1) > 1e-3)
-    throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
+  if (!is_rigid(m, kGivenNorm)) throw InputError("motion prior: its rotation is no unit quaternion; normalise it");
+  if (!is_symmetric(prior.covariance))
+    throw InputError("motion prior: its covariance is not symmetric; give a covariance matrix");
   if (spectrum(prior.covariance).values[0] < -1e-12 * prior.covariance.cwiseAbs().maxCoeff())
     throw InputError(
         "motion prior: its covariance has a negative variance in some direction; give a covariance matrix");

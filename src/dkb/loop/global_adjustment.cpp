@@ -11,18 +11,15 @@
 namespace dkb {
 namespace {
 
-// The live keyframes around `start`, increasing: as many as have that many neighbours together. They are sought along
-// all that holds keyframes together: points, motions, and the tree where there is neither. Without a start those of
-// each map around its newest one, the map of the newest of all first.
-std::vector<KeyframeId> keyframes_around(const Map& map, KeyframeId start, size_t most_neighbours) {
+// The live keyframes around `places`, all at once, increasing: as many as have that many neighbours together. They are
+// sought along all that holds keyframes together: points, motions, and the tree where there is neither. Without places
+// those of each map around its newest one, the map of the newest of all first.
+std::vector<KeyframeId> keyframes_around(const Map& map, const std::vector<KeyframeId>& places,
+                                         size_t most_neighbours) {
   std::vector<KeyframeId> taken;
-  std::vector<std::vector<KeyframeId>> children(static_cast<size_t>(map.keyframe_count()));
+  const std::vector<std::vector<KeyframeId>> children = map.children_of_each();
   std::vector<KeyframeId> starts = map.live_keyframes();
-  for (KeyframeId k : starts)
-    if (const KeyframeId parent = map.keyframe(k)->parent; parent != kNoKeyframe)
-      children[static_cast<size_t>(parent)].push_back(k);
   std::reverse(starts.begin(), starts.end());
-  if (start != kNoKeyframe) starts = {map.live_ancestor(start).id};
 
   std::vector<uint8_t> seen(static_cast<size_t>(map.keyframe_count()), 0);
   size_t sum = 0;
@@ -34,6 +31,11 @@ std::vector<KeyframeId> keyframes_around(const Map& map, KeyframeId start, size_
     sum += k->covisible.size();
     taken.push_back(id);
   };
+  if (!places.empty()) starts.clear();
+  for (KeyframeId place : places) {
+    starts.push_back(map.live_ancestor(place).id);
+    take(starts.back());
+  }
   size_t next = 0;
   for (KeyframeId s : starts) {
     take(s);
@@ -69,8 +71,8 @@ std::vector<uint8_t> those_that_stay(const Map& map, const std::vector<KeyframeI
 
 }  // namespace
 
-MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local, KeyframeId around,
-                              size_t most_neighbours) {
+MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
+                              const std::vector<KeyframeId>& around, size_t most_neighbours) {
   MapCorrection correction;
   const std::vector<KeyframeId> keyframes = keyframes_around(map, around, most_neighbours);
   if (keyframes.size() < 2) return correction;
@@ -85,7 +87,7 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
     for (const Observation& o : map.point(p)->observations) observed += takes_part[static_cast<size_t>(o.keyframe)];
     return observed < 2;
   });
-  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics);
+  BaWindow window = make_ba_window(map, keyframes, std::move(fixed), std::move(points), optics, local.planes);
   if (local.weighted) set_geometric_weights(window.problem, local.weights);
   BaOptions ba;
   ba.rounds = {5, 10};  // [steps] before and after outliers are told apart

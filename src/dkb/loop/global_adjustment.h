@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "dkb/mapping/local_bundle_adjustment.h"
 #include "dkb/mapping/map_correction.h"
@@ -13,11 +14,11 @@ namespace dkb {
 // quarter of this number it is some seconds, and a path of 200 m already misses keyframes (docs/benchmarks.md).
 inline constexpr size_t kMostNeighbours = 160000;
 
-// Adjusts the keyframes and points of a snapshot: those of the map that keyframe `around` is in, or of all maps if
-// there is none. The first keyframe of each map stays. Where these have more than `most_neighbours` covisible
+// Adjusts the keyframes and points of a snapshot: those of the maps that keyframes `around` are in, or of all maps if
+// there are none. The first keyframe of each map stays. Where these have more than `most_neighbours` covisible
 // neighbours together, it takes what is nearest to `around`, else to the newest one, and what borders on the rest
 // stays. `local` tells how points are weighted. Deterministic.
 MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalBaOptions& local,
-                              KeyframeId around = kNoKeyframe, size_t most_neighbours = kMostNeighbours);
+                              const std::vector<KeyframeId>& around = {}, size_t most_neighbours = kMostNeighbours);
 
 }  // namespace dkb

@@ -12,7 +12,7 @@ LoopCloser::LoopCloser(const Optics& optics, const LoopOptions& options, uint64_
     : optics_(optics), options_(options), seed_(seed) {}
 
 std::optional<MapCorrection> LoopCloser::process(const Map& snapshot, KeyframeId id) {
-  if (id < rests_until_) return std::nullopt;
+  if (rests(id)) return std::nullopt;
   const auto finding = find_loop(snapshot, id, optics_, options_, seed_);
   if (!finding) return std::nullopt;
   rests_until_ = id + 1 + kRestKeyframes;

@@ -12,6 +12,8 @@ class LoopCloser {
  public:
   LoopCloser(const Optics& optics, const LoopOptions& options, uint64_t seed);
 
+  // Nothing is looked for from this keyframe: a loop that was closed just before is the one that it sees.
+  bool rests(KeyframeId id) const { return id < rests_until_; }
   // `snapshot` holds keyframe `id`. What to do about the loop that it closes, if it does.
   std::optional<MapCorrection> process(const Map& snapshot, KeyframeId id);
 

@@ -93,9 +93,7 @@ std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id) {
 std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
   const auto count = static_cast<size_t>(map.keyframe_count());
   std::vector<PathThroughMap> paths(count);
-  std::vector<std::vector<KeyframeId>> children(count);
-  for (KeyframeId k : map.live_keyframes())
-    if (map.keyframe(k)->parent != kNoKeyframe) children[static_cast<size_t>(map.keyframe(k)->parent)].push_back(k);
+  const std::vector<std::vector<KeyframeId>> children = map.children_of_each();
   using Entry = std::pair<double, KeyframeId>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   paths[static_cast<size_t>(from)].length = 0;
@@ -150,9 +148,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     if (m.score < kMinRelativeSimilarity * neighbour_score || static_cast<int>(candidates.size()) >= kMaxCandidates)
       break;
     candidates.push_back(m.id);
-    const auto& covisible = map.keyframe(m.id)->covisible;
-    for (size_t i = 0; i < std::min(covisible.size(), kAreaKeyframes / 2); ++i)
-      covered[static_cast<size_t>(covisible[i].keyframe)] = 1;
+    for (KeyframeId k : map.best_covisible(m.id, kAreaKeyframes / 2)) covered[static_cast<size_t>(k)] = 1;
   }
 
   std::vector<PathThroughMap> paths;

@@ -104,6 +104,21 @@ std::vector<KeyframeId> Map::roots() const {
   return ids;
 }
 
+std::vector<std::vector<KeyframeId>> Map::children_of_each() const {
+  std::vector<std::vector<KeyframeId>> children(keyframes_.size());
+  for (KeyframeId id : live_keyframes())
+    if (const KeyframeId parent = keyframe(id)->parent; parent != kNoKeyframe)
+      children[static_cast<size_t>(parent)].push_back(id);
+  return children;
+}
+
+std::vector<KeyframeId> Map::best_covisible(KeyframeId id, size_t most) const {
+  const std::vector<Covisible>& all = keyframe(id)->covisible;
+  std::vector<KeyframeId> best;
+  for (size_t i = 0; i < std::min(all.size(), most); ++i) best.push_back(all[i].keyframe);
+  return best;
+}
+
 std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
   std::vector<KeyframeId> newest;
   if (keyframe(id) == nullptr) return newest;

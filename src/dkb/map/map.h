@@ -119,6 +119,10 @@ class Map {
   // Of all keyframes ever made: whoever asks for many walks no path twice.
   std::vector<KeyframeId> root_of_each() const;
   std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
+  // Per keyframe ever made, the live ones that hang on it in the spanning tree, increasing.
+  std::vector<std::vector<KeyframeId>> children_of_each() const;
+  // Of the keyframes that share points with this one, which must exist, those that share most; `most` at most.
+  std::vector<KeyframeId> best_covisible(KeyframeId id, size_t most) const;
   // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.
   std::vector<KeyframeId> newest_beside(KeyframeId id, int most) const;
   // The keyframes that see these points, by decreasing number of them, then increasing id. Points that are unknown are

@@ -26,7 +26,8 @@ MapSections write_sections(const Map& map, const MapFileContext& context);
 // the last two: they are empty then.
 MapFile read_sections(const std::array<std::string_view, MapSections::kCount>& sections, uint32_t format);
 
-bool sound(const Rigid3& pose);  // finite, its quaternion of unit norm
+bool sound(const Rigid3& pose);                    // finite, its quaternion of unit norm
+bool is_near_image(const Eigen::Vector2f& pixel);  // as can be turned into an integer
 void write_pose(ByteWriter& out, const Rigid3& pose);
 Rigid3 read_pose(ByteReader& in);
 

@@ -148,8 +148,7 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
     for (size_t f = 0; f < count; ++f, ++i) {
       Keypoint& p = features->keypoints[f];
       p.image_pixel = {image_x[i], image_y[i]};
-      if (!(std::abs(image_x[i]) <= 1e6f && std::abs(image_y[i]) <= 1e6f))
-        in.fail("has a feature far outside its image");
+      if (!is_near_image(p.image_pixel)) in.fail("has a feature far outside its image");
       const Eigen::Vector2f prediction = undistort(image_x[i], image_y[i]);
       p.pixel = {stepped(prediction.x(), step_x[i]), stepped(prediction.y(), step_y[i])};
       if (format >= 3 && depth[i] < 0)
@@ -162,8 +161,7 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
       p.octave = octave_before = static_cast<uint8_t>(octave_before + static_cast<uint8_t>(octave[i]));
       p.colour = colour[i];
       features->descriptors[f] = read_descriptor(descriptor_reader);
-      if (!(std::abs(p.pixel.x()) <= 1e6f && std::abs(p.pixel.y()) <= 1e6f))
-        in.fail("has a feature far outside its image");
+      if (!is_near_image(p.pixel)) in.fail("has a feature far outside its image");
     }
     if (count > 0) features->grid = KeypointGrid(features->keypoints, camera.width, camera.height);
     result.push_back(std::move(features));

@@ -11,13 +11,6 @@
 namespace dkb {
 namespace {
 
-// Far beyond any image, near enough to be turned into an integer.
-constexpr float kMaxPixel = 1e6f;
-
-bool sound(const Eigen::Vector2f& pixel) {
-  return std::abs(pixel.x()) <= kMaxPixel && std::abs(pixel.y()) <= kMaxPixel;  // false for NaN
-}
-
 // How far `pixel` lies from its prediction, counted in floats; 0 when they are equal, small when they are near.
 uint32_t step_from(float prediction, float pixel) {
   const uint32_t step = std::bit_cast<uint32_t>(pixel) - std::bit_cast<uint32_t>(prediction);
@@ -209,6 +202,11 @@ std::string point_section(const Map& map) {
 
 }  // namespace
 
+bool is_near_image(const Eigen::Vector2f& pixel) {
+  constexpr float kMaxPixel = 1e6F;                                             // far beyond any image
+  return std::abs(pixel.x()) <= kMaxPixel && std::abs(pixel.y()) <= kMaxPixel;  // false for NaN
+}
+
 bool sound(const Rigid3& pose) {
   return pose.rotation.coeffs().allFinite() && pose.translation.allFinite() &&
          std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
@@ -225,7 +223,7 @@ std::string flaw_of(const Keyframe& keyframe, int levels) {
   if (!sound(keyframe.cam_from_world) || !sound(keyframe.cam_from_parent)) return name + " has an impossible pose";
   if (!keyframe.features) return "";
   for (const Keypoint& k : keyframe.features->keypoints) {
-    if (!sound(k.pixel) || !sound(k.image_pixel)) return name + " has a feature far outside its image";
+    if (!is_near_image(k.pixel) || !is_near_image(k.image_pixel)) return name + " has a feature far outside its image";
     for (float depth : {k.depth, k.lent_depth})
       if (!std::isfinite(depth) || depth < 0) return name + " has a feature with an impossible depth";
     if (!std::isfinite(k.place_sigma) || k.place_sigma < 0) return name + " has a feature of impossible accuracy";

@@ -428,6 +428,26 @@ TEST(Map, TheNewestBesideAKeyframeAreOfItsOwnMap) {
   EXPECT_TRUE(m.map.newest_beside(4, 2).empty());
 }
 
+TEST(Map, ChildrenAreWhoeverLivesAndHangsOnAKeyframe) {
+  Map map = test::random_map(8, 10, 30, 5);
+  const auto children = map.children_of_each();
+  ASSERT_EQ(children.size(), static_cast<size_t>(map.keyframe_count()));
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
+    std::vector<KeyframeId> expected;
+    for (KeyframeId k : map.live_keyframes())
+      if (map.keyframe(k)->parent == id) expected.push_back(k);
+    EXPECT_EQ(children[static_cast<size_t>(id)], expected) << id;
+  }
+}
+
+TEST(Map, TheBestCovisibleKeyframesAreAsManyAsAreWantedOrThere) {
+  ThreeKeyframes world;
+  world.map.update_covisibility(1, 1);
+  EXPECT_EQ(world.map.best_covisible(1, 0), std::vector<KeyframeId>{});
+  EXPECT_EQ(world.map.best_covisible(1, 1), std::vector<KeyframeId>{0});
+  EXPECT_EQ(world.map.best_covisible(1, 5), (std::vector<KeyframeId>{0, 2}));
+}
+
 TEST(Map, KeyframesWithoutAParentAreTheRoots) {
   ThreeKeyframes m;
   EXPECT_EQ(m.map.roots(), std::vector<KeyframeId>{0});

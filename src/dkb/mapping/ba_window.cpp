@@ -7,7 +7,7 @@
 namespace dkb {
 
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
-                        std::vector<PointId> points, const Optics& optics) {
+                        std::vector<PointId> points, const Optics& optics, bool planes) {
   BaWindow window;
   BaProblem& problem = window.problem;
   problem.camera = optics.camera;
@@ -27,7 +27,7 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
           {static_cast<int>(c), previous, motion->since.previous_from_current, motion->information(), kChi2SixDof99});
   }
 
-  add_planes(map, window.keyframes, problem);
+  if (planes) add_planes(map, window.keyframes, problem);
 
   window.points = std::move(points);
   // Room for what comes and no more: in a large map half of it again would be some megabytes.

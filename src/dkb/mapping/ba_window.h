@@ -28,7 +28,8 @@ struct BaWindow {
 };
 
 // `keyframes` with their observations of `points`; all must be live. `fixed`: per keyframe, 1 = stays where it is.
+// `planes`: with what they see of planes.
 BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::vector<uint8_t> fixed,
-                        std::vector<PointId> points, const Optics& optics);
+                        std::vector<PointId> points, const Optics& optics, bool planes);
 
 }  // namespace dkb

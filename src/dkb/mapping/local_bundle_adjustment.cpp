@@ -37,9 +37,8 @@ Matrix6d common_error(const Map& map, const BaWindow& window, const BaResult& re
 
 std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const Optics& optics,
                                              const LocalBaOptions& options) {
-  std::vector<KeyframeId> keyframes = {newest};
-  for (const Covisible& c : map.keyframe(newest)->covisible)
-    if (static_cast<int>(keyframes.size()) < options.free_keyframes) keyframes.push_back(c.keyframe);
+  std::vector<KeyframeId> keyframes = map.best_covisible(newest, static_cast<size_t>(options.free_keyframes - 1));
+  keyframes.push_back(newest);
   std::sort(keyframes.begin(), keyframes.end());
 
   std::vector<PointId> points = map.points_of(keyframes);
@@ -64,7 +63,8 @@ std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const 
     fixed.push_back(1);
   }
   if (std::none_of(fixed.begin(), fixed.end(), [](uint8_t f) { return f != 0; })) fixed[0] = 1;
-  BaWindow window = make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), optics);
+  BaWindow window =
+      make_ba_window(map, std::move(keyframes), std::move(fixed), std::move(points), optics, options.planes);
   BaProblem& problem = window.problem;
   if (options.weighted) set_geometric_weights(problem, options.weights);
 

@@ -15,6 +15,7 @@ struct LocalBaOptions {
   int fixed_keyframes = 20;  // others that see their points, those with most first, >= 1
   bool weighted = true;      // geometric weights of DKB section 3.3 (switch BA of the paper's ablation)
   GeometricWeightOptions weights;
+  bool planes = true;  // those that the map knows take part
 };
 
 // Adjusts the neighbourhood of a keyframe (DKB eqs. 42-48) and writes the result into the map; observations that end as

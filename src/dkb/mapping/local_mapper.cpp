@@ -18,7 +18,7 @@ constexpr double kMinFoundRatio = 0.25;  // found / visible below which a young 
 constexpr int kProbationKeyframes = 3;   // after its birth that a point is on probation
 constexpr int kMinObservers = 2;         // keyframes that must see a point by the end of its probation
 constexpr int kRedundantObservers = 3;   // others at the same scale or finer that make a keyframe's point redundant
-constexpr int kFusionKeyframes = 10;     // covisible keyframes whose points are fused with a new keyframe's
+constexpr size_t kFusionKeyframes = 10;  // covisible keyframes whose points are fused with a new keyframe's
 constexpr double kFusionRadius = 3.0;    // [px] at the finest level
 constexpr double kSeamTolerance = 2.0;   // factor on radius and error limit of fusion where a loop was just closed
 constexpr size_t kCompared = 48;         // descriptors of a point that are compared, each with each
@@ -231,9 +231,7 @@ int LocalMapper::fuse_into(KeyframeId keyframe, const std::vector<PointId>& poin
 }
 
 void LocalMapper::fuse_neighbours(KeyframeId id) {
-  std::vector<KeyframeId> neighbours;
-  for (const Covisible& c : map_.keyframe(id)->covisible)
-    if (static_cast<int>(neighbours.size()) < kFusionKeyframes) neighbours.push_back(c.keyframe);
+  const std::vector<KeyframeId> neighbours = map_.best_covisible(id, kFusionKeyframes);
   for (KeyframeId n : neighbours) report_.points_fused += fuse_into(n, map_.points_of({id}));
   report_.points_fused += fuse_into(id, map_.points_of(neighbours));
 }

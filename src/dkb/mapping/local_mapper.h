@@ -16,7 +16,6 @@ namespace dkb {
 
 struct MappingOptions {
   double redundant_share = 0.9;  // a keyframe is culled when this share of its points is seen well elsewhere, 0 ... 1
-  bool planes = true;            // take part in bundle adjustment
   LocalBaOptions ba;
 };
 

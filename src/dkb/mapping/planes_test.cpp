@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "dkb/features/plane_test_scene.h"
+#include "dkb/mapping/ba_window.h"
 #include "dkb/mapping/test_map.h"
 
 namespace dkb {
@@ -91,6 +92,17 @@ TEST_F(Planes, TakeNoPartWhereFewKeyframesSeeThem) {
   const BaProblem p = problem({0, 1, 2});
   EXPECT_EQ(p.cam_from_world.size(), 3u);
   EXPECT_TRUE(p.motions.empty());
+}
+
+// As those of a map that was loaded.
+TEST_F(Planes, TakeNoPartWhereTheyAreNotWanted) {
+  for (int k = 0; k < 6; ++k) look(pose_at(k), pose_at(k));
+  const auto motions = [&](bool planes) {
+    return make_ba_window(map, {0, 1, 2, 3, 4, 5}, {1, 1, 1, 1, 1, 0}, {}, Optics(camera), planes)
+        .problem.motions.size();
+  };
+  EXPECT_EQ(motions(false), 1U) << "the keyframe's own";
+  EXPECT_GT(motions(true), 1U);
 }
 
 // Three planes that are not parallel say all of a pose.

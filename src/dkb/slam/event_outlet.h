@@ -18,13 +18,17 @@ class EventOutlet {
   void deliver(std::vector<Event> events) {
     if (events.empty()) return;
     // Copied, since a callback may set another one.
-    const auto callback = callback_;
-    const auto executor = executor_;
-    if (!callback) {
+    std::function<void(const Event&)> callback;
+    Slam::Executor executor;
+    {
       const std::lock_guard lock(mutex_);
-      for (Event& e : events) waiting_.push_back(std::move(e));
-      while (waiting_.size() > kMaxEvents) waiting_.pop_front();
-      return;
+      callback = callback_;
+      executor = executor_;
+      if (!callback) {
+        for (Event& e : events) waiting_.push_back(std::move(e));
+        while (waiting_.size() > kMaxEvents) waiting_.pop_front();
+        return;
+      }
     }
     // What a callback throws must not cost the events that come after it.
     std::exception_ptr thrown;
@@ -47,16 +51,17 @@ class EventOutlet {
     return events;
   }
   void set(std::function<void(const Event&)> callback, Slam::Executor executor) {
-    callback_ = std::move(callback);
-    executor_ = std::move(executor);
+    const std::lock_guard lock(mutex_);
+    callback_.swap(callback);  // what was there is destroyed after the lock: it may hold anything
+    executor_.swap(executor);
   }
 
  private:
   static constexpr size_t kMaxEvents = 10000;
 
-  std::function<void(const Event&)> callback_;  // the feeding thread's
+  std::mutex mutex_;  // guards what follows
+  std::function<void(const Event&)> callback_;
   Slam::Executor executor_;
-  std::mutex mutex_;
   std::deque<Event> waiting_;
 };
 

@@ -2,6 +2,7 @@
 #include "dkb/slam/loop_stage.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace dkb {
 namespace {
@@ -25,9 +26,13 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
       search_(
           [this](const Task& task) {
             Result result;
-            if (task.generation == closed_generation_) return result;  // the map is about to move
+            const KeyframeId keyframe = task.keyframes.front();
+            if (task.generation == closed_generation_) {  // the map is about to move
+              if (!closer_.rests(keyframe)) result.skipped = keyframe;
+              return result;
+            }
             const Stopwatch watch;
-            if (auto correction = closer_.process(*task.view, task.keyframe)) {
+            if (auto correction = closer_.process(*task.view, keyframe)) {
               result.correction = std::make_shared<const MapCorrection>(std::move(*correction));
               closed_generation_ = task.generation;
             }
@@ -41,7 +46,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
             Result result;
             result.generation = task.generation;
             result.correction =
-                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, task.keyframe));
+                std::make_shared<const MapCorrection>(adjust_globally(*task.view, optics, local_ba, task.keyframes));
             result.ms = watch.ms();
             return result;
           },
@@ -50,13 +55,16 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
 void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate, bool may_skip) {
   const int keyframes = view->live_keyframe_count();
   // An adjustment that a loop overtook is not made anew in vain: the searches wait for it.
-  while (!adjustment_overtaken_ && next_ < view->keyframe_count()) {
-    const KeyframeId keyframe = next_++;
-    if (!options_.loop.enabled || view->live_keyframe(keyframe) == nullptr) continue;
+  std::vector<KeyframeId> due;
+  if (!adjustment_overtaken_) {
+    due = std::exchange(again_, {});
+    while (next_ < view->keyframe_count()) due.push_back(next_++);
+  }
+  for (size_t i = 0; i < due.size(); ++i) {
+    if (!options_.loop.enabled || view->live_keyframe(due[i]) == nullptr) continue;
     // The newest ones are searched: what they show is where the camera is.
-    const auto left = static_cast<size_t>(view->keyframe_count() - keyframe);
-    if (may_skip && search_.outstanding() + left > kMaxLate) continue;
-    search_.push({view, keyframe, generation_}, now + rate.frames(options_.loop_latency(keyframes)));
+    if (may_skip && search_.outstanding() + due.size() - i > kMaxLate) continue;
+    search_.push({view, {due[i]}, generation_}, now + rate.frames(options_.loop_latency(keyframes)));
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
@@ -69,17 +77,20 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
 std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex now, bool wait) {
   std::vector<std::shared_ptr<const MapCorrection>> corrections;
   while (auto found = search_.take_due(now, wait)) {
-    times_.add("loop", found->ms);
+    if (found->skipped != kNoKeyframe) again_.push_back(found->skipped);
+    if (found->ms) times_.add("loop", *found->ms);
     if (!found->correction) continue;
     ++generation_;
     adjustment_wanted_ = true;
-    adjust_around_ = found->correction->near_side.front();
+    adjust_around_.push_back(found->correction->near_side.front());
     corrections.push_back(std::move(found->correction));
   }
   while (auto adjusted = adjustment_.take_due(now, wait)) {
-    times_.add("global_ba", adjusted->ms);
+    times_.add("global_ba", *adjusted->ms);
     adjustment_overtaken_ = adjusted->generation != generation_;
-    if (!adjustment_overtaken_) corrections.push_back(std::move(adjusted->correction));
+    if (adjustment_overtaken_) continue;
+    adjust_around_.clear();
+    corrections.push_back(std::move(adjusted->correction));
   }
   return corrections;
 }

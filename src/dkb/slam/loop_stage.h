@@ -43,34 +43,38 @@ class LoopStage {
   // Has all maps adjusted with the next view that is offered.
   void want_adjustment() {
     adjustment_wanted_ = true;
-    adjust_around_ = kNoKeyframe;
+    adjust_around_.clear();
   }
 
   // Corrections due at `now`, in the order in which mapping must take them.
   std::vector<std::shared_ptr<const MapCorrection>> take_due(FrameIndex now, bool wait);
-  bool idle() const { return search_.outstanding() == 0 && adjustment_.outstanding() == 0 && !adjustment_wanted_; }
+  bool idle() const {
+    return search_.outstanding() == 0 && adjustment_.outstanding() == 0 && !adjustment_wanted_ && again_.empty();
+  }
   // Durations of loop and global_ba since they were taken last, of the results that were taken.
   StageTimes take_times() { return times_.take(); }
 
  private:
   struct Task {
     MapView view;
-    KeyframeId keyframe = kNoKeyframe;  // that is searched, or adjusted around
+    std::vector<KeyframeId> keyframes;  // the one that is searched, or those adjusted around
     int generation = 0;
   };
   struct Result {
     std::shared_ptr<const MapCorrection> correction;  // none when nothing was found
     int generation = 0;                               // of an adjustment
-    double ms = 0;
+    KeyframeId skipped = kNoKeyframe;                 // to be searched when the loop found before it has moved the map
+    std::optional<double> ms;                         // of a search that was made
   };
 
   LoopStageOptions options_;
-  LoopCloser closer_;           // of the search's thread
-  int closed_generation_ = -1;  // likewise: where it found the last loop
-  int generation_ = 0;          // corrections handed out that moved the map by a loop or a merge
-  KeyframeId next_ = 0;         // the first keyframe that was not offered yet
+  LoopCloser closer_;              // of the search's thread
+  int closed_generation_ = -1;     // likewise: where it found the last loop
+  int generation_ = 0;             // corrections handed out that moved the map by a loop or a merge
+  KeyframeId next_ = 0;            // the first keyframe that was not offered yet
+  std::vector<KeyframeId> again_;  // those before it that were skipped, increasing
   bool adjustment_wanted_ = false, adjustment_overtaken_ = false;
-  KeyframeId adjust_around_ = kNoKeyframe;  // where the last loop was; none: everywhere
+  std::vector<KeyframeId> adjust_around_;  // where the loops since the last adjustment were; none: everywhere
   StageTimes times_;
   DueStage<Task, Result> search_, adjustment_;  // last: their threads use the above
 };

@@ -85,6 +85,27 @@ TEST(LoopStage, ThreadsDoNotChangeABit) {
   }
 }
 
+// The search was late, and the first of the keyframes that waited closes a loop: the map moves, and whoever it is too
+// early to search there for is passed over for five keyframes. The others are not forgotten.
+TEST(LoopStage, KeyframesThatWaitedWhenALoopWasFoundAreSearchedInTheMapThatItMoved) {
+  test::RoundTrip world;
+  world.go(test::RoundTrip::kRound + 2);
+  const int first = world.map.keyframe_count();
+  LoopStage stage(world.optics(), prompt(), {}, 1, false);
+  stage.start_at(first - 1);
+  world.go(12);
+  const auto searched = [&] { return stage.take_times().summaries()["loop"].count; };
+  stage.offer(world.map.snapshot(), 0, FrameRate(30), false);
+  const auto found = stage.take_due(1000, true);
+  ASSERT_EQ(found.size(), 1U);
+  const auto at = static_cast<size_t>(found[0]->near_side.front() - (first - 1));
+  EXPECT_EQ(searched(), at + 1) << "what was passed over took no time";
+  move_map(world.map, *found[0]);
+  stage.offer(world.map.snapshot(), 1001, FrameRate(30), false);
+  stage.take_due(1001 + 1000, true);
+  EXPECT_GT(searched(), 0U);
+}
+
 // In real time the search may be too late for all of them: the newest show where the camera is, back at the start.
 TEST(LoopStage, OfKeyframesThatWaitedTheNewestAreSearched) {
   test::RoundTrip world;

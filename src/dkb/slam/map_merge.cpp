@@ -33,7 +33,7 @@ std::optional<MergedMaps> merge_maps(const Map& first, const Map& second, const 
     seam = id;
   }
   if (!is_joined(mapper.map())) return std::nullopt;
-  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba, seam));
+  mapper.apply(adjust_globally(mapper.map(), optics, options.mapping.ba, {seam}));
   result.map = mapper.map();
   return result;
 }

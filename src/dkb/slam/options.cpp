@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dkb/image/given_motion.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
@@ -140,7 +141,7 @@ void bind_experiments(Settings& s, SlamOptions& o) {
          Range{0, 10, true});
   s.bind("experiment.mapping.ba.adaptive_weight", &w.adaptive, "estimate the weight from the residuals");
 
-  s.bind("experiment.mapping.planes", &o.mapping.planes, "flat surfaces take part in bundle adjustment");
+  s.bind("experiment.mapping.planes", &o.mapping.ba.planes, "flat surfaces take part in bundle adjustment");
 
   PaperFilterOptions& paper = o.dynamics.paper;
   s.bind("experiment.dynamics.paper.flow_threshold", &paper.flow_threshold, "[px] d_th (DKB eq. 9)", above(0));
@@ -224,7 +225,7 @@ SlamOptions preset_options(const std::string& name, const std::string& where) {
   o.dynamics.filter = FilterKind::paper;
   o.adaptive_keyframes = paper_keyframe_options();
   o.mapping.ba.weights.adaptive = false;
-  o.mapping.planes = false;
+  o.mapping.ba.planes = false;
   if (name == "orb") {
     o.dynamics.filter = FilterKind::none;
     o.keyframe_policy = KeyframePolicyKind::baseline;
@@ -245,6 +246,7 @@ SlamOptions expand(const Options& options) {
   o.pipeline.realtime = options.realtime;
   o.dense_map = options.dense_map;
   o.base_from_cam = options.base_from_cam;
+  o.base_from_cam.rotation.normalize();
   return o;
 }
 
@@ -258,8 +260,11 @@ std::string settings_table() {
   return table;
 }
 
+Options::Options() {
+  start_from("default", "preset");
+}
 Options::Options(const std::string& preset) {
-  start_from(preset, "--preset");
+  start_from(preset, "preset");
 }
 
 void Options::start_from(const std::string& preset, const std::string& where) {
@@ -300,7 +305,7 @@ void Options::load(const std::filesystem::path& path) {
   for (const SettingLine& line : lines) set(line.key, line.value, line.where);
 }
 
-void Options::disable(const std::string& list) {
+void Options::disable(const std::string& list, const std::string& where) {
   const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
   std::istringstream names(list);
   for (std::string name; std::getline(names, name, ',');) {
@@ -313,8 +318,8 @@ void Options::disable(const std::string& list) {
     else if (name == "loop")
       loop.enabled = false;
     else
-      throw InputError("--disable: there is no part \"" + name + "\"" + did_you_mean(name, known) +
-                       "; parts: dr, kf, ba, loop");
+      throw InputError((where.empty() ? "disable" : where) + ": there is no part \"" + name + "\"" +
+                       did_you_mean(name, known) + "; parts: dr, kf, ba, loop");
   }
 }
 
@@ -349,6 +354,11 @@ void Options::check() const {
                  "at least 2 times dense.voxel");
   require_option(dense.obstacle_high > dense.obstacle_low, "dense.obstacle_high", dense.obstacle_high,
                  "above dense.obstacle_low");
+  constexpr double kMountNorm = 1e-2;  // mounts are written by hand, to three digits
+  if (!is_rigid(base_from_cam, kMountNorm))
+    throw InvalidOption("base_from_cam",
+                        "a motion with a quaternion of length " + std::to_string(base_from_cam.rotation.norm()),
+                        "of finite numbers, with a quaternion of length 1; normalise it");
 }
 
 }  // namespace dkb

@@ -147,6 +147,27 @@ TEST(Options, ErrorsNameTheWholeKey) {
   rejects("dynamics.filter", [](auto& o) { o.dynamics.filter = static_cast<FilterKind>(99); });
 }
 
+TEST(Options, AMountIsARigidMotion) {
+  Options options;
+  options.base_from_cam.rotation.coeffs() *= 1.005;  // written by hand
+  EXPECT_EQ(test::input_error_of([&] { options.check(); }), "no error");
+  EXPECT_NEAR(expand(options).base_from_cam.rotation.norm(), 1, 1e-15);
+  options.base_from_cam.rotation.coeffs() *= 2;
+  EXPECT_EQ(
+      test::input_error_of([&] { options.check(); }),
+      "base_from_cam: a motion with a quaternion of length 2.010000 is out of range; it must be of finite numbers, "
+      "with a quaternion of length 1; normalise it");
+  const auto refused = [](const Rigid3& mount) {
+    Options with;
+    with.base_from_cam = mount;
+    return test::input_error_of([&] { with.check(); }).find("base_from_cam: ") == 0;
+  };
+  const double nan = std::nan("");
+  EXPECT_TRUE(refused({Eigen::Quaterniond(0, 0, 0, 0), Eigen::Vector3d::Zero()}));
+  EXPECT_TRUE(refused({Eigen::Quaterniond(nan, 0, 0, 0), Eigen::Vector3d::Zero()}));
+  EXPECT_TRUE(refused({Eigen::Quaterniond::Identity(), {0, nan, 0}}));
+}
+
 TEST(Options, AMisspeltKeyNamesTheNearestOne) {
   EXPECT_EQ(refusal("featurs.count=5"), "--set: unknown key \"featurs.count\" (did you mean \"features.count\"?)");
 }
@@ -170,7 +191,15 @@ TEST(Presets, OnlyThePapersWeightIsFixed) {
 }
 
 TEST(Presets, AnUnknownOneIsNamed) {
-  EXPECT_NE(test::input_error_of([] { Options("defalt"); }).find("default"), std::string::npos);
+  EXPECT_EQ(test::input_error_of([] { Options("defalt"); }),
+            "preset: there is no preset \"defalt\" (did you mean \"default\"?); presets: default, paper, orb");
+}
+
+TEST(Options, APartThatIsNotThereIsToldAsTheCallerSays) {
+  Options options;
+  const std::string what = ": there is no part \"bs\" (did you mean \"ba\"?); parts: dr, kf, ba, loop";
+  EXPECT_EQ(test::input_error_of([&] { options.disable("bs"); }), "disable" + what);
+  EXPECT_EQ(test::input_error_of([&] { options.disable("bs", "--disable"); }), "--disable" + what);
 }
 
 TEST(Presets, TheOrbOneIsThePapersWithItsPartsOff) {

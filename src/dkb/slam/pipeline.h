@@ -49,6 +49,8 @@ class Pipeline {
   void check(const Frame& frame) const;
   // A frame that fits. Throws InputError for what failed in a stage's thread: the pipeline is of no use after that.
   FrameResult process(const Frame& frame);
+  // A frame that nobody looked at came in between.
+  void pass_over() { stamp_doubt_.pass_over(); }
   // Waits for what mapping should have done by now, as a dataset run does at each frame anyway.
   void catch_up() {
     if (options_.pipeline.realtime) take_due_map(true);
@@ -93,6 +95,7 @@ class Pipeline {
   void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
   void note(Event::Kind kind, std::string text = "", int keyframe = -1);
   void note_changes(const TrackedFrame& tracked);
+  std::string remedy_without_features() const;
   void collect_times();
 
   const PipelineContext& context_;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the pipeline tells of a frame and of the run.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -12,6 +14,12 @@ namespace dkb {
 namespace {
 
 constexpr int kPatience = 30;  // [frames] without a map before that is told: about a second
+
+std::string new_map_text(int number) {
+  if (number == 0) return "map 0 begins";
+  return fmt::format("map {} begins; how its world lies to that of {} is not known until they are joined", number,
+                     number == 1 ? "map 0" : fmt::format("maps 0 to {}", number - 1));
+}
 
 }  // namespace
 
@@ -59,14 +67,14 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   }
   result.world_from_odom = odometry_.world_from_odom();
   record_.add(tracked, result, tracker_.map());
-  note_changes(tracked);
-  if (decision.insert) note(Event::Kind::keyframe, rule_of(decision), tracked.reference);
-  if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
-
   const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
                                      [](FeatureReason reason) { return reason != FeatureReason::none; });
   crowded_share_ =
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
+  note_changes(tracked);
+  if (decision.insert) note(Event::Kind::keyframe, rule_of(decision), tracked.reference);
+  if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
+
   last_mask_ = scene.mask;
   outcome.keyframe = decision.insert;
   scenes_.learn(outcome);
@@ -81,17 +89,25 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
 
 void Pipeline::note_changes(const TrackedFrame& tracked) {
   // Where a prior tells how the camera came there, the old map goes on.
-  if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map);
+  if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map, new_map_text(map_number(tracked.reference)));
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
   if (tracked.state == TrackingState::initialising && !localize_only_ && ++frames_before_map_ == kPatience)
-    note(Event::Kind::warning,
-         "tracking has not begun: none of the first " + std::to_string(kPatience) + " frames has " +
-             std::to_string(options_.tracking.initial_points) +
-             " features with depth; are there depth images, in units of the camera's depth_factor?");
+    note(Event::Kind::warning, "tracking has not begun: none of the first " + std::to_string(kPatience) +
+                                   " frames has " + std::to_string(options_.tracking.initial_points) +
+                                   " features with depth" + remedy_without_features());
   if (tracked.state == TrackingState::initialising && localize_only_ && ++frames_without_map_ == kPatience)
     note(Event::Kind::warning, "there is no map to localise in; load one, or end localize_only to make one");
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
+}
+
+// What to do about a frame of which too few features are left.
+std::string Pipeline::remedy_without_features() const {
+  if (crowded_share_ <= 0.5) return "; are there depth images, in units of the camera's depth_factor?";
+  return fmt::format(
+      " on what stands still: {:.0f}% of them lie on what the detector ({}) takes for movers; does it mark the still "
+      "world?",
+      100 * crowded_share_, scenes_.detector_kind());
 }
 
 // What runs beside tracking says how it is getting on.
@@ -122,9 +138,10 @@ std::vector<Event> Pipeline::take_events() {
 
 std::function<DenseMap()> Pipeline::dense_map_task() const {
   if (!dense_) throw InputError("dense map: it was not asked for; set Options::dense_map");
+  const std::vector<TrajectoryFrame> trajectory = record_.trajectory(TrajectoryKind::by_map);
   std::vector<TimedPose> poses;
-  for (const TrajectoryFrame& f : record_.trajectory(TrajectoryKind::by_map))
-    if (f.map == 0) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
+  for (const TrajectoryFrame& f : trajectory)  // maps that are not joined have worlds of their own
+    if (f.map == trajectory.back().map) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
   return [dense = *dense_, poses = std::move(poses), seed = options_.seed, mount = options_.base_from_cam] {
     return dense.build(poses, seed, mount);
   };

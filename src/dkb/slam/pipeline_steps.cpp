@@ -356,7 +356,7 @@ void Pipeline::push_start(const TrackedFrame* next) {
   MapStart start = std::move(*start_);
   start_.reset();
   if (next != nullptr && next->start_features) tracker_.remake(*next, start.packet);
-  if (options_.mapping.planes) start.packet.planes = find_planes(start.scene);
+  if (options_.mapping.ba.planes) start.packet.planes = find_planes(start.scene);
   mapping_.push(std::move(start.packet), mapping_due());
 }
 
@@ -374,7 +374,7 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
     const MotionPrior since{packet.cam_from_reference.inverse(), false, tracked.covariance};
     packet.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{packet.reference, since});
   }
-  if (options_.mapping.planes && !tracked.starts_map) packet.planes = find_planes(scene);
+  if (options_.mapping.ba.planes && !tracked.starts_map) packet.planes = find_planes(scene);
   since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
   for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;

@@ -25,6 +25,7 @@ constexpr int kHalvings = 20;        // of the interval in which a factor lies
 Frame PriorCalibration::calibrated(Frame frame) {
   given_ = frame.prior();
   if (!given_) return frame;
+  rotation_only_ = given_->rotation_only;
   given_->covariance += kExact * kExact * Matrix6d::Identity();
   MotionPrior prior = *given_;
   prior.covariance *= std::max(1.0, factor_);
@@ -69,8 +70,10 @@ std::string PriorCalibration::add(const MotionPrior& seen) {
 }
 
 bool PriorCalibration::contradict_images() const {
-  return static_cast<double>(steps_.size()) >= kUsual &&
-         beside_usual(&Step::squared_error) * kChi2SixDofMedian > kChi2SixDof99;
+  // What half of all steps stay below, and all but one in a hundred, in as many directions as the prior tells of.
+  const double half = rotation_only_ ? kChi2ThreeDofMedian : kChi2SixDofMedian;
+  const double most = rotation_only_ ? kChi2ThreeDof99 : kChi2SixDof99;
+  return static_cast<double>(steps_.size()) >= kUsual && beside_usual(&Step::squared_error) * half > most;
 }
 
 bool PriorCalibration::say_nothing() const {

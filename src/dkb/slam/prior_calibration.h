@@ -35,6 +35,7 @@ class PriorCalibration {
   double beside_usual(double Step::*value) const;
 
   std::optional<MotionPrior> given_;  // of this frame
+  bool rotation_only_ = false;        // the last one
   std::deque<Step> steps_;
   double factor_ = 1;  // of variances
   bool told_ = false;

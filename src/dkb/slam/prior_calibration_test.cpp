@@ -71,6 +71,17 @@ TEST(PriorCalibration, LearnsHowFarAPriorIsOffThatClaimsToBeExact) {
   EXPECT_FALSE(proud.say_nothing()) << "it is off by 2 mm in 3 cm";
 }
 
+// A turn has three degrees of freedom: half of all steps are off by less than 2.4 variances and one in a hundred by
+// more than 11.3. A gyroscope that is twice as far off as it says (4 * 2.4 = 9.5) is within that.
+TEST(PriorCalibration, TurnsAloneAreJudgedByTheirThreeDegreesOfFreedom) {
+  const auto turns = [](double factor) {
+    return after(
+        300, [factor](int, Random& r) { return noise(r, factor * kClaimed); }, true);
+  };
+  EXPECT_FALSE(turns(2).contradict_images());
+  EXPECT_TRUE(turns(2.6).contradict_images());
+}
+
 TEST(PriorCalibration, TellsMotionsOfTheBaseFromThoseOfTheCamera) {
   // cam_from_base: x ahead becomes z, y to the left -x.
   Eigen::Matrix3d axes;

@@ -155,11 +155,13 @@ int MapSnapshot::keyframe_count() const {
 }
 
 std::vector<PointInfo> MapSnapshot::points() const {
+  const std::vector<KeyframeId> roots = map_->roots(), root_of = map_->root_of_each();
   std::vector<PointInfo> points;
   points.reserve(map_->point_count());
   for (PointId id : map_->live_points()) {
     const MapPoint& p = *map_->point(id);
-    points.push_back({id, p.position, p.colour, static_cast<int>(p.observations.size())});
+    const int map = map_number(roots, root_of[static_cast<size_t>(p.observations.front().keyframe)]);
+    points.push_back({id, p.position, p.colour, static_cast<int>(p.observations.size()), map});
   }
   return points;
 }

@@ -2,12 +2,13 @@
 // The library's front door; what happens to a frame stands in pipeline.cpp.
 #include "dkb_slam/slam.h"
 
-#include <cmath>
+#include <atomic>
 #include <exception>
 #include <mutex>
 #include <utility>
 
 #include "dkb/geometry/decompositions.h"
+#include "dkb/image/given_motion.h"
 #include "dkb/image/skipped_motion.h"
 #include "dkb/map/map_file.h"
 #include "dkb/slam/event_outlet.h"
@@ -44,8 +45,27 @@ class Slam::Impl {
     context.camera.check();
     given.check();
     context.detectors.schedule.check();
+    for (const auto& detector : context.detectors.prompt)
+      if (detector == nullptr) throw InputError("detectors: one of `prompt` is null; leave it out");
     start({});
   }
+
+  // One feeding call at a time. What the owner of a turn throws ends it.
+  class Turn {
+   public:
+    explicit Turn(Impl& impl) : busy_(impl.busy) {
+      if (busy_.exchange(true, std::memory_order_acquire))
+        throw InputError(
+            "slam: it is at work for another call; feed it from one thread, and not from within a detector or a "
+            "keyframe rule");
+    }
+    ~Turn() { busy_.store(false, std::memory_order_release); }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    std::atomic<bool>& busy_;
+  };
 
   void throw_failure() const {
     if (failure) std::rethrow_exception(failure);
@@ -79,6 +99,14 @@ class Slam::Impl {
     pipeline->explain_keyframes(explain_keyframes);
   }
 
+  // With the events of the frame.
+  FrameResult process(const Frame& given, std::vector<Event>& told);
+  std::vector<Event> finish() {
+    const Turn turn(*this);
+    guarded([&] { pipeline->finish(); });
+    return pipeline->take_events();
+  }
+
   MapFileContext map_context() const {
     return {context.camera, context.options.features.scale, context.options.features.levels};
   }
@@ -91,6 +119,7 @@ class Slam::Impl {
 
   Options options;
   PipelineContext context;
+  std::atomic<bool> busy = false;
   bool paused = false, localize_only = false, explain_keyframes = false;
   SkippedMotion skipped;
   int last_frame = 0;  // that was accepted
@@ -112,47 +141,60 @@ FrameResult Slam::process(const FrameInput& input) {
 }
 
 FrameResult Slam::process(const Frame& given) {
-  if (impl_->paused) {
-    impl_->skipped.skip(given);
+  std::vector<Event> events;
+  FrameResult result = impl_->process(given, events);
+  impl_->events.deliver(std::move(events));  // out of turn: who is called may call
+  return result;
+}
+
+FrameResult Slam::Impl::process(const Frame& given, std::vector<Event>& told) {
+  const Turn turn(*this);
+  if (paused) {
+    skipped.skip(given);
+    if (pipeline) pipeline->pass_over();
     FrameResult result;
-    result.frame = impl_->last_frame;
+    result.frame = last_frame;
     result.stamp_ns = given.stamp_ns();
     result.state = TrackingState::paused;
     return result;
   }
-  const Frame frame = impl_->skipped.with_motion(given);
-  impl_->throw_failure();
-  impl_->pipeline->check(frame);
-  FrameResult result = impl_->guarded([&] { return impl_->pipeline->process(frame); });
-  impl_->skipped = {};
-  impl_->last_frame = result.frame;
-  impl_->events.deliver(impl_->pipeline->take_events());
+  const Frame frame = skipped.with_motion(given);
+  throw_failure();
+  pipeline->check(frame);
+  FrameResult result = guarded([&] { return pipeline->process(frame); });
+  skipped = {};
+  last_frame = result.frame;
+  told = pipeline->take_events();
   return result;
 }
 
 void Slam::finish() {
-  impl_->guarded([&] { impl_->pipeline->finish(); });
-  impl_->events.deliver(impl_->pipeline->take_events());
+  impl_->events.deliver(impl_->finish());
 }
 
 void Slam::reset() {
+  const Impl::Turn turn(*impl_);
   impl_->start({});
 }
 void Slam::pause(bool on) {
+  const Impl::Turn turn(*impl_);
   impl_->paused = on;
 }
 void Slam::localize_only(bool on) {
+  const Impl::Turn turn(*impl_);
   impl_->localize_only = on;
   if (impl_->pipeline) impl_->pipeline->localize_only(on);
 }
 void Slam::suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance) {
-  if (!world_from_cam.translation.allFinite() || !(std::abs(world_from_cam.rotation.norm() - 1) < 1e-3))
+  if (!is_rigid(world_from_cam, kGivenNorm))
     throw InputError("suggested pose: it is no rigid motion of finite numbers; give a unit quaternion");
-  if (!covariance.allFinite() || !(spectrum(covariance).values[0] > 0))
-    throw InputError("suggested pose: its covariance is not positive definite; give variances above 0");
+  if (!covariance.allFinite() || !is_symmetric(covariance) || !(spectrum(covariance).values[0] > 0))
+    throw InputError("suggested pose: its covariance is not symmetric and positive definite; give variances above 0");
+  const Impl::Turn turn(*impl_);
   if (impl_->pipeline) impl_->pipeline->suggest_pose({world_from_cam.inverse(), covariance});
 }
 void Slam::explain_keyframes(bool on) {
+  const Impl::Turn turn(*impl_);
   impl_->explain_keyframes = on;
   if (impl_->pipeline) impl_->pipeline->explain_keyframes(on);
 }
@@ -161,15 +203,21 @@ void Slam::save_map(const std::filesystem::path& path) const {
   save_map_task()(path);
 }
 std::function<void(const std::filesystem::path&)> Slam::save_map_task() const {
+  const Impl::Turn turn(*impl_);
   // After a failure the map as it was then may be saved; where no world could begin there is none.
   if (!impl_->pipeline) impl_->throw_failure();
   if (!impl_->failure) impl_->guarded([&] { impl_->pipeline->catch_up(); });
   return [map = impl_->shared_record()->map(), context = impl_->map_context()](const std::filesystem::path& path) {
+    if (path.empty()) throw InputError("save_map: the path is empty; give the name of a file, as map.dkb");
+    if (map.keyframe_count() == 0)
+      throw InputError(path.string() +
+                       ": not written, since the map has no keyframe yet; save it when frames have been tracked");
     dkb::save_map(path, *map.map(), context);
   };
 }
 
 void Slam::load_map(const std::filesystem::path& path) {
+  const Impl::Turn turn(*impl_);
   MapFile file = dkb::load_map(path);
   check_same_optics(file.context, impl_->map_context(), path.string());
   file.map.date_back();
@@ -196,6 +244,7 @@ DenseMap Slam::dense_map() const {
   return dense_map_task()();
 }
 std::function<DenseMap()> Slam::dense_map_task() const {
+  const Impl::Turn turn(*impl_);
   impl_->throw_failure();
   return impl_->pipeline->dense_map_task();
 }

@@ -29,9 +29,30 @@ TEST(StampDoubt, NothingIsToldOfAnyRateThatACameraMayRunAt) {
     for (const int64_t ms : {5, 16, 33, 100, 1000}) EXPECT_EQ(told(rate, ms * 1'000'000), "") << rate << ", " << ms;
 }
 
-TEST(StampDoubt, OneGapIsNoUnit) {
+// Frames whose stamps come before it are refused from then on.
+TEST(StampDoubt, OneGapIsToldAsALeapNotAsAUnit) {
+  for (const double rate : {0.0, 30.0})
+    for (const int at : {10, 50}) {
+      StampDoubt doubt(rate);
+      for (int i = 0; i < 60; ++i)
+        EXPECT_EQ(doubt.add(i * int64_t{33'333'333} + (i < at ? 0 : 10'000'000'000)),
+                  i == at ? "the stamp is 10 s after the one before it; if the clock leapt, call reset(): frames with "
+                            "earlier stamps are refused"
+                          : "");
+    }
+}
+
+TEST(StampDoubt, AGapOfThreeSecondsIsUsual) {
   StampDoubt doubt(30);
-  for (int i = 0; i < 60; ++i) EXPECT_EQ(doubt.add((i < 10 ? i : i + 1'000'000) * int64_t{33'333'333}), "");
+  for (int i = 0; i < 60; ++i) EXPECT_EQ(doubt.add(i * int64_t{33'333'333} + (i < 40 ? 0 : 3'000'000'000)), "");
+}
+
+TEST(StampDoubt, APauseIsNoLeap) {
+  StampDoubt doubt(30);
+  for (int i = 0; i < 60; ++i) {
+    if (i == 40) doubt.pass_over();
+    EXPECT_EQ(doubt.add(i * int64_t{33'333'333} + (i < 40 ? 0 : 10'000'000'000)), "");
+  }
 }
 
 }  // namespace

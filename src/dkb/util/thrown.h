@@ -3,17 +3,35 @@
 
 #include <exception>
 #include <string>
+#include <string_view>
 
 #include "dkb/util/errors.h"
 
 namespace dkb {
 
-// For catch blocks: what the exception that is being handled says.
+// A message of somebody else's as one line, as all of ours are.
+inline std::string as_one_line(std::string_view text) {
+  constexpr std::string_view kBreaks = "\r\n\t\v\f";
+  std::string line;
+  bool broken = false;
+  for (const char c : text) {
+    if (kBreaks.find(c) != std::string_view::npos) {
+      broken = true;
+      continue;
+    }
+    if (broken && !line.empty() && line.back() != ' ' && c != ' ') line += ' ';
+    broken = false;
+    line += c;
+  }
+  return line;
+}
+
+// For catch blocks: what the exception that is being handled says, in one line.
 inline std::string what_was_thrown() {
   try {
     throw;
   } catch (const std::exception& e) {
-    return e.what();
+    return as_one_line(e.what());
   } catch (...) {
     return "it threw something that is no exception";
   }
