@@ -147,13 +147,13 @@ void write_sequence(const Simulator& simulator, const std::filesystem::path& fol
   try {
     int reported = 0;
     std::unique_lock lock(mutex);
-    while (running > 0) {
-      changed.wait(lock);
-      const int now = done;
-      if (!progress || now == reported) continue;
-      reported = now;
+    for (;;) {
+      changed.wait(lock, [&] { return running == 0 || done != reported; });
+      if (done == reported) break;
+      reported = done;
+      if (!progress) continue;
       lock.unlock();
-      progress(now);
+      progress(reported);
       lock.lock();
     }
   } catch (...) {

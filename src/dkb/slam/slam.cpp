@@ -100,7 +100,26 @@ class Slam::Impl {
   }
 
   // With the events of the frame.
-  FrameResult process(const Frame& given, std::vector<Event>& told);
+  FrameResult process(const Frame& given, std::vector<Event>& told) {
+    const Turn turn(*this);
+    if (paused) {
+      skipped.skip(given);
+      if (pipeline) pipeline->pass_over();
+      FrameResult result;
+      result.frame = last_frame;
+      result.stamp_ns = given.stamp_ns();
+      result.state = TrackingState::paused;
+      return result;
+    }
+    const Frame frame = skipped.with_motion(given);
+    throw_failure();
+    pipeline->check(frame);
+    FrameResult result = guarded([&] { return pipeline->process(frame); });
+    skipped = {};
+    last_frame = result.frame;
+    told = pipeline->take_events();
+    return result;
+  }
   std::vector<Event> finish() {
     const Turn turn(*this);
     guarded([&] { pipeline->finish(); });
@@ -144,27 +163,6 @@ FrameResult Slam::process(const Frame& given) {
   std::vector<Event> events;
   FrameResult result = impl_->process(given, events);
   impl_->events.deliver(std::move(events));  // out of turn: who is called may call
-  return result;
-}
-
-FrameResult Slam::Impl::process(const Frame& given, std::vector<Event>& told) {
-  const Turn turn(*this);
-  if (paused) {
-    skipped.skip(given);
-    if (pipeline) pipeline->pass_over();
-    FrameResult result;
-    result.frame = last_frame;
-    result.stamp_ns = given.stamp_ns();
-    result.state = TrackingState::paused;
-    return result;
-  }
-  const Frame frame = skipped.with_motion(given);
-  throw_failure();
-  pipeline->check(frame);
-  FrameResult result = guarded([&] { return pipeline->process(frame); });
-  skipped = {};
-  last_frame = result.frame;
-  told = pipeline->take_events();
   return result;
 }
 
