@@ -245,7 +245,8 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
   int measured = 0;
   for (size_t i = 0; i < matches.size(); ++i)
     measured += both->label[i] == of_camera && observations[matches[i].observation].depth > 0;
-  if (both->count(of_camera) < min_still || 2 * measured < both->count(of_camera)) return std::nullopt;
+  const double still = both->count(of_camera);
+  if (still < min_still || measured < std::min(still / 2, static_cast<double>(min_still))) return std::nullopt;
   const Labels one(matches.size(), 0);
   const double cost_of_one = problem.cost({one, 0}, problem.fit({one, 0}, Vector6d::Zero(), 4));
   if (both->cost + kMoves * both->count(1 - of_camera) >= cost_of_one) return std::nullopt;

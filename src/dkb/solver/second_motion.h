@@ -29,8 +29,8 @@ inline double surface_around(double depth) {
 // is linear about the pose.
 //
 // Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
-// where fewer than `min_still` observations would be of the camera's, or an eighth of either, or where half of the
-// camera's have no depth. Deterministic.
+// where fewer than `min_still` observations would be of the camera's, or an eighth of either, or where of the
+// camera's neither half nor `min_still` have a depth of their own. Deterministic.
 std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
                                                   std::span<const PoseObservation> observations, int min_still);
 
