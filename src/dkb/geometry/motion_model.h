@@ -18,16 +18,17 @@ inline constexpr double kSpeedSd = 0.2;                // [m/s]
 inline constexpr double kAngularSpeedSd = 0.3;         // [rad/s]
 inline constexpr double kEvenMotion = 0.2;             // [s] over which its motion is taken to be even
 
-// [m/s] What its velocity may have changed by after some time, in each axis: an acceleration lasts no longer than until
-// the velocity is any other that a hand may have, which two independent ones tell. Turns are not bounded: robots turn
-// faster than hands.
+// [m/s] What two velocities of a hand that have nothing to do with each other differ by, in each axis. Turns have no
+// such bound: robots turn faster than hands.
+inline constexpr double kVelocityChangeSd = std::numbers::sqrt2 * kSpeedSd;
+// [m/s] What its velocity may have changed by after some time: an acceleration lasts until the velocity is any other.
 inline double velocity_change_sd(double seconds) {
-  return std::min(kAccelerationSd * seconds, std::numbers::sqrt2 * kSpeedSd);
+  return std::min(kAccelerationSd * seconds, kVelocityChangeSd);
 }
 // [m] What that takes the camera off by.
 inline double position_change_sd(double seconds) {
-  const double bound = std::numbers::sqrt2 * kSpeedSd, even = bound / kAccelerationSd;
-  return seconds < even ? 0.5 * kAccelerationSd * seconds * seconds : bound * (seconds - 0.5 * even);
+  constexpr double kLasts = kVelocityChangeSd / kAccelerationSd;  // [s] the acceleration
+  return seconds < kLasts ? 0.5 * kAccelerationSd * seconds * seconds : kVelocityChangeSd * (seconds - 0.5 * kLasts);
 }
 
 // [translation, rotation] of the same variance in each axis.
