@@ -47,6 +47,11 @@ void check_arguments(const ConvertArguments& arguments) {
       throw InputError(std::string(option) + ": does nothing when a " + (from_folder ? "folder" : "recording") +
                        " becomes a " + (to_folder ? "folder" : "recording") + ", only for " + of + "; leave it out");
   };
+  const fs::path out = arguments.out;
+  for (const char* ending : {".zip", ".oni", ".mp4", ".avi", ".mkv", ".tar", ".gz", ".tgz", ".7z", ".db3"})
+    if (to_folder && out.extension() == ending && !fs::is_directory(out, error))
+      throw InputError(arguments.out + ": " + ending +
+                       " is nothing that is written; give FILE.bag, FILE.mcap or the name of a folder");
   const SourceOptions& source = arguments.options.source;
   if (to_folder) refuse("--compression", !arguments.compression.empty(), "a recording that is written");
   if (!from_folder) refuse("--raw", arguments.options.raw, "a folder that is read");

@@ -11,14 +11,24 @@
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/plural.h"
 #include "dkb_slam/source.h"
 #include "export/results_recording.h"
 #include "interrupt.h"
+#include "report/other_maps.h"
 #include "source_options.h"
 #include "terminal.h"
 
 namespace dkb {
 namespace {
+
+// What lies in the worlds of other maps than that of trajectory.txt is left out.
+std::string with_left_out(const std::string& out, size_t poses, const std::filesystem::path& results) {
+  std::string line = out + ": " + plural(poses, "pose", "poses");
+  if (!std::filesystem::is_directory(results)) return line;
+  const std::string others = other_maps_text(poses_of_maps(results));
+  return others.empty() ? line : line + "; left out: " + others;
+}
 
 struct ExportArguments {
   std::string results, format, out, images;
@@ -43,14 +53,14 @@ void run_export(const ExportArguments& arguments) {
     const auto pictures = arguments.images.empty() ? nullptr : open_source(arguments.images, arguments.source);
     const Interrupt interrupt([] {});  // else it would leave half a file
     const size_t poses = write_results_recording(results, pictures.get(), out);
-    tell(stdout, "{}: {} poses\n", arguments.out, poses);
+    tell(stdout, "{}\n", with_left_out(arguments.out, poses, results));
     return;
   }
   const Trajectory trajectory = read_poses(fs::is_directory(results) ? results / "trajectory.txt" : results);
   write_file_atomically(out, arguments.format == "tum"     ? trajectory_to_text(trajectory)
                              : arguments.format == "kitti" ? trajectory_to_kitti(trajectory)
                                                            : trajectory_to_euroc(trajectory));
-  tell(stdout, "{}: {} poses\n", arguments.out, trajectory.size());
+  tell(stdout, "{}\n", with_left_out(arguments.out, trajectory.size(), results));
 }
 
 }  // namespace

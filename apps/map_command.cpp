@@ -17,6 +17,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/new_folder.h"
+#include "dkb/util/plural.h"
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
 #include "export/keyframe_pictures.h"
@@ -73,6 +74,16 @@ struct MapExportArguments {
   DetectorChoice detection;
 };
 
+// What an export of one map leaves out of a file with several.
+std::string left_out(const Map& map, size_t points, size_t keyframes) {
+  const size_t maps = map.roots().size();
+  if (maps < 2) return "";
+  return fmt::format("; left out: {} that {} never joined to it, with {} and {}", plural(maps - 1, "map", "maps"),
+                     maps == 2 ? "was" : "were",
+                     plural(static_cast<size_t>(map.live_keyframe_count()) - keyframes, "keyframe", "keyframes"),
+                     plural(map.point_count() - points, "point", "points"));
+}
+
 // A model for photogrammetry or splatting, with pictures and masks where their source is given.
 void export_model(const MapExportArguments& arguments) {
   const MapFile file = load_map(arguments.file);
@@ -82,8 +93,9 @@ void export_model(const MapExportArguments& arguments) {
   const std::filesystem::path out = arguments.out;
   const Interrupt interrupt([] {});
   NewFolder folder(out);
-  std::vector<KeyframeId> keyframes = keyframes_of_first_map(file.map);
+  std::vector<KeyframeId> keyframes = keyframes_of_largest_map(file.map);
   const size_t all = keyframes.size();
+  const std::string others = left_out(file.map, file.map.points_of(keyframes).size(), all);
   std::string pictures = "no images: --images SOURCE adds them, with masks of what moves";
   if (!arguments.images.empty()) {
     SourceOptions reading = arguments.reading;
@@ -98,7 +110,7 @@ void export_model(const MapExportArguments& arguments) {
     slam.localize_only(true);
     keyframes =
         write_keyframe_pictures(file, *source, slam, colmap ? MaskNames::with_ending : MaskNames::as_picture, out);
-    pictures = std::to_string(keyframes.size()) + " images with masks";
+    pictures = plural(keyframes.size(), "image with its mask", "images with masks");
     if (keyframes.size() < all)
       tell(stderr, "warning: {}: holds {} of the map's {} keyframes; the model has these alone\n", arguments.images,
            keyframes.size(), all);
@@ -108,8 +120,8 @@ void export_model(const MapExportArguments& arguments) {
   else
     write_nerfstudio(file, keyframes, !arguments.images.empty(), out);
   folder.keep();
-  tell(stdout, "{}: {} keyframes, {} points; {}\n", arguments.out, keyframes.size(),
-       file.map.points_of(keyframes).size(), pictures);
+  tell(stdout, "{}: {}, {}; {}{}\n", arguments.out, plural(keyframes.size(), "keyframe", "keyframes"),
+       plural(file.map.points_of(keyframes).size(), "point", "points"), pictures, others);
 }
 
 void check_arguments(const MapExportArguments& arguments) {
@@ -136,11 +148,22 @@ void export_map(const MapExportArguments& arguments) {
   check_arguments(arguments);
   if (arguments.format == "colmap" || arguments.format == "nerfstudio") return export_model(arguments);
   const MapFile file = load_map(arguments.file);
-  const std::string cloud = arguments.format == "ply"   ? point_cloud_ply(file.map)
-                            : arguments.format == "pcd" ? point_cloud_pcd(file.map)
-                                                        : point_cloud_json(file.map);
-  write_file_atomically(arguments.out, cloud);
-  tell(stdout, "{}: {} points\n", arguments.out, file.map.point_count());
+  const Map& map = file.map;
+  if (arguments.format == "json") {  // which tells the maps apart
+    write_file_atomically(arguments.out, point_cloud_json(map));
+    const size_t maps = map.roots().size();
+    tell(stdout, "{}: {}{}\n", arguments.out, plural(map.point_count(), "point", "points"),
+         maps > 1 ? fmt::format(" of {} maps that were never joined", maps) : "");
+    return;
+  }
+  const std::vector<PointId> points = points_by_map(map).front();
+  const auto keyframes = map.live_keyframes();
+  const auto of_first = std::count_if(keyframes.begin(), keyframes.end(),
+                                      [&](KeyframeId id) { return map.root(id) == map.roots().front(); });
+  write_file_atomically(arguments.out,
+                        arguments.format == "ply" ? point_cloud_ply(map, points) : point_cloud_pcd(map, points));
+  tell(stdout, "{}: {}{}\n", arguments.out, plural(points.size(), "point", "points"),
+       left_out(map, points.size(), static_cast<size_t>(of_first)));
 }
 
 struct MergeArguments {
@@ -152,6 +175,9 @@ void merge(const MergeArguments& arguments) {
   const std::filesystem::path out = arguments.out;
   if (std::filesystem::is_directory(out)) fail_to_write(out, "open", EISDIR);
   if (out.has_parent_path() && !std::filesystem::is_directory(out.parent_path())) fail_to_write(out, "open", ENOENT);
+  std::error_code none;
+  if (std::filesystem::equivalent(arguments.first, arguments.second, none))
+    throw InputError(arguments.second + ": is the same file as " + arguments.first + "; give two maps");
   const MapFile first = load_map(arguments.first), second = load_map(arguments.second);
   const MapFileContext &a = first.context, &b = second.context;
   if (!same_optics(a.camera, b.camera))
@@ -166,8 +192,10 @@ void merge(const MergeArguments& arguments) {
     throw InputError(arguments.second + ": shows no place for certain that " + arguments.first +
                      " shows; record the way from one to the other");
   save_map(arguments.out, merged->map, a);
-  tell(stdout, "{}: {} keyframes, {} points; {} joints, {} loops closed\n", arguments.out,
-       merged->map.live_keyframe_count(), merged->map.point_count(), merged->merges, merged->loops);
+  tell(stdout, "{}: {}, {}; {}, {} closed\n", arguments.out,
+       plural(merged->map.live_keyframe_count(), "keyframe", "keyframes"),
+       plural(merged->map.point_count(), "point", "points"), plural(merged->merges, "joint", "joints"),
+       plural(merged->loops, "loop", "loops"));
 }
 
 }  // namespace

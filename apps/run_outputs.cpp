@@ -8,13 +8,18 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <vector>
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/map/point_cloud.h"
 #include "dkb/util/files.h"
+#include "dkb/util/plural.h"
 #include "dkb/util/stamps.h"
+#include "frame_files.h"
+#include "report/other_maps.h"
 
 namespace dkb {
 namespace {
@@ -35,25 +40,32 @@ double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// NAME.txt has the frames of the first map; maps that were never joined to it have worlds and files of their own,
-// NAME_map2.txt and so on. Files of maps that are no more would mislead: they go, once all others are written.
-void write_by_map(const std::filesystem::path& folder, const std::string& name, const std::vector<Trajectory>& by_map) {
-  const auto file = [&](size_t map) {
-    return folder / (map == 0 ? name + ".txt" : name + "_map" + std::to_string(map + 1) + ".txt");
-  };
-  for (size_t map = 0; map < by_map.size(); ++map)
-    if (map == 0 || !by_map[map].empty()) write_trajectory(file(map), by_map[map]);
-  std::set<std::filesystem::path> stale;
+// Files of these maps by `name`. Those of maps that are no more would mislead: they go, once all others are written.
+void write_by_map(const std::filesystem::path& folder, const std::string& name, const std::string& ending,
+                  const std::map<size_t, std::string>& by_map) {
+  for (const auto& [map, content] : by_map) write_file_atomically(folder / name_of_map(name, map, ending), content);
+  std::vector<std::filesystem::path> stale;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string there = entry.path().filename().string();
-    const std::string start = name + "_map", end = ".txt";
-    if (there.starts_with(start) && there.ends_with(end) &&
-        there.find_first_not_of("0123456789", start.size()) == there.size() - end.size())
-      stale.insert(there);
+    const size_t map = map_of_file(entry.path().filename().string(), name, ending);
+    if (map > 0 && !by_map.contains(map)) stale.push_back(entry.path());
   }
-  for (size_t map = 1; map < by_map.size(); ++map)
-    if (!by_map[map].empty()) stale.erase(file(map).filename());
-  for (const auto& there : stale) std::filesystem::remove(folder / there);
+  for (const auto& there : stale) std::filesystem::remove(there);
+}
+
+void write_trajectories(const std::filesystem::path& folder, const std::string& name,
+                        const std::vector<Trajectory>& by_map) {
+  std::map<size_t, std::string> texts;
+  for (size_t map = 0; map < by_map.size(); ++map)
+    if (map == 0 || !by_map[map].empty()) texts[map] = trajectory_to_text(by_map[map]);
+  write_by_map(folder, name, ".txt", texts);
+}
+
+void write_clouds(const std::filesystem::path& folder, const Map& map) {
+  std::map<size_t, std::string> clouds;
+  const auto points = points_by_map(map);
+  for (size_t i = 0; i < points.size(); ++i)
+    if (i == 0 || !points[i].empty()) clouds[i] = point_cloud_ply(map, points[i]);
+  write_by_map(folder, "map", ".ply", clouds);
 }
 
 // [1/s] of frames with these stamps; 0 where they do not tell.
@@ -139,39 +151,35 @@ Statistics statistics_with(const Slam& slam, const RunFacts& facts) {
 
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
                    const RunFacts& facts) {
-  write_by_map(folder, "trajectory", trajectories);
-  write_by_map(folder, "trajectory_online", trajectories_by_map(slam.online_trajectory(), facts.stamps));
-  write_by_map(folder, "keyframes", trajectories_by_map(slam.keyframes(), facts.stamps));
+  write_trajectories(folder, "trajectory", trajectories);
+  write_trajectories(folder, "trajectory_online", trajectories_by_map(slam.online_trajectory(), facts.stamps));
+  write_trajectories(folder, "keyframes", trajectories_by_map(slam.keyframes(), facts.stamps));
   if (facts.writes_map) {
     slam.save_map(folder / "map.dkb");
-    write_file_atomically(folder / "map.ply", point_cloud_ply(*slam.map().map()));
+    write_clouds(folder, *slam.map().map());
   }
   write_file_atomically(folder / "config.yaml", facts.config_yaml);
-  write_movers(folder / "movers.csv", facts.movers);
-  if (!facts.features_csv.empty()) write_file_atomically(folder / "features.csv", facts.features_csv);
-  if (!facts.debug_log.empty()) write_file_atomically(folder / "debug.log", facts.debug_log);
-  if (!facts.detections.empty()) write_file_atomically(folder / "detections.txt", facts.detections);
 }
 
 void write_statistics(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts) {
   write_file_atomically(folder / "stats.json", stats_json(statistics_with(slam, facts), facts));
 }
 
-void remove_earlier_outputs(const std::filesystem::path& folder, const RunFacts& facts, std::set<std::string> written) {
-  if (facts.writes_map) written.insert({"map.dkb", "map.ply"});
-  if (!facts.features_csv.empty()) written.insert("features.csv");
-  if (!facts.debug_log.empty()) written.insert("debug.log");
-  if (!facts.detections.empty()) written.insert("detections.txt");
+void remove_earlier_outputs(const std::filesystem::path& folder, const std::set<std::string>& written) {
   std::error_code ignored;
-  for (const char* name : {"map.dkb", "map.ply", "dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs",
-                           "features.csv", "detections.txt", "debug.log", "cv_orb.json"})
+  for (const std::string name : {"map.dkb", "map.ply", "dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs",
+                                 "features.csv", "detections.txt", "debug.log", "movers.csv", "cv_orb.json"}) {
     if (!written.contains(name)) std::filesystem::remove(folder / name, ignored);
+    std::filesystem::remove(folder / (name + kUnfinished), ignored);
+  }
+  if (!written.contains("map.ply")) write_by_map(folder, "map", ".ply", {});
 }
 
 std::string write_dense_map(const std::filesystem::path& folder, const DenseMap& map, double seconds) {
   write_file_atomically(folder / "dense.ply", mesh_ply(map.mesh));
-  std::string line =
-      fmt::format("dense map: {} keyframes, {} triangles, {:.1f} s", map.views, map.mesh.triangles.size(), seconds);
+  std::string line = fmt::format("dense map: {}, {}, {:.1f} s", plural(map.views, "keyframe", "keyframes"),
+                                 plural(map.mesh.triangles.size(), "triangle", "triangles"), seconds);
+  if (map.map > 0) line += "; of the world of " + name_of_map("trajectory", static_cast<size_t>(map.map), ".txt");
   if (!map.grid) return line + "; no floor in view: no occupancy grid";
   write_file_atomically(folder / "occupancy.pgm", occupancy_pgm(*map.grid));
   write_file_atomically(folder / "occupancy.yaml", occupancy_yaml(*map.grid, "occupancy.pgm"));

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "dkb/dataset/movers_file.h"
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
@@ -20,14 +19,11 @@ struct RunFacts {
   int offered = 0, skipped = 0;     // pairs of the selection; those never given to the system
   double startup_s = 0, wall_s = 0;
   std::string config_yaml;
-  std::string features_csv;  // empty = not asked for
-  std::string debug_log;     // likewise
-  std::string detections;    // likewise
-  std::string run_json;      // what was run
-  std::string model;         // file name of the network, should there be one
+  std::string run_json;  // what was run
+  std::string model;     // file name of the network, should there be one
   bool interrupted = false;
-  MoverRows movers;
-  StageTimes times;  // of stages that the system does not have
+  std::vector<size_t> poses_of_map;  // in trajectory.txt, trajectory_map2.txt ...
+  StageTimes times;                  // of stages that the system does not have
   bool writes_map = true;
   std::optional<int> dropped;  // of `skipped`, in real time: those for which there was no time
 };
@@ -38,8 +34,8 @@ double seconds_since_process_start();
 // The system's statistics, with the stages that it does not have.
 Statistics statistics_with(const Slam& slam, const RunFacts& facts);
 
-// Writes every result of the contract but stats.json into `folder`, each file atomically; `trajectories` are Slam's by
-// map, which takes a moment to smooth. Throws OutputError.
+// Writes every result of the contract but stats.json and those of FrameFiles into `folder`, each file atomically;
+// `trajectories` are Slam's by map, which takes a moment to smooth. Throws OutputError.
 void write_outputs(const std::filesystem::path& folder, const Slam& slam, const std::vector<Trajectory>& trajectories,
                    const RunFacts& facts);
 
@@ -47,8 +43,8 @@ void write_outputs(const std::filesystem::path& folder, const Slam& slam, const 
 void write_statistics(const std::filesystem::path& folder, const Slam& slam, const RunFacts& facts);
 
 // Removes what an earlier run left in `folder` and this one does not have: of the files that not every run writes,
-// those that are neither among `facts` nor in `written`.
-void remove_earlier_outputs(const std::filesystem::path& folder, const RunFacts& facts, std::set<std::string> written);
+// those that are not among `written`.
+void remove_earlier_outputs(const std::filesystem::path& folder, const std::set<std::string>& written);
 
 // dense.ply, and occupancy.pgm and occupancy.yaml when there is a floor. Returns a line for the user. Throws
 // OutputError.

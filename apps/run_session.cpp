@@ -9,7 +9,7 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
-#include <limits>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
@@ -18,7 +18,6 @@
 #include "bench/bench_cv_orb.h"
 #include "dkb/dataset/detector_choice.h"
 #include "dkb/dataset/folder_source.h"
-#include "dkb/dataset/movers_file.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/paced_source.h"
 #include "dkb/detection/boxes_file.h"
@@ -29,9 +28,11 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/log.h"
+#include "dkb/util/plural.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb_slam/slam.h"
+#include "report/other_maps.h"
 #include "run_provenance.h"
 #include "terminal.h"
 
@@ -56,27 +57,14 @@ fs::path default_output(const fs::path& source) {
   const fs::path all = "dkb-out";
   make_output_folder(all);
   const std::string name = source_name(source) + "-" + stamp;
-  std::string own = name;
-  for (int i = 2; !fs::create_directory(all / own); ++i) own = fmt::format("{}-{}", name, i);
-  return all / own;
-}
-
-void append_features(std::string& csv, const std::string& stamp, const FrameResult& result) {
-  for (const FeatureReport& f : result.features)
-    csv += fmt::format("{},{:.2f},{:.2f},{}\n", stamp, f.image_x, f.image_y, name_of(f.state));
-}
-
-// A row as boxes files have it.
-void append_boxes(std::string& text, const std::string& stamp, const FrameResult& result) {
-  for (const Detection& d : result.detections)
-    text += fmt::format("{} {} {:.2f} {:.2f} {:.2f} {:.2f} {:.3f}\n", stamp, written_class(d.class_name), d.box.x,
-                        d.box.y, d.box.w, d.box.h, d.score);
-}
-
-void append_frame(std::string& log, const std::string& stamp, const FrameResult& result) {
-  log += fmt::format("{} frame {} {}", stamp, result.frame, name_of(result.state));
-  if (result.tracked()) log += fmt::format(", {} points; {}", result.inliers, result.keyframe_explanation);
-  log += '\n';
+  for (int i = 1;; ++i) {
+    const fs::path own = all / (i == 1 ? name : fmt::format("{}-{}", name, i));
+    std::error_code error;
+    if (fs::create_directory(own, error)) return own;
+    if (!error) continue;
+    make_output_folder(own);  // says why it cannot be
+    return own;
+  }
 }
 
 // Where the setting that a message begins with was given, to stand before the message; empty for a default.
@@ -155,6 +143,7 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   r.wall_s = facts.wall_s;
   r.statistics = statistics_with(slam, facts);
   r.trajectory = trajectory;
+  r.poses_of_map = facts.poses_of_map;
   r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
   r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
   r.seed = options.seed;
@@ -169,6 +158,20 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   return r;
 }
 
+// [m] of the depths that an image has.
+struct DepthRange {
+  double nearest = 0, median = 0, farthest = 0;
+};
+std::optional<DepthRange> range_of(const DepthImage& image) {
+  std::vector<float> depths;
+  std::copy_if(image.data(), image.data() + image.size(), std::back_inserter(depths), [](float z) { return z > 0; });
+  if (depths.empty()) return {};
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  const auto [nearest, farthest] = std::minmax_element(depths.begin(), depths.end());
+  return DepthRange{*nearest, *middle, *farthest};
+}
+
 // What the first frame's depth image holds, whatever the limits of the camera; empty where that cannot be told.
 std::string depths_of(const RunArguments& args) {
   SourceOptions options = args.reading;
@@ -178,15 +181,10 @@ std::string depths_of(const RunArguments& args) {
     const std::unique_ptr<Source> again = open_source(args.source, options);
     const SourceFrame first = again->next();
     if (first.state != SourceState::frame) return "";
-    double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
-    const DepthImage& depths = first.frame.image()->depth;
-    for (size_t i = 0; i < depths.size(); ++i) {
-      const double z = depths.data()[i];
-      if (z > 0) nearest = std::min(nearest, z), farthest = std::max(farthest, z);
-    }
-    if (farthest == 0) return " (the first depth image is empty)";
-    return fmt::format(" (the first image holds {:.3g} ... {:.3g} m{})", nearest, farthest,
-                       farthest > 100 ? ": millimetres?" : "");
+    const auto range = range_of(first.frame.image()->depth);
+    if (!range) return " (the first depth image is empty)";
+    return fmt::format(" (the first image holds {:.3g} ... {:.3g} m{})", range->nearest, range->farthest,
+                       range->farthest > 100 ? ": millimetres?" : "");
   } catch (const std::exception&) {
     return "";
   }
@@ -223,6 +221,18 @@ std::shared_ptr<const FileDetector> boxes_of(const RunArguments& args, const Det
 
 }  // namespace
 
+void NewFolders::note(const fs::path& path) {
+  std::error_code ignored;
+  for (fs::path at = path; !at.empty() && at != at.root_path() && !fs::exists(at, ignored); at = at.parent_path())
+    paths_.insert(paths_.begin(), at);
+}
+
+NewFolders::~NewFolders() {
+  std::error_code ignored;
+  for (auto path = paths_.rbegin(); path != paths_.rend(); ++path)
+    if (fs::is_directory(*path, ignored)) fs::remove(*path, ignored);  // one that holds something stays
+}
+
 RunSession::RunSession(const RunArguments& args)
     : args_(args),
       warnings_([this](const std::string& line) {
@@ -244,7 +254,9 @@ RunSession::RunSession(const RunArguments& args)
   if (!args.load_map.empty()) slam_->load_map(args.load_map);
   slam_->localize_only(args.localize);
   slam_->explain_keyframes(args.debug_log || args.viewer.on || args.viewer.record);
+  made_.note(args.out.empty() ? "dkb-out" : args.out);
   out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
+  if (args.out.empty()) made_.add(out_);
   std::error_code none;
   if (fs::equivalent(out_, args.source, none))
     throw InputError("--out " + out_.string() + ": is the folder of the source; choose another");
@@ -252,8 +264,7 @@ RunSession::RunSession(const RunArguments& args)
   if (!args.quiet) tell(stdout, "{}, results in {}\n", recording_->description(), out_.string());
 
   facts_.writes_map = !args.localize;
-  if (args.dump_boxes) facts_.detections = "# rgb_timestamp class x y w h score\n";
-  if (args.dump_features) facts_.features_csv = "timestamp,x,y,state\n";
+  files_.emplace(out_, FrameFiles::Wanted{args.dump_features, args.dump_boxes, args.debug_log});
   log_.emplace(recording_->size());
   if (args.realtime && !live_) paced_.emplace(*recording_);
   source_ = paced_ ? static_cast<Source*>(&*paced_) : recording_.get();
@@ -320,10 +331,30 @@ void RunSession::track() {
       if (const TimedBoxes* boxes = boxes_ ? boxes_->at(next.frame.stamp_ns()) : nullptr)
         boxed_.insert(boxes->timestamp);
       warn_of_darkness(next.frame);
+      if (facts_.stamps.size() == 1) tell_depths(next.frame);
       without_mask_ += masks_ && !masks_->has(next.frame.stamp_ns());
       show(next, slam_->process(next.frame));
     }
   }
+}
+
+// A wrong depth factor is seen at once.
+void RunSession::tell_depths(const Frame& first) {
+  constexpr double kNear = 0.4, kFar = 8;  // [m] few cameras see nearer, or measure farther
+  const auto range = range_of(first.image()->depth);
+  if (!args_.quiet) progress_->finish();
+  if (!range) {
+    if (!args_.quiet) tell(stdout, "depth: none in the first frame{}\n", live_ ? "" : depths_of(args_));
+    return;
+  }
+  if (!args_.quiet)
+    tell(stdout, "depth {:.2g} to {:.2g} m, median {:.2g}, in the first frame\n", range->nearest, range->farthest,
+         range->median);
+  if (range->median < kNear || range->median > kFar)
+    warnings_.warn("depth factor",
+                   fmt::format("depth is {:.2g} m in the median of the first frame: is the camera's depth_factor right "
+                               "({:g} per metre; float images are in metres)?",
+                               range->median, opened_.camera().depth_factor));
 }
 
 // What happened since the last call, told to the report; warnings also to the user.
@@ -340,13 +371,10 @@ std::vector<Event> RunSession::take_events() {
 
 // A frame's result to all who want to know of it.
 void RunSession::show(const SourceFrame& next, FrameResult result) {
-  for (const Mover& mover : result.movers)
-    facts_.movers.push_back({seconds_from_ns(result.stamp_ns), next.stamp, mover});
   log_->frame(next.frame, result);
   std::vector<Event> events = take_events();
-  if (args_.dump_features) append_features(facts_.features_csv, next.stamp, result);
-  if (args_.dump_boxes) append_boxes(facts_.detections, next.stamp, result);
-  if (args_.debug_log) append_frame(facts_.debug_log, next.stamp, result);
+  most_features_ = std::max(most_features_, result.features.size());
+  files_->add(next.stamp, result);
   progress_->frame(next.index + 1, &result);
   if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
   warn_of_viewer();
@@ -371,11 +399,14 @@ void RunSession::write(double seconds) {
     written.insert({"map.dkb", "map.ply"});
   }
   const std::vector<Trajectory> trajectories = trajectories_by_map(slam_->trajectory(), facts_.stamps);
+  for (const Trajectory& t : trajectories) facts_.poses_of_map.push_back(t.size());
   write_outputs(out_, *slam_, trajectories, facts_);
+  files_->commit();
+  written.merge(files_->names());
   std::exception_ptr no_dense_map;
   if (args_.dense && !failure_) {
     try {
-      write_dense(written);
+      write_dense(trajectories.front(), written);
     } catch (...) {
       no_dense_map = std::current_exception();
       written.insert({"dense.ply", "occupancy.pgm", "occupancy.yaml"});  // the error says that earlier ones are kept
@@ -398,7 +429,8 @@ void RunSession::write(double seconds) {
   if (viewer_ && args_.viewer.record) written.insert("session.dkbs");
   std::error_code none;
   if (fs::equivalent(args_.load_map, out_ / "map.dkb", none)) written.insert({"map.dkb", "map.ply"});  // not to be lost
-  remove_earlier_outputs(out_, facts_, written);
+  if (facts_.writes_map) written.insert({"map.dkb", "map.ply"});
+  remove_earlier_outputs(out_, written);
   if (!truth.note.empty() && !reported.trajectory.empty())
     warnings_.warn("ground truth", truth.note + "; the run is not judged by it");
   if (truth.hidden > 0) warnings_.warn("hidden truth", "groundtruth.txt: " + hidden_text(truth.hidden));
@@ -408,9 +440,10 @@ void RunSession::write(double seconds) {
   if (no_dense_map) std::rethrow_exception(no_dense_map);
 }
 
-void RunSession::write_dense(std::set<std::string>& written) {
+void RunSession::write_dense(const Trajectory& trajectory, std::set<std::string>& written) {
   const Stopwatch building;
-  const DenseMap map = slam_->dense_map();
+  // Of the world of trajectory.txt, unless that holds nothing.
+  const DenseMap map = trajectory.empty() ? slam_->dense_map() : slam_->dense_map(0);
   facts_.times.add("dense_build", building.ms());
   const std::string line = write_dense_map(out_, map, building.ms() / 1000);
   if (!args_.quiet) tell(stdout, "{}\n", line);
@@ -420,29 +453,53 @@ void RunSession::write_dense(std::set<std::string>& written) {
 
 int RunSession::tell_the_end() {
   const Statistics s = slam_->statistics();
-  if (!args_.quiet)
-    tell(stdout, "{}{} of {} frames tracked, {} keyframes, {} map points; tracking {:.1f} ms per frame\n", interrupted_,
-         s.tracked, facts_.offered, s.keyframes, s.map_points,
-         s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0);
-  if (ape_ && !args_.quiet)
-    tell(stdout, "APE {:.4f} m against groundtruth.txt (RMSE of {} poses)\n", ape_->rmse, ape_->count);
-  if (!args_.quiet) tell(stdout, "report: {}\n", (out_ / "report.html").string());
-  if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !args_.quiet && !line.empty())
-    tell(stdout, "{}\n", line);
-  if (const SourceCounts lost = recording_->counts(); !live_ && !args_.quiet && lost.unpaired + lost.late > 0)
-    tell(stdout, "{} images without a partner of their time, {} out of order\n", lost.unpaired, lost.late);
+  const auto say = [&](const std::string& line) {
+    if (!args_.quiet) tell(stdout, "{}\n", line);
+  };
+  const std::string predicted =
+      s.predicted > 0 ? fmt::format(" ({} of them predicted, not seen)", s.predicted) : std::string();
+  say(fmt::format("{}{} of {} tracked{}, {}, {}; tracking {:.1f} ms per frame", interrupted_, s.tracked,
+                  plural(facts_.offered, "frame", "frames"), predicted, plural(s.keyframes, "keyframe", "keyframes"),
+                  plural(s.map_points, "map point", "map points"),
+                  s.stages.contains("tracking") ? s.stages.at("tracking").mean_ms : 0.0));
+  if (ape_) say(fmt::format("APE {:.4f} m against groundtruth.txt (RMSE of {} poses)", ape_->rmse, ape_->count));
+  if (const std::string others = other_maps_text(facts_.poses_of_map); !others.empty())
+    say(others + (ape_ ? fmt::format("; the APE is of {}", ape_->count) : ""));
+  say("report: " + (out_ / "report.html").string());
+  if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !line.empty()) say(line);
+  if (const SourceCounts lost = recording_->counts(); !live_ && lost.unpaired + lost.late > 0)
+    say(fmt::format("{} without a partner of their time, {} out of order", plural(lost.unpaired, "image", "images"),
+                    lost.late));
   if (viewer_) viewer_->serve_on(*slam_, args_.quiet);
   warn_of_viewer();
   if (!interrupted_.empty()) return 130;
   if (s.tracked > 0) return 0;
-  if (args_.localize)
-    tell(stderr, "error: the camera was never found in {}\n", args_.load_map);
+  if (!args_.load_map.empty())
+    tell(stderr, "error: the camera was never found in {}{}\n", args_.load_map, without_new_map());
   else
-    tell(stderr,
-         "error: tracking never initialised: no frame has {} features with depth; are there depth images, in "
-         "units of the camera's depth_factor ({} per metre; float images are in metres)?{}\n",
-         options_.tracking.initial_points, opened_.camera().depth_factor, live_ ? "" : depths_of(args_));
+    tell(stderr, "error: tracking never initialised: no frame has {} features with depth{}\n",
+         options_.tracking.initial_points, remedy_without_features());
   return 1;
+}
+
+// Why no map was begun beside the one that was loaded.
+std::string RunSession::without_new_map() const {
+  if (args_.localize) return "";
+  if (options_.tracking.new_map_after == 0) return "; tracking.new_map_after is 0: no new map is begun";
+  return fmt::format(
+      "; a new map begins after {:g} s without it, where a frame has {} features with depth "
+      "(tracking.new_map_after)",
+      options_.tracking.new_map_after, options_.tracking.initial_points);
+}
+
+std::string RunSession::remedy_without_features() const {
+  if (most_features_ < static_cast<size_t>(options_.tracking.initial_points))
+    return fmt::format("; the images show {} at most: are they black, covered or out of focus?",
+                       plural(most_features_, "corner", "corners"));
+  return fmt::format(
+      "; are there depth images, in units of the camera's depth_factor ({} per metre; float images are "
+      "in metres)?{}",
+      opened_.camera().depth_factor, live_ ? "" : depths_of(args_));
 }
 
 }  // namespace dkb

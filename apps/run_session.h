@@ -18,6 +18,7 @@
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
+#include "frame_files.h"
 #include "interrupt.h"
 #include "live_report.h"
 #include "progress.h"
@@ -57,6 +58,20 @@ void check_detector(const DetectorChoice& choice, bool has_model);
 // Whether no option leaves out a part: of the images of a part, boxes and masks may show nobody.
 bool takes_all_images(const RunArguments& args);
 
+// Folders that a run makes: they go again where nothing came into them.
+class NewFolders {
+ public:
+  NewFolders() = default;
+  ~NewFolders();
+  NewFolders(const NewFolders&) = delete;
+  NewFolders& operator=(const NewFolders&) = delete;
+  void note(const std::filesystem::path& path);  // before it is made, with those that it lies in
+  void add(const std::filesystem::path& path) { paths_.push_back(path); }
+
+ private:
+  std::vector<std::filesystem::path> paths_;  // the outermost first
+};
+
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {
  public:
@@ -70,10 +85,13 @@ class RunSession {
  private:
   void track();
   std::vector<Event> take_events();
+  void tell_depths(const Frame& first);
   void show(const SourceFrame& next, FrameResult result);
   void write(double seconds);
-  void write_dense(std::set<std::string>& written);
+  void write_dense(const Trajectory& trajectory, std::set<std::string>& written);
   int tell_the_end();
+  std::string without_new_map() const;
+  std::string remedy_without_features() const;
   void warn_of_source();
   void warn_of_viewer();
   void warn_of_unused();
@@ -90,7 +108,9 @@ class RunSession {
   bool live_;
   double loading_s_ = 0;  // of the detectors
   std::optional<Slam> slam_;
+  NewFolders made_;
   std::filesystem::path out_;
+  std::optional<FrameFiles> files_;
   std::optional<PacedSource> paced_;  // in real time
   Source* source_ = nullptr;          // that frames are taken from
   std::optional<Interrupt> interrupt_;
@@ -104,7 +124,8 @@ class RunSession {
   std::shared_ptr<const MaskFolder> masks_;    // where there are any
   size_t without_mask_ = 0;                    // frames that none of them belongs to
   bool had_prior_ = false;
-  int brightest_ = 0;  // grey of the first frames
+  int brightest_ = 0;         // grey of the first frames
+  size_t most_features_ = 0;  // of a frame
   LiveReport camera_;
   std::optional<Progress> progress_;
   std::exception_ptr failure_;

@@ -3,13 +3,21 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
+#include <set>
+#include <sstream>
 #include <string>
+#include <system_error>
 
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/simulator/simulator.h"
 #include "dkb/util/new_folder.h"
+#include "dkb/util/plural.h"
 #include "interrupt.h"
 #include "number_check.h"
 
@@ -22,6 +30,25 @@ struct SimulateArguments {
   std::vector<double> blackout;
   std::vector<int> size;
 };
+
+// The images of a sequence that `simulate` wrote, by its list of pairs: of each frame colour, depth and mask, named as
+// they are here and all there. Those of another recording are none of its business.
+std::set<std::filesystem::path> images_in(const std::filesystem::path& folder) {
+  std::set<std::filesystem::path> images;
+  std::ifstream list(folder / "associations.txt");
+  for (std::string line; std::getline(list, line);) {
+    std::istringstream columns(line);
+    std::string stamp, colour, depth_stamp, depth;
+    if (!(columns >> stamp >> colour >> depth_stamp >> depth)) continue;
+    if (colour != "rgb/" + stamp + ".jpg" || depth != "depth/" + depth_stamp + ".png") continue;
+    const std::filesystem::path frame[] = {colour, depth, "masks/" + stamp + ".png"};
+    std::error_code none;
+    if (std::all_of(std::begin(frame), std::end(frame),
+                    [&](const auto& image) { return std::filesystem::is_regular_file(folder / image, none); }))
+      images.insert(std::begin(frame), std::end(frame));
+  }
+  return images;
+}
 
 void run_simulate(const SimulateArguments& arguments) {
   const Simulator simulator(arguments.options);
@@ -36,6 +63,7 @@ void run_simulate(const SimulateArguments& arguments) {
   };
   const Interrupt interrupt([] {});
   NewFolder folder(arguments.out);
+  const std::set<std::filesystem::path> earlier = images_in(arguments.out);
   {
     Line line;
     write_sequence(simulator, arguments.out, [&](int written) {
@@ -46,8 +74,13 @@ void run_simulate(const SimulateArguments& arguments) {
     });
   }
   folder.keep();
+  // Of a longer sequence some would stay that no list names.
+  const std::set<std::filesystem::path> written = images_in(arguments.out);
+  std::error_code ignored;
+  for (const std::filesystem::path& image : earlier)
+    if (!written.contains(image)) std::filesystem::remove(folder.path() / image, ignored);
   std::printf(
-      "%s: %d frames of scene %s, seed %llu\n", arguments.out.c_str(), simulator.frames(),
+      "%s: %s of scene %s, seed %llu\n", arguments.out.c_str(), plural(simulator.frames(), "frame", "frames").c_str(),
       arguments.options.path.empty() ? arguments.options.scene.c_str() : ("around " + arguments.options.path).c_str(),
       static_cast<unsigned long long>(arguments.options.seed));
 }

@@ -118,15 +118,44 @@ TEST_F(Export, AModelHoldsNoPointsOfAMapThatIsNotJoined) {
   const size_t points = file.map.point_count();
   file.map.append(Map(file.map));
   ASSERT_EQ(file.map.roots().size(), 2U);
+  file.map.cull_keyframe(file.map.live_keyframes().at(1));  // so that the second is the larger one
+  const size_t left_out = file.map.point_count() - points;
+  ASSERT_LE(left_out, points);
   save_map(run.out / "map.dkb", file.map, file.context);
   for (const char* format : {"colmap", "nerfstudio"}) {
     const Finished done = export_map(format);
     ASSERT_EQ(done.exit_code, 0) << done.err;
     EXPECT_NE(done.out.find(", " + std::to_string(points) + " points;"), std::string::npos) << done.out;
+    EXPECT_NE(done.out.find("; left out: 1 map that was never joined to it, with "), std::string::npos) << done.out;
   }
   EXPECT_EQ(lines_of(folder / "colmap" / "sparse" / "0" / "points3D.txt").size(), points);
   EXPECT_NE(read_text(folder / "nerfstudio" / "sparse_pc.ply").find("element vertex " + std::to_string(points) + "\n"),
             std::string::npos);
+}
+
+TEST_F(Export, CloudsAreOfTheMapThatTheTrajectoryIsOf) {
+  MapFile file = load_map(run.out / "map.dkb");
+  const size_t points = file.map.point_count();
+  file.map.append(Map(file.map));
+  save_map(run.out / "map.dkb", file.map, file.context);
+  for (const char* format : {"ply", "pcd"}) {
+    const Finished done = export_map(format);
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_NE(done.out.find(": " + std::to_string(points) + " points; left out: 1 map"), std::string::npos) << done.out;
+  }
+  EXPECT_NE(read_text(folder / "pcd").find("\nPOINTS " + std::to_string(points) + "\n"), std::string::npos);
+  ASSERT_EQ(export_map("json").exit_code, 0);
+  const auto json = nlohmann::json::parse(read_text(folder / "json"));
+  EXPECT_EQ(json["points"].size(), 2 * points);
+  EXPECT_EQ(json["points"].back()["map"], 1);
+  const Finished recorded = run_program({"export", run.out.string(), "--out", (folder / "out.mcap").string()});
+  ASSERT_EQ(recorded.exit_code, 0) << recorded.err;
+  size_t bytes = 0;
+  const auto stream = open_messages(folder / "out.mcap");
+  while (const auto message = stream->next())
+    if (stream->topics()[message->topic].name == "/map_points") bytes = message->bytes.size();
+  EXPECT_GE(bytes, 16 * points);
+  EXPECT_LT(bytes, 16 * points + 1000) << "with its header";
 }
 
 TEST_F(Export, AModelWithoutPicturesSaysSoAndAForeignRecordingIsRefused) {

@@ -71,7 +71,7 @@ Frame WallWorld::frame(int index, const Look& look) const {
       grey[i] = look.blank ? 128
                 : on_card  ? block(77, (x - look.card) / kCardBlock, y / kCardBlock)
                            : block(look.picture, (column + 100 * kBlock) / kBlock, y / kBlock);
-      depth[i] = static_cast<float>(on_card ? kCard : kWall);
+      if (!look.flat) depth[i] = static_cast<float>(on_card ? kCard : kWall);
     }
   FrameInput input;
   input.stamp_ns = 33'333'333 * static_cast<int64_t>(index);

@@ -20,6 +20,7 @@ class WallWorld {
     int card = -1000;      // [px] left edge of the card in the image; out of sight unless told
     bool dark = false;     // no picture and no depth
     bool blank = false;    // no picture
+    bool flat = false;     // no depth
     uint64_t picture = 1;  // on the wall: another number is another place
   };
 

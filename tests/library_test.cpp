@@ -128,6 +128,28 @@ TEST_F(Library, TrackingThatCannotBeginIsToldOnce) {
   EXPECT_EQ(events[0].kind, Kind::warning);
   EXPECT_EQ(events[0].frame, 29);
   EXPECT_NE(events[0].text.find("100 features with depth"), std::string::npos) << events[0].text;
+  EXPECT_NE(events[0].text.find("are they black, covered or out of focus?"), std::string::npos) << events[0].text;
+}
+
+TEST_F(Library, DepthThatIsMissingIsToldOnceAlsoInAMap) {
+  const auto without_depth = [&](int i) { return world.frame(i, {.flat = true}); };
+  const auto warnings_of = [](Slam& slam) {
+    std::vector<std::string> texts;
+    for (const Event& event : slam.take_events())
+      if (event.kind == Kind::warning) texts.push_back(event.text);
+    return texts;
+  };
+  Slam never = slam_with();
+  for (int i = 0; i < 40; ++i) never.process(without_depth(i));
+  const auto first = warnings_of(never);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_NE(first[0].find("(no pixel has a depth of "), std::string::npos) << first[0];
+  Slam slam = slam_with();
+  for (int i = 0; i < 5; ++i) slam.process(world.frame(i, {}));
+  for (int i = 5; i < 75; ++i) slam.process(without_depth(i));
+  const auto later = warnings_of(slam);
+  ASSERT_EQ(later.size(), 1U);
+  EXPECT_NE(later[0].find("no depth: none of the last 30 frames has any"), std::string::npos) << later[0];
 }
 
 // Pause and localise.

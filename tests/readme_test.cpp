@@ -107,7 +107,7 @@ TEST(Files, TheSceneOfThePageCanBeDrawn) {
   const std::string output =
       output_of(std::string("\"") + DKB_SLAM_EXECUTABLE + "\" simulate --frames 1 --scene \"" +
                 (folder / "scene.yaml").string() + "\" --out \"" + (folder / "out").string() + "\"");
-  EXPECT_NE(output.find(": 1 frames of scene"), std::string::npos) << output;
+  EXPECT_NE(output.find(": 1 frame of scene"), std::string::npos) << output;
   std::filesystem::remove_all(folder);
 }
 #endif

@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "dkb/dataset/image_codecs.h"
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -126,6 +127,77 @@ TEST(RunEnding, OutputsThatCannotBeWrittenLoseNoResult) {
   EXPECT_EQ(shell("@ eval " + truth + " " + truth + " >/dev/full"), 1);
   EXPECT_EQ(shell("@ eval " + truth + " " + truth + " >/dev/null"), 0);
   EXPECT_EQ(shell("@ --help >/dev/full"), 1);
+}
+
+TEST(RunEnding, RowsOfFramesAreOnTheDiskBeforeTheRunEnds) {
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  std::vector<std::string> arguments = endless.run(temp / "out");
+  arguments.insert(arguments.end(), {"--threads", "1", "--dump-features", "--dump-boxes", "--debug-log"});
+  Program program(arguments);
+  const int pipe = endless.hold_up(program);
+  ASSERT_GE(pipe, 0);
+  const std::vector<std::string> names = {"features.csv", "detections.txt", "debug.log", "movers.csv"};
+  for (const std::string& name : names) EXPECT_TRUE(fs::exists(temp / "out" / (name + ".part"))) << name;
+  EXPECT_GT(read_text(temp / "out" / "features.csv.part").size(), 50'000U);
+  EXPECT_NE(read_text(temp / "out" / "debug.log.part").find(" frame 9 "), std::string::npos);
+  kill(program.pid(), SIGKILL);
+  program.wait();
+  EXPECT_TRUE(fs::exists(temp / "out" / "features.csv.part")) << "one that is killed loses nothing";
+  close(pipe);
+
+  ASSERT_EQ(SlamRun(sequence(), temp / "out", {"--max-frames", "6", "--debug-log"}).finished.exit_code, 0);
+  EXPECT_TRUE(fs::exists(temp / "out" / "debug.log"));
+  EXPECT_TRUE(fs::exists(temp / "out" / "movers.csv"));
+  for (const std::string& name : names) EXPECT_FALSE(fs::exists(temp / "out" / (name + ".part"))) << name;
+}
+
+TEST(RunEnding, AnInterruptedRunHasItsRowsOfFrames) {
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  std::vector<std::string> arguments = endless.run(temp / "out");
+  arguments.push_back("--debug-log");
+  Program program(arguments);
+  ASSERT_TRUE(wait_for_first_frame(program));
+  kill(program.pid(), SIGINT);
+  while (!program.ended()) endless.let_go(), pause_ms(5);
+  EXPECT_EQ(program.wait().exit_code, 130);
+  const auto stats = nlohmann::json::parse(read_text(temp / "out" / "stats.json"));
+  EXPECT_EQ(rows_of(temp / "out" / "debug.log").size(), stats["frames"]);
+  EXPECT_TRUE(fs::exists(temp / "out" / "movers.csv"));
+}
+
+TEST(RunEnding, AFileOfRowsThatCannotBeWrittenIsGivenUpAndTheResultsAreWritten) {
+  const TempFolder temp;
+  const Finished run = run_program({"run", sequence().string(), "--detector", "none", "--max-frames", "30", "--out",
+                                    (temp / "out").string(), "--dump-features"},
+                                   300'000);
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_NE(run.err.find("features.csv: cannot be written"), std::string::npos) << run.err;
+  EXPECT_TRUE(fs::exists(temp / "out" / "trajectory.txt"));
+  EXPECT_FALSE(fs::exists(temp / "out" / "features.csv.part"));
+}
+
+TEST(RunEnding, ARunThatFailsAtOnceLeavesNoFolder) {
+  const TempFolder temp;
+  const Finished run = run_program(
+      {"run", sequence().string(), "--detector", "exec:/no/such/program", "--out", (temp / "new" / "out").string()});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_TRUE(fs::is_empty(temp.path()));
+  EXPECT_NE(shell("cd " + temp.path().string() + " && @ run " + sequence().string() + " --detector exec:/no/such"), 0);
+  EXPECT_TRUE(fs::is_empty(temp.path()));
+}
+
+TEST(RunEnding, AFolderThatCannotBeMadeIsABadInput) {
+  const TempFolder temp;
+  copy_sequence(temp / std::string(250, 'x'), 6, false);
+  const std::string told = (temp / "told").string();
+  EXPECT_EQ(shell("cd " + temp.path().string() + " && @ run " + std::string(250, 'x') + " --detector none 2>" + told),
+            2);
+  const std::string text = read_text(told);
+  EXPECT_TRUE(text.starts_with("error: dkb-out/xxx")) << text;
+  EXPECT_NE(text.find(": cannot make this output folder ("), std::string::npos) << text;
+  EXPECT_NE(text.find("; choose another with --out\n"), std::string::npos) << text;
 }
 
 TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
@@ -284,6 +356,67 @@ TEST(RunEnding, CtrlCWhileTheResultsOfAWholeRunAreWrittenIsNoInterruption) {
   EXPECT_EQ(run.out.find("interrupted"), std::string::npos) << run.out;
 }
 
+// What a run of 12 frames of the sequence says, changed by `change` [of a pair's colour and depth file].
+template <class Change>
+Finished run_changed(const fs::path& folder, const Change& change, std::vector<std::string> more = {}) {
+  copy_sequence(folder / "data", 12, true);
+  for (const auto& row : rows_of(folder / "data/associations.txt"))
+    change(folder / "data" / row[1], folder / "data" / row[3]);
+  std::vector<std::string> arguments = {
+      "run", (folder / "data").string(), "--out", (folder / "out").string(), "--detector", "none"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_program(arguments);
+}
+
+TEST(RunEnding, WhyTrackingNeverBeganIsToldByWhatTheImagesShow) {
+  const TempFolder temp;
+  const Finished black = run_changed(temp / "black", [](const fs::path& colour, const fs::path&) {
+    write_text(colour, encode_png(GreyImage(640, 480, 0)));
+  });
+  EXPECT_EQ(black.exit_code, 1);
+  EXPECT_NE(black.err.find("the images show 0 corners at most: are they black, covered or out of focus?"),
+            std::string::npos)
+      << black.err;
+  const Finished empty = run_changed(temp / "empty", [](const fs::path&, const fs::path& depth) {
+    write_text(depth, encode_png(Image<uint16_t>(640, 480, 0)));
+  });
+  EXPECT_EQ(empty.exit_code, 1);
+  EXPECT_NE(empty.err.find("are there depth images"), std::string::npos) << empty.err;
+  EXPECT_NE(empty.out.find("\ndepth: none in the first frame"), std::string::npos) << empty.out;
+}
+
+TEST(RunEnding, DepthsOfTheFirstFrameAreTold) {
+  const TempFolder temp;
+  const Finished run = run_changed(temp / "usual", [](const fs::path&, const fs::path&) {});
+  EXPECT_NE(run.out.find("\ndepth "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find(" m, median "), std::string::npos) << run.out;
+  EXPECT_EQ(run.err.find("depth_factor"), std::string::npos) << run.err;
+  const Finished near = run_changed(temp / "near",
+                                    [](const fs::path&, const fs::path& depth) {
+                                      write_text(depth, encode_png(Image<uint16_t>(640, 480, 1500)));  // 0.3 m
+                                    },
+                                    {"--camera", "fr1"});
+  EXPECT_NE(
+      near.err.find("warning: depth is 0.3 m in the median of the first frame: is the camera's depth_factor right "
+                    "(5000 per metre"),
+      std::string::npos)
+      << near.err;
+}
+
+TEST(RunEnding, AMapThatTheCameraWasNeverFoundInIsNamed) {
+  const TempFolder temp;
+  ASSERT_EQ(SlamRun(sequence(), temp / "map", {"--max-frames", "12"}).finished.exit_code, 0);
+  const std::string map = (temp / "map/map.dkb").string();
+  const Finished lost = run_changed(
+      temp / "other",
+      [](const fs::path& colour, const fs::path&) { write_text(colour, encode_png(GreyImage(640, 480, 90))); },
+      {"--load-map", map});
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_NE(lost.err.find("error: the camera was never found in " + map + "; a new map begins after 1 s without it"),
+            std::string::npos)
+      << lost.err;
+}
+
 TEST(RunEnding, TheLastLinesTellTheErrorAndTheReport) {
   const TempFolder temp;
   copy_sequence(temp / "data", 12, false);
@@ -300,6 +433,40 @@ TEST(RunEnding, TheLastLinesTellTheErrorAndTheReport) {
   EXPECT_NE(broken.err.find("warning: " + (temp.path() / "data" / "groundtruth.txt").string() + ":1"),
             std::string::npos)
       << broken.err;
+}
+
+TEST(RunEnding, ASimulationIntoTheFolderOfALongerOneLeavesNoImageOfIt) {
+  const TempFolder temp;
+  const auto simulate = [&](const char* frames) {
+    return run_program(
+        {"simulate", "--out", (temp / "s").string(), "--size", "64x64", "--frames", frames, "--seed", frames});
+  };
+  ASSERT_EQ(simulate("5").exit_code, 0);
+  write_text(temp / "s/rgb/mine.jpg", "mine");
+  const Finished shorter = simulate("1");
+  ASSERT_EQ(shorter.exit_code, 0);
+  EXPECT_NE(shorter.out.find(": 1 frame of scene"), std::string::npos) << shorter.out;
+  for (const char* images : {"rgb", "depth", "masks"})
+    EXPECT_EQ(std::distance(fs::directory_iterator(temp / "s" / images), {}), images == std::string("rgb") ? 2 : 1);
+}
+
+TEST(RunEnding, WhatIsNoFolderIsNoOutputOfAConversion) {
+  const TempFolder temp;
+  for (const char* name : {"q.zip", "q.oni", "q.mp4"}) {
+    const Finished done = run_program({"convert", sequence().string(), "--out", (temp / name).string()});
+    EXPECT_EQ(done.exit_code, 2);
+    EXPECT_NE(done.err.find("give FILE.bag, FILE.mcap or the name of a folder"), std::string::npos) << done.err;
+    EXPECT_FALSE(fs::exists(temp / name));
+  }
+}
+
+TEST(RunEnding, AMapIsNotMergedWithItself) {
+  const TempFolder temp;
+  ASSERT_EQ(SlamRun(sequence(), temp / "run", {"--max-frames", "12"}).finished.exit_code, 0);
+  const std::string map = (temp / "run/map.dkb").string();
+  const Finished done = run_program({"map", "merge", map, map, "--out", map});
+  EXPECT_EQ(done.exit_code, 2);
+  EXPECT_NE(done.err.find("is the same file as"), std::string::npos) << done.err;
 }
 
 TEST(RunEnding, AnInterruptedConversionExportOrSimulationLeavesNothing) {

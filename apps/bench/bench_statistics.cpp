@@ -48,13 +48,13 @@ std::vector<Comparison> compare(const Suite& suite, const std::vector<Cell>& cel
       if (pairs.ours.empty()) continue;
       if (const double a = ours.scored(), b = theirs.scored(); a < kEven * b || b < kEven * a)
         c.uneven.push_back({suite.sequences[s].name, a, b});
-      const MedianInterval here = mean_ratio({pairs}, {.seed = kSeed});
+      const MedianInterval here = mean_ratio({pairs});
       if (here.known && here.interval.high < 1) c.better.push_back(suite.sequences[s].name);
       if (here.known && here.interval.low > 1) c.worse.push_back(suite.sequences[s].name);
       all.push_back(std::move(pairs));
     }
     c.sequences = static_cast<int>(all.size());
-    c.ratio = mean_ratio(all, {.seed = kSeed});
+    c.ratio = mean_ratio(all);
     result.push_back(std::move(c));
   }
   return result;
@@ -79,7 +79,7 @@ std::optional<SweepResult> swept(const Suite& suite, const std::vector<Cell>& ce
   result.runs = by_seed.size();
   std::vector<double> medians, widths;
   for (const auto& values : by_value) {
-    result.ape.push_back(median_interval(values, {.seed = kSeed}));
+    result.ape.push_back(median_interval(values));
     medians.push_back(result.ape.back().median);
     widths.push_back(result.ape.back().interval.high - result.ape.back().interval.low);
   }
@@ -90,7 +90,7 @@ std::optional<SweepResult> swept(const Suite& suite, const std::vector<Cell>& ce
   result.p_value = friedman_p_value(by_seed, kSeed);
   for (size_t k = 0; k < variants.size(); ++k)
     if (suite.sweep->published_choice && suite.variants[variants[k]].swept == *suite.sweep->published_choice)
-      result.choice = mean_ratio({{by_value[k], by_value[result.best]}}, {.seed = kSeed});
+      result.choice = mean_ratio({{by_value[k], by_value[result.best]}});
   return result;
 }
 

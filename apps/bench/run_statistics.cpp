@@ -12,10 +12,14 @@
 namespace dkb {
 namespace {
 
-// The values that leave (1 - confidence) / 2 of the sample on either side.
-Interval percentile_interval(std::vector<double> samples, double confidence) {
+constexpr int kResamples = 10000;
+constexpr double kConfidence = 0.95;
+constexpr uint64_t kSeed = 1;
+
+// The values that leave (1 - kConfidence) / 2 of the sample on either side.
+Interval percentile_interval(std::vector<double> samples) {
   std::sort(samples.begin(), samples.end());
-  const double tail = 0.5 * (1.0 - confidence) * static_cast<double>(samples.size());
+  const double tail = 0.5 * (1.0 - kConfidence) * static_cast<double>(samples.size());
   const size_t low = std::min(static_cast<size_t>(tail), samples.size() - 1);
   return {samples[low], samples[samples.size() - 1 - low]};
 }
@@ -48,12 +52,6 @@ double spread_of_rank_sums(const std::vector<std::vector<double>>& ranks) {
 
 }  // namespace
 
-void BootstrapOptions::check() const {
-  require_option(resamples >= 100, "bootstrap.resamples", resamples, "at least 100");
-  require_option(confidence > 0 && confidence < 1, "bootstrap.confidence", confidence, "between 0 and 1");
-  require_option(min_values >= 2, "bootstrap.min_values", min_values, "at least 2");
-}
-
 double median_of(std::vector<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   std::sort(values.begin(), values.end());
@@ -61,22 +59,20 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
-MedianInterval median_interval(const std::vector<double>& values, const BootstrapOptions& options) {
-  options.check();
-  MedianInterval result{median_of(values), {}, values.size() >= static_cast<size_t>(options.min_values)};
+MedianInterval median_interval(const std::vector<double>& values) {
+  MedianInterval result{median_of(values), {}, values.size() >= kLeastRuns};
   if (!result.known) return result;
-  Random random(options.seed);
+  Random random(kSeed);
   std::vector<double> medians, drawn(values.size());
-  for (int r = 0; r < options.resamples; ++r) {
+  for (int r = 0; r < kResamples; ++r) {
     for (double& value : drawn) value = values[random.below(static_cast<uint32_t>(values.size()))];
     medians.push_back(median_of(drawn));
   }
-  result.interval = percentile_interval(std::move(medians), options.confidence);
+  result.interval = percentile_interval(std::move(medians));
   return result;
 }
 
-MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const BootstrapOptions& options) {
-  options.check();
+MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences) {
   MedianInterval result;
   if (sequences.empty()) return result;
   result.known = true;
@@ -84,15 +80,15 @@ MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const Bootst
   for (const PairedRuns& s : sequences) {
     if (s.ours.size() != s.reference.size() || s.ours.empty())
       throw InputError("mean_ratio: both systems need the same runs, at least one");
-    result.known = result.known && s.ours.size() >= static_cast<size_t>(options.min_values);
+    result.known = result.known && s.ours.size() >= kLeastRuns;
     sum += std::log(median_of(s.ours) / median_of(s.reference));
   }
   const auto n = static_cast<double>(sequences.size());
   result.median = std::exp(sum / n);
   if (!result.known) return result;
-  Random random(options.seed);
+  Random random(kSeed);
   std::vector<double> ratios, ours, reference;
-  for (int r = 0; r < options.resamples; ++r) {
+  for (int r = 0; r < kResamples; ++r) {
     double drawn = 0;
     for (const PairedRuns& s : sequences) {
       ours.clear(), reference.clear();
@@ -104,7 +100,7 @@ MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const Bootst
     }
     ratios.push_back(std::exp(drawn / n));
   }
-  result.interval = percentile_interval(std::move(ratios), options.confidence);
+  result.interval = percentile_interval(std::move(ratios));
   return result;
 }
 

@@ -6,7 +6,7 @@
 
 namespace dkb {
 
-// Statistics over repeated runs. Each is a function of its arguments alone: resampling has an explicit seed.
+// Statistics over repeated runs. Each is a function of its arguments alone: resampling has a seed of its own.
 
 // Middle value, mean of the two middle ones when their number is even; NaN for none. Values must not be NaN.
 double median_of(std::vector<double> values);
@@ -15,13 +15,7 @@ struct Interval {
   double low = 0, high = 0;
 };
 
-struct BootstrapOptions {
-  int resamples = 10000;     // >= 100
-  double confidence = 0.95;  // in (0, 1)
-  uint64_t seed = 1;
-  int min_values = 5;  // fewer say too little for an interval, >= 2
-  void check() const;  // throws InvalidOption
-};
+constexpr size_t kLeastRuns = 5;  // fewer say too little for an interval
 
 // What an interval is worth: `known` is false with too few values.
 struct MedianInterval {
@@ -29,18 +23,18 @@ struct MedianInterval {
   Interval interval;
   bool known = false;
 };
-// Percentile bootstrap of the median (Efron, "Bootstrap Methods: Another Look at the Jackknife", Ann. Statist. 1979).
-// With 5 values a 95% interval reaches from the smallest to the largest: the exact chance that the median of a resample
-// is the smallest value is 5.8%.
-MedianInterval median_interval(const std::vector<double>& values, const BootstrapOptions& options = {});
+// 95% of the percentile bootstrap of the median (Efron, "Bootstrap Methods: Another Look at the Jackknife", Ann.
+// Statist. 1979). With 5 values a 95% interval reaches from the smallest to the largest: the exact chance that the
+// median of a resample is the smallest value is 5.8%.
+MedianInterval median_interval(const std::vector<double>& values);
 
 // Runs of two systems on one sequence; equal indices had the same seed.
 struct PairedRuns {
   std::vector<double> ours, reference;  // the same number, positive
 };
 // Geometric mean over sequences of median(ours) / median(reference), and its interval by drawing seeds anew, the same
-// for both systems, in every sequence. Unknown when a sequence has fewer than `min_values` runs, or there is none.
-MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences, const BootstrapOptions& options = {});
+// for both systems, in every sequence. Unknown when a sequence has fewer than kLeastRuns runs, or there is none.
+MedianInterval mean_ratio(const std::vector<PairedRuns>& sequences);
 
 // Friedman's test by permutation (Friedman, "The Use of Ranks to Avoid the Assumption of Normality", JASA 1937):
 // `blocks[b][t]` is the value of treatment t in block b, here weight t with seed b. Returns the chance that treatments

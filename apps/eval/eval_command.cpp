@@ -16,13 +16,18 @@ namespace fs = std::filesystem;
 namespace {
 
 struct EvalArguments {
-  std::string truth, estimate, rpe_delta = "1f", json, plot;
+  std::string truth, estimate, rpe_delta = "1f", align, json, plot;
+  bool scale = false;
   EvaluationOptions options;
 };
 
 Evaluation evaluate_files(const EvalArguments& arguments) {
   EvaluationOptions options = arguments.options;
   options.rpe_delta = parse_rpe_delta(arguments.rpe_delta);
+  if (!arguments.align.empty()) options.alignment = alignment_named(arguments.align, "--align");
+  if (arguments.scale && !arguments.align.empty() && options.alignment != Alignment::sim3)
+    throw InputError("--scale: is --align sim3; leave one of them out");
+  if (arguments.scale) options.alignment = Alignment::sim3;
   size_t hidden = 0;
   const Trajectory truth = read_poses(arguments.truth, &hidden);
   if (hidden > 0) tell(stderr, "warning: {}: {}\n", arguments.truth, hidden_text(hidden));
@@ -59,7 +64,10 @@ void register_eval(CLI::App& app, int& exit_code) {
                     "such a stretch from every pose on, as papers quote them (default: stretches that do not overlap)");
   command->add_option("--time-offset", arguments->options.time_offset, "[s] added to the stamps of the estimate")
       ->capture_default_str();
-  command->add_flag("--scale", arguments->options.with_scale, "align by a similarity (monocular estimates)");
+  command->add_option("--align", arguments->align,
+                      "by the rigid motion (se3, the default) or the similarity (sim3) that fits all positions, by the "
+                      "first pose (origin), or none");
+  command->add_flag("--scale", arguments->scale, "the same as --align sim3 (monocular estimates)");
   command->add_option("--json", arguments->json, "write the figures to this file");
   command->add_option("--plot", arguments->plot, "draw paths and errors into this file (.svg)");
   command->callback([arguments, &exit_code] {

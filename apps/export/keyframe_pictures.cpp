@@ -35,7 +35,7 @@ GreyImage still_world(const FrameResult& result, const DepthImage& depth, const 
 std::vector<KeyframeId> write_keyframe_pictures(const MapFile& file, Source& source, Slam& slam, MaskNames names,
                                                 const std::filesystem::path& folder) {
   std::map<int64_t, KeyframeId> wanted;  // by stamp [us]
-  for (KeyframeId id : keyframes_of_first_map(file.map)) {
+  for (KeyframeId id : keyframes_of_largest_map(file.map)) {
     wanted.emplace(ns_from_seconds(file.map.keyframe(id)->timestamp) / 1000, id);
   }
   make_output_folder(folder / "images");

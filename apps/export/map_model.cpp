@@ -43,12 +43,12 @@ std::string picture_name(const Keyframe& keyframe) {
   return stamp_text(ns_from_seconds(keyframe.timestamp)) + ".png";
 }
 
-std::vector<KeyframeId> keyframes_of_first_map(const Map& map) {
-  std::vector<KeyframeId> keyframes = map.live_keyframes();
-  if (keyframes.empty()) return keyframes;
-  const KeyframeId root = map.roots().front();
-  std::erase_if(keyframes, [&](KeyframeId id) { return map.root(id) != root; });
-  return keyframes;
+std::vector<KeyframeId> keyframes_of_largest_map(const Map& map) {
+  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
+  std::vector<std::vector<KeyframeId>> by_map(std::max<size_t>(1, roots.size()));
+  for (KeyframeId id : map.live_keyframes())
+    by_map[static_cast<size_t>(map_number(roots, root_of[static_cast<size_t>(id)]))].push_back(id);
+  return *std::max_element(by_map.begin(), by_map.end(), [](auto& a, auto& b) { return a.size() < b.size(); });
 }
 
 void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes, const std::filesystem::path& folder) {

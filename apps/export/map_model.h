@@ -10,13 +10,13 @@
 
 namespace dkb {
 
-// A map as others take it who make pictures of it: photogrammetry, neural radiance fields, Gaussian splatting. Of the
-// first map alone, since maps that were never joined have worlds of their own.
+// A map as others take it who make pictures of it: photogrammetry, neural radiance fields, Gaussian splatting. Of one
+// map alone, since maps that were never joined have worlds of their own.
 
 // Name of a keyframe's picture, without folder: STAMP.png.
 std::string picture_name(const Keyframe& keyframe);
-// The live keyframes of the first map, increasing.
-std::vector<KeyframeId> keyframes_of_first_map(const Map& map);
+// The live keyframes of the map that has most of them, increasing.
+std::vector<KeyframeId> keyframes_of_largest_map(const Map& map);
 
 // COLMAP's text model of some of these keyframes: sparse/0/cameras.txt, images.txt and points3D.txt with their tracks,
 // below `folder`. Pixels have their origin at the corner of the top-left pixel there.

@@ -14,6 +14,7 @@
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/map_file.h"
+#include "dkb/map/point_cloud.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
 #include "dkb/util/errors.h"
@@ -85,9 +86,10 @@ HeaderMessage header_at(int64_t stamp_ns, const char* frame) {
   return header;
 }
 
+// Of the map that trajectory.txt is of: others have worlds of their own.
 PointCloud2Message cloud_of(const Map& map, int64_t stamp_ns, std::vector<char>& bytes) {
   constexpr uint32_t kStep = 16;
-  const std::vector<PointId> points = map.live_points();
+  const std::vector<PointId> points = points_by_map(map).front();
   bytes.resize(points.size() * kStep);
   for (size_t i = 0; i < points.size(); ++i) {
     const MapPoint& p = *map.point(points[i]);

@@ -5,14 +5,12 @@
 #include <cmath>
 
 #include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/plural.h"
+#include "report/other_maps.h"
 #include "report/report_sections.h"
 
 namespace dkb::report {
 namespace {
-
-std::string plural(long n, const std::string& one, const std::string& more) {
-  return fmt::format("{} {}", n, n == 1 ? one : more);
-}
 
 std::string tile(const char* style, const std::string& name, const std::string& value, const std::string& more) {
   return fmt::format(
@@ -31,8 +29,13 @@ std::string headline(const Context& c) {
   std::string out = s.tracked == c.facts.offered
                         ? "All " + plural(s.tracked, "frame has a pose", "frames have a pose")
                         : fmt::format("{} of {} frames have a pose", s.tracked, c.facts.offered);
-  if (c.truth.evaluation) out += ", " + metres(c.truth.evaluation->ape.translation.rmse) + " rmse from the truth";
-  return out;
+  const std::string others = other_maps_text(c.facts.poses_of_map);
+  if (!others.empty()) out += "; " + others;
+  if (!c.truth.evaluation) return out;
+  const ErrorStatistics& ape = c.truth.evaluation->ape.translation;
+  if (!others.empty())
+    return out + fmt::format("; of the others {} are {} rmse from the truth", ape.count, metres(ape.rmse));
+  return out + ", " + metres(ape.rmse) + " rmse from the truth";
 }
 
 // Frames without a pose, by their cause.

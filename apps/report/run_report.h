@@ -27,11 +27,12 @@ struct ReportFacts {
   std::string version;                                       // of the program
   std::vector<std::pair<std::string, std::string>> choices;  // how it was started: camera, detector ...
   Camera camera;
-  bool realtime = false;         // frames came at the pace of their stamps
-  int offered = 0, skipped = 0;  // as in stats.json
-  double wall_s = 0;             // likewise
-  Statistics statistics;         // with the stages of all threads
-  Trajectory trajectory;         // of the first map, as in trajectory.txt
+  bool realtime = false;             // frames came at the pace of their stamps
+  int offered = 0, skipped = 0;      // as in stats.json
+  double wall_s = 0;                 // likewise
+  Statistics statistics;             // with the stages of all threads
+  Trajectory trajectory;             // of the first map, as in trajectory.txt
+  std::vector<size_t> poses_of_map;  // in trajectory.txt, trajectory_map2.txt ...
   std::vector<ChangedSetting> settings;
   CauseLimits limits;
   uint64_t seed = 1;  // picks the random pictures

@@ -85,6 +85,7 @@ struct OccupancyGrid {
   double origin_x = 0, origin_y = 0;  ///< [m] of the lower left corner of the lower left cell, on the floor
   Image<uint8_t> cells;               ///< row 0 is the top: the largest y
   Rigid3 floor_from_world;            ///< z = 0 is the floor, z up
+  int map = 0;                        ///< whose world that is, as TrajectoryFrame::map
 };
 
 /// The dense map of the still world: people and what they moved are left out.
@@ -93,6 +94,7 @@ struct DenseMap {
   /// Nothing when no floor was found. It is the lowest large level surface seen so far: early on that may be a table.
   std::optional<OccupancyGrid> grid;
   int views = 0;  ///< keyframes that were fused
+  int map = 0;    ///< that they are of, as TrajectoryFrame::map
 };
 
 /// Files of a dense map: Stanford PLY (binary), and the two files that ROS' map_server reads. `image` is the name of

@@ -103,7 +103,6 @@ class DKB_SLAM_API Options {
     double grid_cell = 0.05;      ///< [m] side of a cell of the occupancy grid, 0.01 ... 1, at least 2 voxels
     double obstacle_low = 0.10;   ///< [m] above the floor: what is lower can be driven over, above 0
     double obstacle_high = 1.50;  ///< [m] what is higher can be driven under, above obstacle_low
-    int threads = 2;              ///< of the fusion, whose result does not depend on it, 1 ... 64
   } dense;
 
   struct Pipeline {

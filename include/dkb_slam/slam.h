@@ -50,40 +50,39 @@ struct TrajectoryFrame {
 
 /// What has happened since the world began.
 struct Statistics {
-  int frames = 0, tracked = 0, lost = 0;       ///< accepted; with a pose; without one although there is a map
-  int predicted = 0;                           ///< of the tracked ones, by a motion prior or by depth alone
-  int relocalisations = 0;                     ///< how often a lost camera was found
-  int keyframes = 0, keyframes_inserted = 0;   ///< in the map now; ever made
-  int maps = 0;                                ///< that are not joined
-  int loops = 0, merges = 0;                   ///< places seen again; maps joined
-  size_t map_points = 0;                       ///< in the map now
-  int points_created = 0, points_culled = 0;   ///< map points ever made; taken out because too few frames found them
-  int points_fused = 0;                        ///< joined with another that is the same
-  int points_retracted = 0;                    ///< taken out because they lie on something that moves
-  int keyframes_culled = 0;                    ///< taken out because others show the same
-  std::map<std::string, int> keyframe_rules;   ///< keyframes by the rule that made them
-  std::map<std::string, int> keyframe_tests;   ///< how often each test of the rule spoke for a keyframe
-  long features_removed = 0;                   ///< features that the filter kept from tracking
-  std::string detector = "none";               ///< kinds, joined by +
-  double detector_rate_hz = 0;                 ///< answers of the slow detector per second of the sequence
-  int detector_latency_frames = 0;             ///< its DetectionSchedule::latency
-  std::string detector_inference;              ///< Detectors::inference
-  bool detector_failed = false;                ///< a detector threw ten times in a row: it is not asked any more
+  int frames = 0, tracked = 0, lost = 0;      ///< accepted; with a pose; without one although there is a map
+  int predicted = 0;                          ///< of the tracked ones, by a motion prior or by depth alone
+  int relocalisations = 0;                    ///< how often a lost camera was found
+  int keyframes = 0, keyframes_inserted = 0;  ///< in the map now; ever made
+  int maps = 0;                               ///< that are not joined
+  int loops = 0, merges = 0;                  ///< places seen again; maps joined
+  size_t map_points = 0;                      ///< in the map now
+  int points_created = 0, points_culled = 0;  ///< map points ever made; taken out because too few frames found them
+  int points_fused = 0;                       ///< joined with another that is the same
+  int points_retracted = 0;                   ///< taken out because they lie on something that moves
+  int keyframes_culled = 0;                   ///< taken out because others show the same
+  std::map<std::string, int> keyframe_rules;  ///< keyframes by the rule that made them
+  std::map<std::string, int> keyframe_tests;  ///< how often each test of the rule spoke for a keyframe
+  long features_removed = 0;                  ///< features that the filter kept from tracking
+  std::string detector = "none";              ///< kinds, joined by +
+  double detector_rate_hz = 0;                ///< answers of the slow detector per second of the sequence
+  int detector_latency_frames = 0;            ///< its DetectionSchedule::latency
+  std::string detector_inference;             ///< Detectors::inference
+  bool detector_failed = false;               ///< a detector threw ten times in a row: it is not asked any more
   /// Of a real-time run: how long [s] it was late and therefore did without half of "detection", "loop_search" and half
   /// of the "features"; each includes those after it. Empty in any other run, which leaves nothing out.
   std::map<std::string, double> degraded_s;
   std::map<std::string, StageSummary> stages;  ///< times by stage: "tracking", "mapping", "wait_mapper" ...
-  /// By stage: how often it took how long. Element k counts durations from 2^(k/4 - 5) ms to those of element k + 1, the
-  /// first and the 64th, which is the last that there may be, also what lies beyond.
+  /// By stage: how often it took how long. Element k counts durations from 2^(k/4 - 5) ms to those of element k + 1,
+  /// the first and the 64th, which is the last that there may be, also what lies beyond.
   std::map<std::string, std::vector<int>> stage_histograms;
 };
 
 /// RGB-D SLAM. One thread feeds: process(), finish(), reset(), load_map(), save_map(), save_map_task(), dense_map(),
-/// dense_map_task(), suggest_pose() and the switches. Each of these throws InputError, and does nothing, while another is
-/// at work: on another thread, or because a detector or a keyframe rule calls it. Callbacks of on_event() may call them.
-/// Any thread calls meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(), take_events(),
-/// on_event().
-/// Several systems may live in one process and know nothing of each other.
+/// dense_map_task(), suggest_pose() and the switches. Each of these throws InputError, and does nothing, while another
+/// is at work: on another thread, or because a detector or a keyframe rule calls it. Callbacks of on_event() may call
+/// them. Any thread calls meanwhile: map(), trajectory(), online_trajectory(), keyframes(), statistics(),
+/// take_events(), on_event(). Several systems may live in one process and know nothing of each other.
 ///
 /// Deterministic: the same frames and options give the same poses and map to the last bit, with or without threads,
 /// except with Options::realtime.
@@ -99,8 +98,9 @@ class DKB_SLAM_API Slam {
   Slam(Slam&&) noexcept;
   Slam& operator=(Slam&&) noexcept;
 
-  /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise. A stamp that is
-  /// far ahead of the one before it is taken, and told as a warning: whatever comes before it is refused from then on.
+  /// Tracks the next frame. Throws InputError when it does not fit the camera or its stamp does not rise. A stamp that
+  /// is far ahead of the one before it is taken, and told as a warning: whatever comes before it is refused from then
+  /// on.
   FrameResult process(const FrameInput& input);
   FrameResult process(const Frame& frame);  ///< likewise
 
@@ -123,22 +123,23 @@ class DKB_SLAM_API Slam {
   void explain_keyframes(bool on);
 
   /// Writes the map as it is now, by a temporary file and a rename. A real-time run waits for what mapping should have
-  /// done by now. Throws InputError, and leaves a file that is there as it is, when it cannot or the map has no keyframe
-  /// yet.
+  /// done by now. Throws InputError, and leaves a file that is there as it is, when it cannot or the map has no
+  /// keyframe yet.
   void save_map(const std::filesystem::path& path) const;
-  /// The same, to be called on any thread and at any time: it writes the map of the moment of this call. For robots that
-  /// save it while they go on tracking.
+  /// The same, to be called on any thread and at any time: it writes the map of the moment of this call. For robots
+  /// that save it while they go on tracking.
   std::function<void(const std::filesystem::path& path)> save_map_task() const;
-  /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Poses are in
-  /// the world that the map was made with, whatever Options::base_from_cam says now. The file holds no surfaces: the
-  /// dense map begins anew. Throws InputError, and leaves all as it is, when the file is broken or was made with another
-  /// camera or pyramid.
+  /// Forgets everything as reset() does, and goes on in that map: frames are lost until one is found in it. Poses are
+  /// in the world that the map was made with, whatever Options::base_from_cam says now. The file holds no surfaces: the
+  /// dense map begins anew. Throws InputError, and leaves all as it is, when the file is broken or was made with
+  /// another camera or pyramid.
   void load_map(const std::filesystem::path& path);
 
   /// The map as tracking knows it.
   MapSnapshot map() const;
-  /// Poses of all tracked frames by the map as it is now, each made more exact by those before and after it, as whatever
-  /// carries a camera has mass (not with the presets "paper" and "orb"); complete after finish(). Some 0.1 ms a frame.
+  /// Poses of all tracked frames by the map as it is now, each made more exact by those before and after it, as
+  /// whatever carries a camera has mass (not with the presets "paper" and "orb"); complete after finish(). Some 0.1 ms
+  /// a frame.
   std::vector<TrajectoryFrame> trajectory() const;
   /// The same frames as they were published.
   std::vector<TrajectoryFrame> online_trajectory() const;
@@ -146,12 +147,13 @@ class DKB_SLAM_API Slam {
   std::vector<TrajectoryFrame> keyframes() const;
   Statistics statistics() const;  ///< stages of other threads are complete after finish()
 
-  /// The still world from the keyframes so far; takes seconds. Of maps that are not joined, that of the last frame with a
-  /// pose. A map that was loaded has no images: only keyframes made since then are in it, and without new ones there is
-  /// no grid. Throws InputError when Options::dense_map is off.
+  /// The still world from the keyframes so far; takes seconds. Of maps that are not joined, that of the last frame with
+  /// a pose. A map that was loaded has no images: only keyframes made since then are in it, and without new ones there
+  /// is no grid. Throws InputError when Options::dense_map is off.
   DenseMap dense_map() const;
-  /// The same, to be called on any thread and at any time: it makes the map of the moment of this call, which itself
-  /// takes no time. For robots that want a grid while they go on tracking.
+  DenseMap dense_map(int map) const;  ///< likewise, of the map of this number, as TrajectoryFrame::map has it
+  /// The first of these, to be called on any thread and at any time: it makes the map of the moment of this call, which
+  /// itself takes no time. For robots that want a grid while they go on tracking.
   std::function<DenseMap()> dense_map_task() const;
 
   /// What happened since the last call, oldest first; at most the newest 10,000 are kept. Nothing while a callback is

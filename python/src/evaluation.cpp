@@ -54,7 +54,7 @@ void bind_evaluation(py::module_& module) {
                                       .time_offset = time_offset,
                                       .rpe_delta = parse_rpe_delta(rpe_delta),
                                       .rpe_all_pairs = all_pairs,
-                                      .with_scale = scale}));
+                                      .alignment = scale ? Alignment::sim3 : Alignment::se3}));
   });
   module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
     if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);

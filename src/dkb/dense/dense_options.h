@@ -13,7 +13,7 @@ struct DenseOptions {
   double grid_cell = 0.05;      // [m] side of a cell of the occupancy grid, 0.01 ... 1, >= 2 voxels
   double obstacle_low = 0.10;   // [m] above the floor: what is lower can be driven over, > 0
   double obstacle_high = 1.50;  // [m] what is higher can be driven under, > obstacle_low
-  int threads = 2;              // of the fusion, 1 ... 64; the result does not depend on it
+  int threads = 2;              // of the fusion, >= 1: as robots go on tracking meanwhile; no result depends on it
 };
 
 }  // namespace dkb

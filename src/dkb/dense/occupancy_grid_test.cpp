@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <sstream>
+#include <vector>
 
 namespace dkb {
 namespace {
@@ -52,6 +54,64 @@ TEST(OccupancyGrid, RaysMakeCellsFreeUpToWhatTheyHit) {
   const OccupancyGrid grid = make_occupancy_grid(mesh, {&placed, 1}, camera, {}, {});
   EXPECT_EQ(cell_at(grid, 2.01, 0.01), OccupancyGrid::kOccupied);
   for (double x = 0.1; x < 1.9; x += 0.1) EXPECT_EQ(cell_at(grid, x, -0.01), OccupancyGrid::kFree) << x;
+}
+
+// A camera 1 m above a floor, pitched 20 degrees down along x, that looks from three places over an edge at x = 2 into
+// a stairwell whose ground lies at z = -`drop`, up to a wall at x = 5; `noise` [m] is added to every second depth.
+OccupancyGrid stairwell(double drop, double noise = 0) {
+  const ViewCamera camera{320, 240, 262, 262, 159.5, 119.5};
+  const double pitch = 20 * M_PI / 180;
+  const Eigen::Vector3d forward(std::cos(pitch), 0, -std::sin(pitch)), right(0, -1, 0);
+  Eigen::Matrix3d rotation;
+  rotation << right, forward.cross(right), forward;
+  DepthView views[3];
+  std::vector<PlacedView> placed;
+  for (DepthView& view : views) {
+    const Eigen::Vector3d eye(0.1 * static_cast<double>(placed.size()), 0, 1);
+    view.depth = Image<uint16_t>(320, 240);
+    for (int y = 0; y < 240; ++y)
+      for (int x = 0; x < 320; ++x) {
+        const Eigen::Vector3d ray = rotation * camera.ray(x, y);
+        double z = ray.x() > 0 ? (5 - eye.x()) / ray.x() : 0;
+        const bool before_edge = ray.z() < 0 && eye.x() + ray.x() / -ray.z() < 2;
+        if (ray.z() < 0) z = before_edge ? 1 / -ray.z() : std::min(z, (1 + drop) / -ray.z());
+        view.depth(x, y) = static_cast<uint16_t>((z + (x / 4 % 2) * noise) * DepthView::kUnitsPerMetre);
+      }
+    placed.push_back({&view, Rigid3(Eigen::Quaterniond(rotation), eye).inverse()});
+  }
+  SurfaceMesh mesh;  // the floor up to the edge, and the wall
+  for (int j = -50; j < 50; ++j) {
+    const float y = 0.02F * static_cast<float>(j);
+    for (int i = 40; i < 100; ++i) mesh.vertices.emplace_back(0.02F * static_cast<float>(i), y, 0.0F);
+    for (int k = -100; k < 100; ++k) mesh.vertices.emplace_back(5.01F, y, 0.02F * static_cast<float>(k));
+  }
+  DenseOptions options;
+  options.max_depth = 10;
+  return make_occupancy_grid(mesh, placed, camera, {}, options);
+}
+
+// Under the middle column of rays.
+uint8_t cell_ahead(const OccupancyGrid& grid, double x) {
+  return cell_at(grid, x, -0.01);
+}
+
+TEST(OccupancyGrid, ADropIsOccupiedFromItsEdgeOn) {
+  const OccupancyGrid grid = stairwell(2);
+  for (double x = 1.0; x < 1.99; x += 0.1) EXPECT_EQ(cell_ahead(grid, x), OccupancyGrid::kFree) << x;
+  for (double x = 2.3; x < 4.95; x += 0.1) EXPECT_EQ(cell_ahead(grid, x), OccupancyGrid::kOccupied) << x;
+}
+
+TEST(OccupancyGrid, AFloorThatIsALittleLowerOrNoisyIsNoDrop) {
+  // The one is within obstacle_low; depths of the other are off by 5 cm along rays that fall by less than 1 in 1.
+  for (const OccupancyGrid& grid : {stairwell(0.08), stairwell(0, 0.05)})
+    for (double x = 1.0; x < 4.9; x += 0.1) EXPECT_EQ(cell_ahead(grid, x), OccupancyGrid::kFree) << x;
+}
+
+TEST(OccupancyGrid, TheYamlNamesTheWorldThatItIsIn) {
+  OccupancyGrid grid = stairwell(2);
+  EXPECT_NE(occupancy_yaml(grid, "o.pgm").find("world of trajectory.txt:"), std::string::npos);
+  grid.map = 2;
+  EXPECT_NE(occupancy_yaml(grid, "o.pgm").find("world of trajectory_map3.txt:"), std::string::npos);
 }
 
 TEST(OccupancyGrid, FilesAreReadBackAsMapServerDoes) {

@@ -33,11 +33,13 @@ nlohmann::ordered_json errors_json(const PoseErrors& e) {
 }  // namespace
 
 std::string evaluation_table(const Evaluation& e) {
-  const std::string scale =
-      e.options.with_scale ? fmt::format(", scale {:.6f}", e.truth_from_estimate.scale) : std::string();
+  std::string alignment;  // where it is not the usual one
+  if (e.options.alignment == Alignment::sim3) alignment = fmt::format(", scale {:.6f}", e.truth_from_estimate.scale);
+  if (e.options.alignment == Alignment::origin) alignment = ", aligned by the first pose alone";
+  if (e.options.alignment == Alignment::none) alignment = ", not aligned";
   std::string out =
       fmt::format("{} poses matched ({} estimated, {} true, stamps within {} s{})\n", e.ape.translation_m.size(),
-                  e.estimated_poses, e.truth_poses, e.options.max_difference, scale);
+                  e.estimated_poses, e.truth_poses, e.options.max_difference, alignment);
   out += fmt::format("{:<21} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median", "std", "min",
                      "max");
   out += table_row("APE translation", "m", e.ape.translation, 6);
@@ -47,7 +49,7 @@ std::string evaluation_table(const Evaluation& e) {
   out += table_row((rpe + " transl.").c_str(), "m", e.rpe.translation, 6);
   out += table_row((rpe + " rotation").c_str(), "deg", e.rpe.rotation, 4);
   // A short clip, or one that hardly moves.
-  if (e.rotation_determined() && e.rotation_sd_deg >= e.ape.rotation.rmse)
+  if (e.rotation_determined() && e.rotation_sd_deg > 0 && e.rotation_sd_deg >= e.ape.rotation.rmse)
     out += fmt::format("APE rotation may be the alignment's alone: the positions tell it to +- {:.2g} deg\n",
                        e.rotation_sd_deg);
   if (!e.rpe_pairs.empty())
@@ -75,6 +77,7 @@ std::string evaluation_json(const Evaluation& e) {
   nlohmann::ordered_json json;
   json["matched"] = e.ape.translation_m.size();
   json["estimated"] = e.estimated_poses;
+  json["align"] = name_of(e.options.alignment);
   json["scale"] = e.truth_from_estimate.scale;
   if (e.wrong_scale) json["wrong_scale"] = *e.wrong_scale;
   json["ape"] = errors_json(e.ape);

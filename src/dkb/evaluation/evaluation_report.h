@@ -16,7 +16,7 @@ std::vector<std::string> evaluation_warnings(const Evaluation& evaluation);
 // The first of these.
 std::string scale_text(double wrong_scale);
 
-// The evaluation as JSON: matched, estimated, scale, ape.translation_m.{rmse, mean, median, std, min, max},
+// The evaluation as JSON: matched, estimated, align, scale, ape.translation_m.{rmse, mean, median, std, min, max},
 // ape.rotation_deg.{...}, rpe.translation_m.{...}, rpe.rotation_deg.{...}, rpe.delta, rpe.pairs, rpe.all_pairs. Numbers
 // of an empty set are null. ape.rotation_determined is false, and ape.rotation_deg null, where positions do not
 // determine the alignment's rotation; ape.rotation_sd_deg is its standard error, elsewhere. wrong_scale is there only

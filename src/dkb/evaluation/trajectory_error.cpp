@@ -169,6 +169,17 @@ std::string to_string(const RpeDelta& delta) {
   return fmt::format("{}{}", delta.value, unit);
 }
 
+const char* name_of(Alignment alignment) {
+  constexpr const char* kNames[] = {"se3", "sim3", "origin", "none"};
+  return kNames[static_cast<size_t>(alignment)];
+}
+
+Alignment alignment_named(const std::string& name, const std::string& where) {
+  for (const Alignment a : {Alignment::se3, Alignment::sim3, Alignment::origin, Alignment::none})
+    if (name == name_of(a)) return a;
+  throw InputError(where + ": \"" + name + "\" is none of se3, sim3, origin and none");
+}
+
 void EvaluationOptions::check() const {
   require_option(std::isfinite(max_difference) && max_difference >= 0, "max-diff", max_difference, "at least 0 s");
   require_option(std::isfinite(time_offset), "time-offset", time_offset, "a number of seconds");
@@ -231,12 +242,18 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const Eval
     from.push_back(estimate[j].world_from_cam.translation);
   }
 
-  e.truth_from_estimate = align_umeyama(from, to, options.with_scale);
+  const bool by_positions = options.alignment == Alignment::se3 || options.alignment == Alignment::sim3;
+  if (by_positions) {
+    e.truth_from_estimate = align_umeyama(from, to, options.alignment == Alignment::sim3);
+  } else if (options.alignment == Alignment::origin) {
+    const auto& [i, j] = matches.front();
+    e.truth_from_estimate.motion = truth[i].world_from_cam * estimate[j].world_from_cam.inverse();
+  }
   // A wrong scale is an error of its own, and leaves the rotation as it is.
   const Similarity3 best = align_umeyama(from, to, true);
   const std::vector<Eigen::Vector3d> errors = errors_after(best, from, to);
-  if (!options.with_scale) e.wrong_scale = wrong_scale(best, errors, from);
-  e.rotation_sd_deg = leave_a_line(from, to) ? rotation_sd(errors, to) : INFINITY;
+  if (options.alignment != Alignment::sim3) e.wrong_scale = wrong_scale(best, errors, from);
+  if (by_positions) e.rotation_sd_deg = leave_a_line(from, to) ? rotation_sd(errors, to) : INFINITY;
   const Similarity3& s = e.truth_from_estimate;
   for (const auto& [i, j] : matches) {
     const Rigid3 &t = truth[i].world_from_cam, &x = estimate[j].world_from_cam;

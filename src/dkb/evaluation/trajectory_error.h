@@ -27,13 +27,20 @@ struct RpeDelta {
 RpeDelta parse_rpe_delta(const std::string& text);  // "1f", "0.5m", "2s"; throws InputError
 std::string to_string(const RpeDelta& delta);
 
+// What brings the estimate into the world of the truth: the rigid motion (se3) or the similarity (sim3) that fits the
+// positions best, the motion that puts its first matched pose on the true one, or nothing. evo's -a, -as,
+// --align_origin, and no option.
+enum class Alignment { se3, sim3, origin, none };
+Alignment alignment_named(const std::string& name, const std::string& where);  // throws InputError
+const char* name_of(Alignment alignment);
+
 struct EvaluationOptions {
   double max_difference = 0.02;  // [s] between matched stamps, >= 0
   double time_offset = 0;        // [s] added to the stamps of the estimate
   RpeDelta rpe_delta;
   bool rpe_all_pairs = false;  // from every pose on, in the place of stretches that do not overlap
-  bool with_scale = false;     // align by a similarity instead of a rigid motion
-  void check() const;          // throws InvalidOption
+  Alignment alignment = Alignment::se3;
+  void check() const;  // throws InvalidOption
 };
 
 struct ErrorStatistics {
@@ -56,11 +63,11 @@ struct Evaluation {
   std::vector<Rigid3> truth, estimate;          // matched, world_from_cam, the estimate aligned to the truth
   Similarity3 truth_from_estimate;              // the alignment
   // [deg] standard error of the alignment's rotation about the axis that positions tell least of; infinite where either
-  // path lies on a line or in one place.
+  // path lies on a line or in one place; 0 where positions have no say in it (origin, none).
   double rotation_sd_deg = 0;
   bool rotation_determined() const { return std::isfinite(rotation_sd_deg); }
   // By how much the estimate is to be enlarged to fit the truth best, where that is told from 1 beyond doubt: most
-  // often a wrong depth factor. Nothing with `with_scale`.
+  // often a wrong depth factor. Nothing with sim3.
   std::optional<double> wrong_scale;
   PoseErrors ape;                                    // per matched pose
   PoseErrors rpe;                                    // per pair of poses
@@ -72,7 +79,7 @@ struct Evaluation {
 // than once.
 std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const Trajectory& b, double max_difference);
 
-// APE after least-squares alignment of the positions, and RPE over consecutive, not overlapping stretches of
+// APE after the alignment, and RPE over consecutive, not overlapping stretches of
 // `rpe_delta`:
 //   frames   poses 0, n, 2n, ...
 //   metres   cut where the path of the estimate since the last cut reaches delta; the first cut is the first such place

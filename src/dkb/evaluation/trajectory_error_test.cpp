@@ -66,6 +66,54 @@ TEST(Evaluate, APathOnALineOrInOnePlaceTellsNoRotationError) {
   EXPECT_FALSE(evaluate(line({0.1, 0, 0}, 0.01), line({0.1, 0, 0}, 0)).rotation_determined());
 }
 
+TEST(Evaluate, EachAlignmentLeavesWhatItDoesNotTakeAway) {
+  // The truth goes 4 m along x and 2 m along y. The estimate is 3 m off in z from the start, half as long, and turned
+  // by a right angle about z at its first pose alone.
+  Trajectory truth, estimate;
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(4, 0, 0), Eigen::Vector3d(4, 2, 0)}) {
+    const double t = static_cast<double>(truth.size());
+    truth.push_back(pose(t, at));
+    estimate.push_back(pose(t, 0.5 * at + Eigen::Vector3d(0, 0, 3), {0, 0, t == 0 ? 90 * kDegree : 0}));
+  }
+  const auto errors = [&](Alignment alignment) {
+    return evaluate(truth, estimate, {.rpe_delta = {}, .alignment = alignment}).ape;
+  };
+
+  // Not aligned: (0, 0, 3), (-2, 0, 3) and (-2, -1, 3); the first rotation alone is off.
+  const PoseErrors none = errors(Alignment::none);
+  EXPECT_NEAR(none.translation_m[0], 3, 1e-12);
+  EXPECT_NEAR(none.translation_m[1], std::sqrt(13), 1e-12);
+  EXPECT_NEAR(none.translation_m[2], std::sqrt(14), 1e-12);
+  EXPECT_NEAR(none.rotation_deg[0], 90, 1e-9);
+  EXPECT_NEAR(none.rotation_deg[1], 0, 1e-9);
+
+  // By the first pose, all is turned by -90 degrees about z: (0, 0, 0), (0, -2, 0), (1, -2, 0).
+  const PoseErrors origin = errors(Alignment::origin);
+  EXPECT_NEAR(origin.translation_m[0], 0, 1e-12);
+  EXPECT_NEAR(origin.translation_m[1], std::sqrt(16 + 4), 1e-12);
+  EXPECT_NEAR(origin.translation_m[2], std::sqrt(9 + 16), 1e-12);
+  EXPECT_NEAR(origin.rotation_deg[0], 0, 1e-9);
+  EXPECT_NEAR(origin.rotation_deg[1], 90, 1e-9);
+
+  // By all positions: half of what each is from the mean (8/3, 2/3, 0) is missing, 1/2 sqrt(64 + 4) / 3 of the first;
+  // with a scale of 2 nothing is.
+  EXPECT_NEAR(errors(Alignment::se3).translation_m[0], std::sqrt(68.0) / 6, 1e-9);
+  EXPECT_NEAR(errors(Alignment::sim3).translation.max, 0, 1e-9);
+  EXPECT_NEAR(evaluate(truth, estimate, {.rpe_delta = {}, .alignment = Alignment::sim3}).truth_from_estimate.scale, 2,
+              1e-9);
+}
+
+TEST(Evaluate, WithoutAlignmentAPathOnALineTellsItsRotationError) {
+  const Evaluation e = evaluate(stamps({0, 1, 2}), stamps({0, 1, 2}), {.rpe_delta = {}, .alignment = Alignment::none});
+  EXPECT_TRUE(e.rotation_determined());
+  EXPECT_EQ(e.ape.rotation.count, 3u);
+}
+
+TEST(Evaluate, AlignmentsHaveEvosNames) {
+  for (const char* name : {"se3", "sim3", "origin", "none"}) EXPECT_STREQ(name_of(alignment_named(name, "")), name);
+  EXPECT_THROW(alignment_named("SE3", "--align"), InputError);
+}
+
 TEST(ReadPoses, NamesTheTrajectoryInAFolder) {
   const fs::path folder = fs::path(testing::TempDir()) / (std::to_string(::getpid()) + "dkb_read_poses");
   fs::create_directories(folder);
@@ -149,7 +197,7 @@ TEST(Evaluate, ScaleIsTakenOutOnlyWhenAsked) {
   Trajectory estimate = truth;
   for (StampedPose& p : estimate) p.world_from_cam.translation *= 0.5;
   EXPECT_GT(evaluate(truth, estimate).ape.translation.rmse, 0.1);
-  const Evaluation e = evaluate(truth, estimate, {.rpe_delta = {}, .with_scale = true});
+  const Evaluation e = evaluate(truth, estimate, {.rpe_delta = {}, .alignment = Alignment::sim3});
   EXPECT_NEAR(e.truth_from_estimate.scale, 2.0, 1e-12);
   EXPECT_LT(e.ape.translation.max, 1e-12);
   EXPECT_LT(e.rpe.translation.max, 1e-12);
@@ -239,7 +287,7 @@ TEST(Evaluate, AScaleThatIsWrongBeyondDoubtIsTold) {
   EXPECT_NEAR(evaluate(truth, scaled(1000, 1)).wrong_scale.value_or(0), 0.001, 1e-5);
   EXPECT_FALSE(evaluate(truth, scaled(1.05, 0.01)).wrong_scale) << "a focal length may be off by so much";
   EXPECT_FALSE(evaluate(truth, scaled(1, 0.3)).wrong_scale);
-  EXPECT_FALSE(evaluate(truth, scaled(0.2, 0.01), {.rpe_delta = {}, .with_scale = true}).wrong_scale);
+  EXPECT_FALSE(evaluate(truth, scaled(0.2, 0.01), {.rpe_delta = {}, .alignment = Alignment::sim3}).wrong_scale);
   // One that has nothing in common with the truth has no scale: it fits best when it is shrunk.
   EXPECT_FALSE(evaluate(truth, random_walk(200, 6)).wrong_scale);
 }

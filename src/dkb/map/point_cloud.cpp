@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 
 #include "dkb/map/byte_stream.h"
@@ -16,8 +17,14 @@ void write_position(ByteWriter& out, const Eigen::Vector3d& position) {
 
 }  // namespace
 
-std::string point_cloud_ply(const Map& map) {
-  return point_cloud_ply(map, map.live_points());
+std::vector<std::vector<PointId>> points_by_map(const Map& map) {
+  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
+  std::vector<std::vector<PointId>> points(std::max<size_t>(1, roots.size()));
+  for (PointId id : map.live_points()) {
+    const auto seen_by = static_cast<size_t>(map.point(id)->observations.front().keyframe);
+    points[static_cast<size_t>(map_number(roots, root_of[seen_by]))].push_back(id);
+  }
+  return points;
 }
 
 std::string point_cloud_ply(const Map& map, const std::vector<PointId>& points) {
@@ -45,7 +52,7 @@ std::string point_cloud_ply(const Map& map, const std::vector<PointId>& points) 
   return out.take();
 }
 
-std::string point_cloud_pcd(const Map& map) {
+std::string point_cloud_pcd(const Map& map, const std::vector<PointId>& points) {
   ByteWriter out;
   out.raw(
       fmt::format("# .PCD v0.7 - Point Cloud Data file format\n"
@@ -59,8 +66,8 @@ std::string point_cloud_pcd(const Map& map) {
                   "VIEWPOINT 0 0 0 1 0 0 0\n"
                   "POINTS {0}\n"
                   "DATA binary\n",
-                  map.point_count()));
-  for (PointId id : map.live_points()) {
+                  points.size()));
+  for (PointId id : points) {
     const MapPoint& p = *map.point(id);
     write_position(out, p.position);
     out.u32(static_cast<uint32_t>(p.colour.r) << 16 | static_cast<uint32_t>(p.colour.g) << 8 | p.colour.b);
@@ -69,14 +76,17 @@ std::string point_cloud_pcd(const Map& map) {
 }
 
 std::string point_cloud_json(const Map& map) {
+  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
+  const auto number = [&](KeyframeId id) { return map_number(roots, root_of[static_cast<size_t>(id)]); };
   std::string json = "{\"points\": [";
   const char* separator = "\n";
   for (PointId id : map.live_points()) {
     const MapPoint& p = *map.point(id);
     fmt::format_to(std::back_inserter(json),
-                   "{}{{\"id\": {}, \"position\": [{}, {}, {}], \"colour\": [{}, {}, {}], \"observations\": {}}}",
-                   separator, p.id, p.position.x(), p.position.y(), p.position.z(), p.colour.r, p.colour.g, p.colour.b,
-                   p.observations.size());
+                   "{}{{\"id\": {}, \"map\": {}, \"position\": [{}, {}, {}], \"colour\": [{}, {}, {}], "
+                   "\"observations\": {}}}",
+                   separator, p.id, number(p.observations.front().keyframe), p.position.x(), p.position.y(),
+                   p.position.z(), p.colour.r, p.colour.g, p.colour.b, p.observations.size());
     separator = ",\n";
   }
   json += "],\n\"keyframes\": [";
@@ -87,9 +97,9 @@ std::string point_cloud_json(const Map& map) {
     const Eigen::Vector3d& t = world_from_cam.translation;
     const Eigen::Quaterniond& q = world_from_cam.rotation;
     fmt::format_to(std::back_inserter(json),
-                   "{}{{\"id\": {}, \"timestamp\": {}, \"world_from_cam\": {{\"position\": [{}, {}, {}], "
+                   "{}{{\"id\": {}, \"map\": {}, \"timestamp\": {}, \"world_from_cam\": {{\"position\": [{}, {}, {}], "
                    "\"quaternion_xyzw\": [{}, {}, {}, {}]}}}}",
-                   separator, id, k.timestamp, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+                   separator, id, number(id), k.timestamp, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
     separator = ",\n";
   }
   return json + "]}\n";

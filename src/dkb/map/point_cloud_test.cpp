@@ -39,7 +39,7 @@ float float_at(const std::string& bytes, size_t at) {
 }
 
 TEST(PointCloud, PlyHasTheHeaderAndRowsOfTheFormat) {
-  const std::string ply = point_cloud_ply(two_points());
+  const std::string ply = point_cloud_ply(two_points(), two_points().live_points());
   const std::string end = "end_header\n";
   EXPECT_EQ(ply.substr(0, 4), "ply\n");
   EXPECT_NE(ply.find("format binary_little_endian 1.0\n"), std::string::npos);
@@ -59,8 +59,22 @@ TEST(PointCloud, PlyOfSomePointsHoldsTheseAlone) {
   EXPECT_EQ(float_at(ply, ply.find("end_header\n") + 11), 0.1f);
 }
 
+TEST(PointCloud, PointsAndKeyframesTellWhichMapTheyAreOf) {
+  Map map = two_points();
+  EXPECT_EQ(points_by_map(Map()).size(), 1u);
+  EXPECT_EQ(points_by_map(map).at(0), map.live_points());
+  map.append(two_points());
+  const auto points = points_by_map(map);
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0], (std::vector{make_point_id(0, 0), make_point_id(0, 1)}));
+  EXPECT_EQ(points[1], (std::vector{make_point_id(1, 0), make_point_id(1, 1)}));
+  const nlohmann::json json = nlohmann::json::parse(point_cloud_json(map));
+  for (const size_t i : {0u, 1u, 2u, 3u}) EXPECT_EQ(json["points"][i]["map"], i / 2) << i;
+  for (const size_t i : {0u, 1u}) EXPECT_EQ(json["keyframes"][i]["map"], i) << i;
+}
+
 TEST(PointCloud, PcdHasTheHeaderAndRowsOfTheFormat) {
-  const std::string pcd = point_cloud_pcd(two_points());
+  const std::string pcd = point_cloud_pcd(two_points(), two_points().live_points());
   const std::string end = "DATA binary\n";
   EXPECT_NE(pcd.find("\nWIDTH 2\nHEIGHT 1\n"), std::string::npos);
   EXPECT_NE(pcd.find("\nPOINTS 2\n"), std::string::npos);
@@ -87,13 +101,13 @@ TEST(PointCloud, JsonHoldsPointsAndKeyframesWithAllDigits) {
 TEST(PointCloud, RemovedPointsAreLeftOut) {
   Map map = two_points();
   map.remove_point(make_point_id(0, 0));
-  EXPECT_NE(point_cloud_ply(map).find("element vertex 1\n"), std::string::npos);
+  EXPECT_NE(point_cloud_ply(map, map.live_points()).find("element vertex 1\n"), std::string::npos);
   EXPECT_EQ(nlohmann::json::parse(point_cloud_json(map))["points"].size(), 1u);
 }
 
 TEST(PointCloud, TheEmptyMapIsAnEmptyCloud) {
-  EXPECT_NE(point_cloud_ply(Map()).find("element vertex 0\n"), std::string::npos);
-  EXPECT_NE(point_cloud_pcd(Map()).find("POINTS 0\n"), std::string::npos);
+  EXPECT_NE(point_cloud_ply(Map(), {}).find("element vertex 0\n"), std::string::npos);
+  EXPECT_NE(point_cloud_pcd(Map(), {}).find("POINTS 0\n"), std::string::npos);
   const nlohmann::json json = nlohmann::json::parse(point_cloud_json(Map()));
   EXPECT_TRUE(json["points"].empty());
   EXPECT_TRUE(json["keyframes"].empty());

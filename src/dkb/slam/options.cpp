@@ -2,7 +2,6 @@
 #include "dkb/slam/options.h"
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 #include <string_view>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "dkb/image/given_motion.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 
 namespace dkb {
@@ -105,8 +105,6 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
         "[m] above the floor: what is lower can be driven over", above(0));
   visit("dense.obstacle_high", p.dense.obstacle_high, o.dense.obstacle_high,
         "[m] above the floor, above obstacle_low: what is higher can be driven under", above(0));
-  visit("dense.threads", p.dense.threads, o.dense.threads,
-        "threads that make the dense map; the result does not depend on them", Range{1, 64});
 
   visit("pipeline.mapper_latency", p.pipeline.mapper_latency, o.pipeline.mapper_latency,
         "[s] until tracking sees a keyframe's mapping, in whole frames", Range{0, 10, true});
@@ -146,66 +144,6 @@ void bind_experiments(Settings& s, SlamOptions& o) {
   PaperFilterOptions& paper = o.dynamics.paper;
   s.bind("experiment.dynamics.paper.flow_threshold", &paper.flow_threshold, "[px] d_th (DKB eq. 9)", above(0));
   s.bind("experiment.dynamics.paper.compensate", &paper.compensate, "flow against the camera's own motion");
-}
-
-// The keys of earlier versions that nothing has taken the place of, by section.
-struct GoneSection {
-  std::string_view section, names;
-};
-constexpr GoneSection kGone[] = {
-    {"features", " subpixel "},
-    {"depth", " edge_fraction "},
-    {"noise", " scale_exponent "},
-    {"tracking",
-     " min_matches min_new_points radius_last_frame radius_wide radius_local_map odometry_sigma_factor match_distance "
-     "match_ratio established_frames refresh_frames "},
-    {"tracking.relocalisation",
-     " candidates neighbours min_matches min_ransac_inliers radius radius_fine min_inliers min_share min_similarity "
-     "min_similarity_far max_distance max_speed max_position_sd ambiguity clear_lead "},
-    {"tracking.local_map", " voted_keyframes neighbours_of_each keyframes "},
-    {"keyframes",
-     " visibility_levels floor_min_tracked floor_few_close floor_many_creatable window threshold_min threshold_max "
-     "rotation_max translation_max "},
-    {"experiment.keyframes", " window threshold_min threshold_max rotation_max translation_max "},
-    {"keyframes.baseline", " frames_between min_tracked reference_ratio few_close many_creatable "},
-    {"mapping",
-     " min_shared_points min_found_ratio probation_keyframes min_observers redundant_observers fusion_keyframes "
-     "fusion_radius seam_tolerance "},
-    {"mapping.creation", " neighbours min_parallax_deg max_distance chi2_epipolar chi2_pixel "},
-    {"mapping.ba", " iterations_first iterations_second adaptive_min adaptive_max adaptive_redundancy "},
-    {"loop",
-     " candidates min_relative_similarity neighbourhood min_keyframes_between area_keyframes rest_keyframes "
-     "match_distance match_ratio min_ransac_inliers radius_first radius min_share min_support support_keyframes "
-     "support_inliers support_translation support_rotation drift_translation_base drift_translation_share "
-     "drift_rotation_base drift_rotation_per_metre merge_min_inliers merge_min_share essential_shared_points "
-     "edge_position_sd edge_position_share edge_rotation_sd edge_rotation_growth edge_rotation_share graph_iterations "
-     "latency latency_per_keyframe "},
-    {"global_ba", " iterations_first iterations_second latency latency_per_keyframe "},
-    {"readout", " step_sd max_readout "},
-    {"dynamics.epipolar", " threshold "},
-    {"dynamics.multiview", " depth_jump radius keyframes "},
-    {"dynamics.silhouette", " cell core min_share layer depth_jump max_depth_offset margin rim "},
-    {"dynamics.motion", " views_per_frame settle interior contour rim lone_hole "},
-    {"dynamics.motion.smoothing", " distance depth_jump_base depth_jump_slope crease crease_link "},
-    {"dynamics", " support_cell points_per_box missed_results evidence_observations "},
-    {"dynamics.flow", " window "},
-    {"dense", " pixel_step mover_margin edge_fraction min_views free_share min_patch obstacle_voxels "},
-};
-
-// What became of a key of earlier versions; empty for a key that never was one.
-std::string fate(const std::string& key, const std::string& where, const Settings& known) {
-  if (known.has(std::string(kExperiment) + key))
-    return where + ": \"" + key + "\" is \"" + std::string(kExperiment) + key + "\" now, and not promised to stay";
-  for (const GoneSection& gone : kGone) {
-    const bool section = gone.section == key && !known.has_section(key);
-    const bool inside = key.size() > gone.section.size() && key.starts_with(gone.section) &&
-                        key[gone.section.size()] == '.' &&
-                        gone.names.find(" " + key.substr(gone.section.size() + 1) + " ") != std::string_view::npos;
-    if (section || inside)
-      return where + ": \"" + key +
-             "\" was a setting of earlier versions and is fixed now; docs/settings.md lists what can be set";
-  }
-  return "";
 }
 
 // The stages' options that a preset stands for.
@@ -282,8 +220,11 @@ void Options::set(const std::string& key, const std::string& value, const std::s
   bind_settings(settings, *this);
   bind_experiments(settings, experimental);
   if (!settings.has(key)) {
-    const std::string gone = fate(key, place, settings);
-    if (!gone.empty()) throw InputError(gone);
+    const std::string experiment = std::string(kExperiment) + key;
+    if (settings.has(experiment))  // as it was called in earlier versions
+      throw InputError(place + ": \"" + key + "\" is \"" + experiment + "\" now, and not promised to stay");
+    if (did_you_mean(key, settings.keys()).empty())
+      throw InputError(place + ": unknown key \"" + excerpt(key) + "\"; docs/settings.md lists what can be set");
   }
   settings.set(key, value, place);
   if (key.starts_with(kExperiment)) experiments_[key] = value;

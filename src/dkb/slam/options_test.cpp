@@ -175,11 +175,10 @@ TEST(Options, AMisspeltKeyNamesTheNearestOne) {
 TEST(Options, AKeyOfEarlierVersionsSaysWhatBecameOfIt) {
   EXPECT_EQ(refusal("mapping.ba.edge_weight=2"),
             "--set: \"mapping.ba.edge_weight\" is \"experiment.mapping.ba.edge_weight\" now, and not promised to stay");
-  for (const char* key : {"tracking.min_matches", "loop.latency_per_keyframe", "dynamics.silhouette",
-                          "experiment.keyframes.threshold_max"})
-    EXPECT_EQ(refusal(std::string(key) + "=2"),
-              "--set: \"" + std::string(key) +
-                  "\" was a setting of earlier versions and is fixed now; docs/settings.md lists what can be set");
+}
+
+TEST(Options, AKeyThatIsLikeNoOtherSaysWhereTheyAreListed) {
+  EXPECT_EQ(refusal("dense.threads=2"), "--set: unknown key \"dense.threads\"; docs/settings.md lists what can be set");
 }
 
 TEST(Presets, OnlyThePapersWeightIsFixed) {

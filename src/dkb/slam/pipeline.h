@@ -65,8 +65,9 @@ class Pipeline {
     odometry_.lost();  // how the camera came there is not known
   }
   void explain_keyframes(bool on) { explain_keyframes_ = on; }
-  // From the keyframes so far. Throws InputError when dense mapping is off.
-  std::function<DenseMap()> dense_map_task() const;
+  // From the keyframes so far: of the map of this number, without one of that of the last pose. Throws InputError when
+  // dense mapping is off.
+  std::function<DenseMap()> dense_map_task(std::optional<int> map = {}) const;
 
   std::vector<Event> take_events();
 
@@ -94,8 +95,8 @@ class Pipeline {
   bool may_make_keyframes() const { return !localize_only_ && next_keyframe_ <= kLastKeyframe; }
   void publish(const Scene& scene, const TrackedFrame& tracked, const KeyframeDecision& decision, FrameResult& result);
   void note(Event::Kind kind, std::string text = "", int keyframe = -1);
-  void note_changes(const TrackedFrame& tracked);
-  std::string remedy_without_features() const;
+  void note_changes(const Scene& scene, const TrackedFrame& tracked);
+  std::string remedy_without_features(const Scene& scene) const;
   void collect_times();
 
   const PipelineContext& context_;
@@ -122,8 +123,11 @@ class Pipeline {
   int64_t last_stamp_ns_ = 0;
   Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
-  int frames_without_map_ = 0;  // of those that only localise
-  double crowded_share_ = 0;    // of its features that movers took
+  int frames_without_map_ = 0;    // of those that only localise
+  int frames_without_depth_ = 0;  // in a row
+  bool told_no_depth_ = false;
+  size_t most_corners_ = 0;   // of a frame before there was a map
+  double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {

@@ -3,17 +3,34 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include "dkb/slam/pipeline.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/plural.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb {
 namespace {
 
 constexpr int kPatience = 30;  // [frames] without a map before that is told: about a second
+
+bool has_depth(const DepthImage& image) {
+  return std::any_of(image.data(), image.data() + image.size(), [](float z) { return z > 0; });
+}
+
+// What depths an image has of those that the camera may tell.
+std::string depths_text(const DepthImage& image, const Camera& camera) {
+  float nearest = std::numeric_limits<float>::infinity(), farthest = 0;
+  for (size_t i = 0; i < image.size(); ++i) {
+    const float z = image.data()[i];
+    if (z > 0) nearest = std::min(nearest, z), farthest = std::max(farthest, z);
+  }
+  if (farthest == 0) return fmt::format("(no pixel has a depth of {:g} to {:g} m)", camera.depth_min, camera.depth_max);
+  return fmt::format("(depths of {:.3g} to {:.3g} m{})", nearest, farthest, farthest > 100 ? ": millimetres?" : "");
+}
 
 std::string new_map_text(int number) {
   if (number == 0) return "map 0 begins";
@@ -71,7 +88,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
                                      [](FeatureReason reason) { return reason != FeatureReason::none; });
   crowded_share_ =
       scene.rejected.empty() ? 0 : static_cast<double>(dynamic) / static_cast<double>(scene.rejected.size());
-  note_changes(tracked);
+  note_changes(scene, tracked);
   if (decision.insert) note(Event::Kind::keyframe, rule_of(decision), tracked.reference);
   if (localize_only_) tracker_.make_report();  // nobody is told: the map stays as it is
 
@@ -87,27 +104,47 @@ void Pipeline::note(Event::Kind kind, std::string text, int keyframe) {
   events_.push_back({kind, next_frame_, last_stamp_ns_, keyframe, std::move(text)});
 }
 
-void Pipeline::note_changes(const TrackedFrame& tracked) {
+void Pipeline::note_changes(const Scene& scene, const TrackedFrame& tracked) {
   // Where a prior tells how the camera came there, the old map goes on.
   if (tracked.starts_map && !tracked.predicted) note(Event::Kind::new_map, new_map_text(map_number(tracked.reference)));
   if (tracked.state == TrackingState::lost && last_state_ != TrackingState::lost) note(Event::Kind::lost);
   if (tracked.tracked() && last_state_ == TrackingState::lost) note(Event::Kind::found);
-  if (tracked.state == TrackingState::initialising && !localize_only_ && ++frames_before_map_ == kPatience)
-    note(Event::Kind::warning, "tracking has not begun: none of the first " + std::to_string(kPatience) +
-                                   " frames has " + std::to_string(options_.tracking.initial_points) +
-                                   " features with depth" + remedy_without_features());
+  if (tracked.state == TrackingState::initialising && !localize_only_) {
+    most_corners_ = std::max(most_corners_, scene.extracted.orb.corners.size());
+    if (++frames_before_map_ == kPatience)
+      note(Event::Kind::warning, "tracking has not begun: none of the first " + std::to_string(kPatience) +
+                                     " frames has " + std::to_string(options_.tracking.initial_points) +
+                                     " features with depth" + remedy_without_features(scene));
+  }
+  // Before there is a map, the warning above says it.
+  frames_without_depth_ = has_depth(scene.extracted.image().depth) ? 0 : frames_without_depth_ + 1;
+  if (frames_without_depth_ == kPatience && !told_no_depth_ && tracked.state != TrackingState::initialising) {
+    told_no_depth_ = true;
+    note(Event::Kind::warning,
+         "no depth: none of the last " + std::to_string(kPatience) +
+             " frames has any, so that nothing new comes into the map; is the depth camera there, "
+             "and its depth_factor right?");
+  }
   if (tracked.state == TrackingState::initialising && localize_only_ && ++frames_without_map_ == kPatience)
     note(Event::Kind::warning, "there is no map to localise in; load one, or end localize_only to make one");
   for (std::string& warning : scenes_.take_warnings()) note(Event::Kind::warning, std::move(warning));
 }
 
-// What to do about a frame of which too few features are left.
-std::string Pipeline::remedy_without_features() const {
-  if (crowded_share_ <= 0.5) return "; are there depth images, in units of the camera's depth_factor?";
-  return fmt::format(
-      " on what stands still: {:.0f}% of them lie on what the detector ({}) takes for movers; does it mark the still "
-      "world?",
-      100 * crowded_share_, scenes_.detector_kind());
+// What to do about frames of which too few features are left; `scene` is the last of them.
+std::string Pipeline::remedy_without_features(const Scene& scene) const {
+  const auto wanted = static_cast<size_t>(options_.tracking.initial_points);
+  if (most_corners_ < wanted)
+    return "; the images show " + plural(most_corners_, "corner", "corners") +
+           " at most: are they black, covered or out of focus?";
+  if (crowded_share_ > 0.5)
+    return fmt::format(
+        " on what stands still: {:.0f}% of them lie on what the detector ({}) takes for movers; does it mark the still "
+        "world?",
+        100 * crowded_share_, scenes_.detector_kind());
+  const Camera& camera = context_.camera;
+  return fmt::format("; are there depth images, in units of the camera's depth_factor ({:g} per metre)? ",
+                     camera.depth_factor) +
+         depths_text(scene.extracted.image().depth, camera);
 }
 
 // What runs beside tracking says how it is getting on.
@@ -136,14 +173,18 @@ std::vector<Event> Pipeline::take_events() {
   return std::exchange(events_, {});
 }
 
-std::function<DenseMap()> Pipeline::dense_map_task() const {
+std::function<DenseMap()> Pipeline::dense_map_task(std::optional<int> map) const {
   if (!dense_) throw InputError("dense map: it was not asked for; set Options::dense_map");
   const std::vector<TrajectoryFrame> trajectory = record_.trajectory(TrajectoryKind::by_map);
+  const int number = map ? *map : trajectory.empty() ? 0 : trajectory.back().map;
   std::vector<TimedPose> poses;
   for (const TrajectoryFrame& f : trajectory)  // maps that are not joined have worlds of their own
-    if (f.map == trajectory.back().map) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
-  return [dense = *dense_, poses = std::move(poses), seed = options_.seed, mount = options_.base_from_cam] {
-    return dense.build(poses, seed, mount);
+    if (f.map == number) poses.push_back({seconds_from_ns(f.stamp_ns), f.world_from_cam});
+  return [dense = *dense_, poses = std::move(poses), seed = options_.seed, mount = options_.base_from_cam, number] {
+    DenseMap made = dense.build(poses, seed, mount);
+    made.map = number;
+    if (made.grid) made.grid->map = number;
+    return made;
   };
 }
 

@@ -241,6 +241,15 @@ Statistics Slam::statistics() const {
 DenseMap Slam::dense_map() const {
   return dense_map_task()();
 }
+DenseMap Slam::dense_map(int map) const {
+  std::function<DenseMap()> make;
+  {
+    const Impl::Turn turn(*impl_);
+    impl_->throw_failure();
+    make = impl_->pipeline->dense_map_task(map);
+  }
+  return make();
+}
 std::function<DenseMap()> Slam::dense_map_task() const {
   const Impl::Turn turn(*impl_);
   impl_->throw_failure();

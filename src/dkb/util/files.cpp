@@ -10,6 +10,7 @@
 #include <cstring>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 #include "dkb/util/errors.h"
 
@@ -57,49 +58,70 @@ fs::path behind_links(const fs::path& path) {
   return error ? path : target;
 }
 
-void write_file_atomically(const fs::path& path, std::string_view content) {
+namespace {
+
+// A device or a pipe is no file to be replaced.
+bool is_device(const fs::path& path) {
   std::error_code unknown;
   const fs::file_status there = fs::status(path, unknown);
-  // A device or a pipe is no file to be replaced.
-  const bool straight = fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
-  const fs::path target = behind_links(path);  // a link stays: what it leads to is replaced
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  const std::string temporary =
-      (folder / ("." + target.filename().string() + ".tmp" + std::to_string(::getpid()))).string();
-  const auto fail = [&](const char* what) {
-    const int error = errno;
-    if (!straight) ::unlink(temporary.c_str());
-    fail_to_write(path, what, error, straight ? "" : "; the previous file, if any, is kept");
-  };
-  const int fd = straight ? ::open(path.c_str(), O_WRONLY | O_CLOEXEC)
-                          : ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) fail("open");
-  size_t done = 0;
-  while (done < content.size()) {
-    const ssize_t n = ::write(fd, content.data() + done, content.size() - done);
+  return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
+}
+
+}  // namespace
+
+GrowingFile::GrowingFile(fs::path path, const std::string& ending)
+    : path_(std::move(path)), target_(behind_links(path_)), straight_(is_device(path_)) {
+  if (straight_) {
+    fd_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    const std::string name = target_.filename().string();
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+    temporary_ =
+        (folder / (ending.empty() ? "." + name + ".tmp" + std::to_string(::getpid()) : name + ending)).string();
+    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  }
+  if (fd_ < 0) fail("open");
+}
+
+GrowingFile::~GrowingFile() {
+  if (fd_ >= 0) ::close(fd_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void GrowingFile::fail(const char* what) {
+  const int error = errno;
+  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  if (!temporary_.empty()) ::unlink(std::exchange(temporary_, {}).c_str());
+  fail_to_write(path_, what, error, straight_ ? "" : "; the previous file, if any, is kept");
+}
+
+void GrowingFile::append(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) {
-      const int error = errno;
-      ::close(fd);
-      errno = error;
-      fail("write");
-    }
-    done += static_cast<size_t>(n);
+    if (n < 0) fail("write");
+    bytes.remove_prefix(static_cast<size_t>(n));
   }
-  if (::fsync(fd) != 0 && errno != EINVAL && errno != EROFS) {
-    const int error = errno;
-    ::close(fd);
-    errno = error;
-    fail("fsync");
-  }
-  if (::close(fd) != 0) fail("close");
-  if (straight) return;
-  if (::rename(temporary.c_str(), target.c_str()) != 0) fail("rename");
+}
+
+void GrowingFile::commit() {
+  if (::fsync(fd_) != 0 && errno != EINVAL && errno != EROFS) fail("fsync");
+  if (::close(std::exchange(fd_, -1)) != 0) fail("close");
+  if (straight_) return;
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("rename");
+  temporary_.clear();
+  const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
   const int dir = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (dir >= 0) {
     ::fsync(dir);
     ::close(dir);
   }
+}
+
+void write_file_atomically(const fs::path& path, std::string_view content) {
+  GrowingFile file(path);
+  file.append(content);
+  file.commit();
 }
 
 void make_output_folder(const fs::path& path) {

@@ -18,6 +18,28 @@ std::filesystem::path behind_links(const std::filesystem::path& path);
 // Throws as fail_to_write() does.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
+// A file that grows on the disk and takes the place of `path` when it is whole, as write_file_atomically() has it.
+class GrowingFile {
+ public:
+  // Grows as .NAME.tmpPID beside what it takes the place of; or as NAME with `ending`, for files that are worth looking
+  // at before they are whole. Throws as fail_to_write() does, here and below.
+  explicit GrowingFile(std::filesystem::path path, const std::string& ending = "");
+  ~GrowingFile();  // without commit() nothing is left behind
+  GrowingFile(const GrowingFile&) = delete;
+  GrowingFile& operator=(const GrowingFile&) = delete;
+
+  void append(std::string_view bytes);
+  void commit();
+
+ private:
+  [[noreturn]] void fail(const char* what);
+
+  const std::filesystem::path path_, target_;
+  const bool straight_;    // a device or a pipe
+  std::string temporary_;  // empty where it is written straight, and once it is whole
+  int fd_ = -1;
+};
+
 // Throws that `path` cannot be written, with what was tried and the errno that it met: an InputError with the remedy
 // where the place is wrong (no such folder, a folder of that name), an OutputError, with `kept` at its end, where the
 // disk is full or broken.

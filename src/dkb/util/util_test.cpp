@@ -125,6 +125,24 @@ TEST(Files, AtomicWriteReplacesTheWholeFile) {
   fs::remove_all(folder);
 }
 
+TEST(Files, AGrowingFileIsWholeOrNotThere) {
+  const test::TempFolder temp;
+  const fs::path path = temp / "rows.csv", part = temp / "rows.csv.part";
+  write_file_atomically(path, "before");
+  {
+    GrowingFile given_up(path, ".part");
+    given_up.append("half");
+    EXPECT_EQ(read_file(part), "half");
+  }
+  EXPECT_EQ(read_file(path), "before");
+  EXPECT_FALSE(fs::exists(part));
+  GrowingFile whole(path, ".part");
+  for (const char* row : {"a\n", "b\n"}) whole.append(row);
+  whole.commit();
+  EXPECT_EQ(read_file(path), "a\nb\n");
+  EXPECT_FALSE(fs::exists(part));
+}
+
 TEST(Files, AtomicWriteLeavesLinksAndPipesWhatTheyAre) {
   const test::TempFolder folder;
   write_file_atomically(folder / "file", "before");
