@@ -95,6 +95,8 @@ TEST_F(RgbdReaderTest, SingleBadPairsAreSkippedWithAReason) {
       EXPECT_EQ(frames[n].skipped.empty(), !bad) << n;
     }
     EXPECT_EQ(frames[7].skipped, pairs[7].depth_path.string() + ": is empty");
+    EXPECT_EQ(frames[9].skipped,
+              pairs[9].depth_path.string() + ": is of 16x24 px, of another size than the frames before (32x24)");
     EXPECT_EQ(frames[2].skipped.rfind(pairs[2].colour_path.string(), 0), 0u) << frames[2].skipped;
   }
 }
@@ -114,7 +116,8 @@ TEST_F(RgbdReaderTest, AnyOfTheFirstFiveOfAWrongTypeOrSizeIsRefused) {
   write_image_file(pairs[4].depth_path, encode_png(GreyImage(32, 24, 50)));
   EXPECT_EQ(probe_error(),
             pairs[4].depth_path.string() +
-                ": is an 8-bit grey PNG; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY");
+                ": is an 8-bit grey PNG; depth must be 16-bit grey PNG, 32-bit float in TIFF or PFM, or uint16 "
+                "or float32 in NPY");
   write_image_file(pairs[4].depth_path, encode_png(Image<uint16_t>(16, 12, 5000)));
   EXPECT_NE(probe_error().find("is of 16x12 px, the camera of 32x24"), std::string::npos);
   write_image_file(pairs[4].depth_path, encode_png(Image<uint16_t>(32, 24, 5000)));
