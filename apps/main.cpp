@@ -9,13 +9,13 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "bench/bench_command.h"
 #include "convert_command.h"
 #include "dkb/util/errors.h"
-#include "dkb/util/settings.h"
 #include "dkb_slam/version.h"
 #include "eval/eval_command.h"
 #include "export_command.h"
@@ -25,6 +25,7 @@
 #include "run_command.h"
 #include "run_viewer.h"
 #include "simulate_command.h"
+#include "usage_text.h"
 #include "view_command.h"
 
 namespace {
@@ -53,48 +54,11 @@ int checked_output(int exit_code) {
   return exit_code == 0 ? kFailed : exit_code;
 }
 
-// What is wrong with the command line, in one line, with the nearest name when one is misspelt.
-std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App* command = &app;
-  std::string path = "dkb-slam ";
-  while (!command->get_subcommands().empty()) {
-    command = command->get_subcommands().front();
-    path += command->get_name() + " ";
-  }
-  const std::vector<const CLI::App*> below = command->get_subcommands([](const CLI::App*) { return true; });
-  const std::vector<std::string> rest = app.remaining(true);
-  const std::string help = "; see " + path + "--help";
-
-  const auto is_option = [](const std::string& word) { return word.size() > 1 && word[0] == '-'; };
-  const auto option = std::find_if(rest.begin(), rest.end(), is_option);
-  if (option != rest.end()) {
-    const std::string name = option->substr(0, option->find('='));
-    std::vector<std::string> known;
-    for (const CLI::Option* o : command->get_options())
-      for (const std::string& long_name : o->get_lnames()) known.push_back("--" + long_name);
-    return "unknown option " + name + dkb::did_you_mean(name, known) + help;
-  }
-  if (!below.empty() && !rest.empty()) {
-    std::vector<std::string> known;
-    for (const CLI::App* c : below) known.push_back(c->get_name());
-    return "unknown command \"" + rest.front() + "\"" + dkb::did_you_mean(rest.front(), known) + help;
-  }
-  if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
-  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !below.empty()) {
-    std::string commands;
-    for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
-    return "a command is missing: " + commands + help;
-  }
-  const std::string text = error.what();
-  if (const std::string begin = "Could not convert: "; text.starts_with(begin))  // all of the others are text
-    return text.substr(begin.size()) + " is not a number in range" + help;
-  return text + help;
-}
-
 int run_command_line(int argc, char** argv) {
   CLI::App app("Real-time RGB-D SLAM that withstands people in the picture (DKB-SLAM)", "dkb-slam");
   app.set_version_flag("--version", "dkb-slam " DKB_SLAM_VERSION);
   app.require_subcommand(1);
+  app.formatter(std::make_shared<dkb::HelpFormatter>());
   int exit_code = 0;
   try {
     dkb::register_run(app, exit_code);
@@ -113,7 +77,7 @@ int run_command_line(int argc, char** argv) {
     app.parse(words);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
-    print_error(usage_error(app, e));
+    print_error(dkb::usage_error(app, e));
     return kBadInput;
   } catch (const dkb::InterruptedError& e) {
     print_error(e.what());

@@ -66,6 +66,16 @@ TEST(ExecRun, ACommandThatIsNotThereIsRefusedBeforeAnyFrame) {
   }
 }
 
+TEST(ExecRun, ACommandThatEndsBeforeItsFirstAnswerIsRefusedBeforeAnyFrame) {
+  const TempFolder temp;
+  const SlamRun run(sequence(), temp / "out", {"--detector", "exec:read -r line; exit 1", "--quiet"});
+  EXPECT_EQ(run.finished.exit_code, 2) << run.finished.err;
+  EXPECT_NE(run.finished.err.find("error: --detector exec: \"read -r line; exit 1\" ended (exit status 1) before its "
+                                  "first answer; what it wrote to its standard error says why"),
+            std::string::npos)
+      << run.finished.err;
+}
+
 // Orange of 10 x 5 px, from (3, 2) on.
 TEST(ExecRun, TheExampleFindsWhatIsOrange) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) GTEST_SKIP() << "skipped: no numpy";

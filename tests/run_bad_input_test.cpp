@@ -284,6 +284,24 @@ TEST(RunBadInput, NoCommandNoDatasetAndAMisspeltCommandAreRefused) {
   }
 }
 
+TEST(RunBadInput, UsageIsToldInPlainWords) {
+  const std::string folder = sequence().string();
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"simulate", "--out", "x", "--size", "640"}, "--size: one value is given; give 2; see dkb-slam simulate --help"},
+      {{"run", folder, "--out"}, "--out: its value is missing; see dkb-slam run --help"},
+      {{"run", folder, "--camera", "fr1", "--camera", "fr2"}, "--camera: is given 2 times; give it once; see"},
+      {{"map", "export", "m.dkb", "--format", "pyl", "--out", "x"},
+       "--format: there is no \"pyl\" (did you mean \"ply\"?); give one of ply, pcd, json, colmap, nerfstudio; see"}};
+  for (const auto& [arguments, says] : cases) {
+    const Finished run = run_program(arguments);
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_EQ(run.err.find("error: " + says), 0U) << run.err;
+    EXPECT_EQ(run.error_lines(), 1U) << run.err;
+  }
+  EXPECT_NE(run_program({"simulate", "--help"}).out.find("--size INTxINT"), std::string::npos);
+  EXPECT_NE(run_program({"view", "--help"}).out.find(" session [session]"), std::string::npos);
+}
+
 TEST(RunBadInput, OptionsThatDoNothingInAConversionAreRefused) {
   const TempFolder temp;
   const std::string folder = sequence().string(), bag = (temp / "a.bag").string(), out = (temp / "out").string();

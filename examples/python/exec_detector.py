@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A detector in a process of its own: whatever is of a strong orange belongs to the robot's own arm, and moves.
 
+It needs numpy.
+
 dkb-slam run FOLDER --detector "motion+exec:examples/python/exec_detector.py"
 """
 import sys

@@ -40,7 +40,7 @@ struct DetectorInput {
 /// Finds what may move in an image. Derive from it to plug in a detector of your own; it may be slow.
 /// One thread at a time calls an instance: the feeding thread when it is prompt, one of the library's when it is slow.
 /// Runs are repeatable as far as the same images in the same order give the same detections.
-/// Boxes outside the image and masks of another size are left out, with a warning (Event::Kind::warning).
+/// Boxes outside the image and masks of another size are left out with a warning; an answer that loses all has failed.
 class DKB_SLAM_API Detector {
  public:
   virtual ~Detector() = default;

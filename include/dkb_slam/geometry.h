@@ -58,7 +58,7 @@ struct DKB_SLAM_API Camera {
   /// nearest one.
   static Camera named(const std::string& name);
   /// Reads a camera file: a YAML map of the fields above; fx, fy, cx, cy, width, height and depth_factor are required.
-  /// Throws InputError with file and line.
+  /// Or a calibration of ROS or OpenCV, whose depth is in millimetres. Throws InputError with file and line.
   static Camera load(const std::filesystem::path& path);
   /// The camera file's text, every field with its unit; k4, k5, k6 where they are not all 0.
   std::string to_yaml() const;

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 from . import _core
@@ -20,7 +19,7 @@ class Slam(_core.Slam):
     The keywords are the options of `dkb-slam run`, with its defaults, and give the same bytes.
 
     camera: of the frames; that of a source is `source.camera`.
-    preset: "default", "paper" or "orb": what the settings start from.
+    preset: "default", "paper" or "orb": what the settings start from; None: what `config` names, else "default".
     detector: "auto" (yolo where there is a model, else motion), "yolo" (or "network"), "motion", "file", "none",
         "exec:COMMAND", several joined by "+"; or a function of one's own; or a list of both. A function is given a
         DetectorImage and returns None, a mask (bool or uint8 [H, W], not 0 = may move), a list of Detection, or
@@ -48,7 +47,7 @@ class Slam(_core.Slam):
     Raises InputError (a ValueError); InvalidOption names the setting, its value and its range.
     """
 
-    def __init__(self, camera: _core.Camera, preset: str = "default", *,
+    def __init__(self, camera: _core.Camera, preset: Optional[str] = None, *,
                  detector: Union[Detector, Sequence[Detector]] = "auto", model: Optional[PathLike] = None,
                  labels: Optional[PathLike] = None, classes: Union[str, Sequence[str], None] = None,
                  boxes: Optional[PathLike] = None, masks: Optional[PathLike] = None,
@@ -58,7 +57,8 @@ class Slam(_core.Slam):
                  realtime: bool = False, dense: bool = False, final_ba: bool = False,
                  base_from_cam: Any = None) -> None:
         if not isinstance(camera, _core.Camera):
-            raise TypeError(f"camera: must be a dkb_slam.Camera, not {type(camera).__name__}")
+            raise TypeError(f"camera: must be a dkb_slam.Camera, not {type(camera).__name__}; "
+                            "Camera.named(\"fr1\") and Camera.load(path) give one")
         if settings is not None and not isinstance(settings, Mapping):
             raise TypeError(f"settings: must be a dict, not {type(settings).__name__}")
         if classes is not None and not isinstance(classes, str):
@@ -92,7 +92,7 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
         of the images' time. A first line `# drift 0.01` says by which share of its way it is off.
     threaded: decode ahead on a thread; the frames are the same.
 
-    Pairs that cannot be read are left out, with a SlamWarning each. Ctrl-C works while a frame is waited for. Raises
+    Pairs that cannot be read are left out, with a SlamWarning. Ctrl-C works while a frame is waited for. Raises
     InputError saying what is wrong and what to do.
     """
     return _core._open(source, camera, start=start, end=end, max_frames=max_frames, skip_pairs=skip_pairs,
@@ -136,7 +136,8 @@ class Plot:
         return self.svg
 
     def save(self, path: PathLike) -> None:
-        Path(path).write_text(self.svg, encoding="utf-8")
+        """Writes it; the name must end in .svg. Raises InputError when it cannot."""
+        _core._save_svg(path, self.svg)
 
     def __repr__(self) -> str:
         return f"Plot({len(self.svg)} bytes of SVG; save(path) writes it)"

@@ -120,7 +120,8 @@ ImageView depth_view(const py::handle& object) {
   const py::array array = array_of(object, "depth", kExpected);
   const bool units = py::isinstance<py::array_t<uint16_t>>(array), metres = py::isinstance<py::array_t<float>>(array);
   if ((!units && !metres) || array.ndim() != 2)
-    throw InputError(fmt::format("depth: it is {}; it must be {}", described(array), kExpected));
+    throw InputError(fmt::format("depth: it is {}; it must be {}{}", described(array), kExpected,
+                                 array.dtype().kind() == 'f' ? ": give depth.astype(numpy.float32)" : ""));
   return view_of(array, units ? PixelFormat::depth_u16 : PixelFormat::depth_f32, "depth");
 }
 

@@ -69,10 +69,32 @@ T argument(const py::handle& value, const char* name, const char* what) {
     throw py::type_error(std::string(name) + ": must be " + what + ", not " + Py_TYPE(value.ptr())->tp_name);
   }
 }
+// The arguments of a call by their names, as Python binds them. Throws TypeError in one line, where pybind would print
+// all of them, whole images too.
+class Call {
+ public:
+  // The first `positional` of `names` may be given by their places, and one argument of each by name.
+  Call(const char* function, const py::args& args, const py::kwargs& kwargs, const std::vector<const char*>& names,
+       size_t positional);
+  // None where it was not given.
+  py::object operator[](const char* name) const {
+    return given_.contains(name) ? py::object(given_[name]) : py::none();
+  }
+  bool has(const char* name) const { return given_.contains(name); }
+  bool flag(const char* name) const { return has(name) && argument<bool>((*this)[name], name, "a bool"); }
+
+ private:
+  py::dict given_;
+};
 // Text of a str or an object with __fspath__. Throws TypeError.
 std::string path_of(const py::handle& value, const char* name);
 // Nanoseconds of an int or numpy integer. Throws TypeError; a float of today's dates would not be exact.
 int64_t stamp_of(const py::handle& value);
+
+// --- camera.cpp ---
+
+// Throws InputError naming what a frame's camera sees otherwise than the one it is given to.
+void check_same_view(const Camera& of_frame, const Camera& wanted);
 
 // --- messages ---
 
@@ -88,11 +110,11 @@ struct PyFrame {
   Frame frame;
   std::string stamp;  // [s] as recorded; of frames made from arrays as written to files
   size_t index = 0;   // of the pair in its recording
+  std::shared_ptr<const Camera> camera;
 };
-// A frame from the arguments of Frame(), copied. Throws InputError and TypeError.
-PyFrame frame_from_arguments(const Camera& camera, const py::object& stamp_ns, const py::object& rgb,
-                             const py::object& depth, const py::object& prior, const py::object& depth_stamp_ns,
-                             bool bgr);
+// A frame from its stamp and the arguments `rgb`, `depth`, `prior`, `depth_stamp_ns` and `bgr`, copied. Throws
+// InputError and TypeError.
+PyFrame frame_from_arguments(const std::shared_ptr<const Camera>& camera, const py::object& stamp_ns, const Call& call);
 // Of None, a MotionPrior or a 4 x 4 matrix.
 std::optional<MotionPrior> prior_of(const py::object& prior);
 

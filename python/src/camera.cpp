@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "bindings.h"
+#include "dkb/dataset/camera_file.h"
 #include "dkb/util/settings.h"
 
 namespace dkb::python {
@@ -77,6 +78,23 @@ std::string camera_repr(const Camera& camera) {
 
 }  // namespace
 
+void check_same_view(const Camera& of_frame, const Camera& wanted) {
+  if (&of_frame == &wanted) return;
+  std::string of, here;
+  for (const Field& field : kFields) {
+    const std::string name = field.name;
+    if (name == "depth_factor" || name == "depth_min" || name == "depth_max" || name == "fps" || name == "readout")
+      continue;  // its depth is in metres already
+    const auto value = [&field](const Camera& c) { return field.real != nullptr ? c.*field.real : c.*field.whole; };
+    if (value(of_frame) == value(wanted)) continue;
+    of += fmt::format("{}{} {}", of.empty() ? "" : ", ", name, value(of_frame));
+    here += fmt::format("{}{} {}", here.empty() ? "" : ", ", name, value(wanted));
+  }
+  if (!of.empty())
+    throw InputError(
+        fmt::format("frame: was made with another camera ({}) than the Slam ({}); make both with one", of, here));
+}
+
 void bind_camera(py::module_& module) {
   py::class_<Camera> camera(module, "Camera", R"(Camera(*, width, height, fx, fy, cx, cy, depth_factor, **optional)
 
@@ -90,7 +108,12 @@ Optional: k1, k2, p1, p2, k3, k4, k5, k6 (distortion, in OpenCV's order), fps [1
 readout [s] of a rolling shutter (0 = unknown or none), depth_min, depth_max [m] (depth outside is taken for missing).
 
 Raises InputError naming the field that is missing, unknown or out of range.)");
-  camera.def(py::init(&camera_from_fields))
+  camera
+      .def(py::init([](const py::args& args, const py::kwargs& given) {
+        if (!args.empty())
+          throw py::type_error("Camera: give every field by name: Camera(width=640, height=480, fx=...)");
+        return camera_from_fields(given);
+      }))
       .def_static("named", &Camera::named, py::arg("name"),
                   "named(name: str) -> Camera\n\nA camera that is known by name: fr1, fr2, fr3 (TUM RGB-D), bonn. "
                   "Raises InputError naming the nearest one.")
@@ -99,10 +122,13 @@ Raises InputError naming the field that is missing, unknown or out of range.)");
           "load(path) -> Camera\n\nReads a camera file (YAML). Raises InputError with file and line.")
       .def("to_yaml", &Camera::to_yaml, "to_yaml() -> str\n\nThe camera file's text, every field with its unit.")
       .def("__repr__", &camera_repr)
-      .def("__eq__", [](const Camera& a, const py::object& other) {
-        return py::isinstance<Camera>(other) && a.to_yaml() == other.cast<const Camera&>().to_yaml();
-      });
-  camera.attr("__hash__") = py::none();
+      .def("__eq__",
+           [](const Camera& a, const py::object& other) {
+             return py::isinstance<Camera>(other) && a.to_yaml() == other.cast<const Camera&>().to_yaml();
+           })
+      .def("__hash__", [](const Camera& c) { return py::hash(py::str(c.to_yaml())); })
+      .def(py::pickle([](const Camera& c) { return py::str(c.to_yaml()); },
+                      [](const py::str& text) { return parse_camera(text, "Camera"); }));
   for (const Field& field : kFields)
     camera.def_property_readonly(field.name, [field](const Camera& c) {
       return field.real != nullptr ? py::object(py::float_(c.*field.real)) : py::object(py::int_(c.*field.whole));

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/evaluation/evaluation_report.h"
 
+#include <filesystem>
+
 #include "bindings.h"
+#include "dkb/util/files.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb::python {
@@ -59,6 +62,12 @@ void bind_evaluation(py::module_& module) {
   module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
     if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);
     return evaluation_svg(evaluated(truth, estimate, {}), title);
+  });
+  module.def("_save_svg", [](const py::object& path, const std::string& svg) {
+    const std::filesystem::path file = path_of(path, "path");
+    if (file.extension() != ".svg")
+      throw InputError(file.string() + ": plots are SVG pictures; give a name that ends in .svg");
+    write_file_atomically(file, svg);
   });
 }
 

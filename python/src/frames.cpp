@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <future>
 #include <mutex>
@@ -60,6 +61,8 @@ class PySource final : public Closable {
       description_ = opened->description();
     }
     refuse_at_end();
+    camera_ = std::make_shared<const Camera>(opened->camera());
+    size_ = opened->size();
     source_ = std::move(opened);
     if (!file) return;
     const size_t at = description_.find(options.camera);
@@ -79,6 +82,7 @@ class PySource final : public Closable {
       const Unlocked released(Entry::always);
       reading_.lock();
     }
+    if (source_) counts_ = source_->counts();  // another thread may have closed it meanwhile
     std::unique_ptr<Source> ended = std::move(source_);
     reading_.unlock();
     const Unlocked released(Entry::always);
@@ -87,45 +91,62 @@ class PySource final : public Closable {
 
   PyFrame next() {
     check_process();
+    refuse_at_end();
+    if (!source_) throw InputError(description_ + ": it is closed; open it again to read it");
     while (true) {
       SourceFrame next = wait_for_next();
       if (!source_) throw py::stop_iteration();
       for (const std::string& line : source_->take_warnings()) warn(line);
       switch (next.state) {
         case SourceState::frame:
-          return {std::move(next.frame), std::move(next.stamp), next.index};
+          return {std::move(next.frame), std::move(next.stamp), next.index, camera_};
         case SourceState::skipped:
           ++skipped_;
+          if (folds(next.note)) break;
           warn(fmt::format("frame {}: {}; frame skipped", next.index, next.note));
           break;
         case SourceState::unplugged:
           if (!unplugged_) warn(next.note.empty() ? "the device is unplugged; waiting for it" : next.note);
           break;
         case SourceState::ended:
+          folds("");
           throw py::stop_iteration();
       }
       unplugged_ = next.state == SourceState::unplugged;
     }
   }
 
-  const Camera& camera() const { return open().camera(); }
-  std::optional<size_t> size() const { return open().size(); }
+  // Of a closed one, too.
+  bool closed() const { return source_ == nullptr; }
+  const Camera& camera() const { return *camera_; }
+  std::optional<size_t> size() const { return size_; }
   const std::string& description() const { return description_; }
   int skipped() const { return skipped_; }
   SourceCounts counts() const {
     check_process();
-    return open().counts();
+    refuse_at_end();
+    return source_ ? source_->counts() : counts_;
   }
 
  private:
-  Source& open() const {
-    refuse_at_end();
-    if (!source_) throw InputError(description_ + ": it is closed");
-    return *source_;
-  }
   void check_process() const {
     if (made_elsewhere())
       throw InputError(description_ + ": it was opened in another process; open it in each process");
+  }
+
+  // Whether the pair before was skipped for the same reason, of another file: such are told once, and at their end how
+  // many they were.
+  bool folds(const std::string& note) {
+    const size_t colon = note.find(": ");
+    std::string reason = colon == std::string::npos ? note : note.substr(colon + 2);
+    if (!reason.empty() && reason == reason_) {
+      ++folded_;
+      return true;
+    }
+    const std::string before = std::exchange(reason_, std::move(reason));
+    const int more = std::exchange(folded_, 0);
+    if (more > 0) warn(fmt::format("{} more frames skipped: {}", more, before));
+    return false;
   }
 
   // A device may let us wait for long, and Ctrl-C must work meanwhile: Python's handler of it runs on this thread.
@@ -150,10 +171,14 @@ class PySource final : public Closable {
     return pending.get();
   }
 
-  std::unique_ptr<Source> source_;
+  std::unique_ptr<Source> source_;  // null when closed
+  std::shared_ptr<const Camera> camera_;
+  std::optional<size_t> size_;
+  SourceCounts counts_;  // when it was closed
   std::mutex reading_;
   std::string description_;
-  int skipped_ = 0;
+  int skipped_ = 0, folded_ = 0;
+  std::string reason_;  // why the last pair was skipped, without its file
   bool unplugged_ = false;
 };
 
@@ -182,7 +207,7 @@ std::shared_ptr<PySource> open(const py::object& where, const py::object& camera
 }
 
 std::string source_repr(const PySource& source) {
-  return "Source(" + source.description() + ")";
+  return (source.closed() ? "Source(closed: " : "Source(") + source.description() + ")";
 }
 
 void bind_frame(py::module_& module) {
@@ -194,20 +219,28 @@ What something else knows of the camera's motion since the frame before: wheels,
 previous_from_current: float64 [4, 4], camera axes, [m]; of the frames that process() was given last and now.
 covariance: float64 [6, 6], right perturbation, [translation m, rotation rad], camera axes; None = the identity.
 rotation_only: the translation is not known. Raises InputError for what is no motion or no covariance.)")
-      .def(py::init([](const py::object& motion, const py::object& covariance, bool rotation_only) {
-             MotionPrior prior;
-             prior.previous_from_current = pose_of(motion, "previous_from_current");
-             prior.rotation_only = rotation_only;
-             if (!covariance.is_none()) prior.covariance = covariance_of(covariance, "covariance");
-             Frame().set_prior(prior);  // which judges it
-             return prior;
-           }),
-           py::arg("previous_from_current"), py::arg("covariance") = py::none(), py::kw_only(),
-           py::arg("rotation_only") = false)
+      .def(py::init([](const py::args& args, const py::kwargs& kwargs) {
+        const Call call("MotionPrior", args, kwargs, {"previous_from_current", "covariance", "rotation_only"}, 2);
+        MotionPrior prior;
+        prior.previous_from_current = pose_of(call["previous_from_current"], "previous_from_current");
+        prior.rotation_only = call.flag("rotation_only");
+        if (const py::object covariance = call["covariance"]; !covariance.is_none())
+          prior.covariance = covariance_of(covariance, "covariance");
+        Frame().set_prior(prior);  // which judges it
+        return prior;
+      }))
       .def_property_readonly("previous_from_current",
                              [](const MotionPrior& p) { return pose_array(p.previous_from_current); })
       .def_property_readonly("covariance", [](const MotionPrior& p) { return matrix_array(p.covariance); })
-      .def_readonly("rotation_only", &MotionPrior::rotation_only);
+      .def_readonly("rotation_only", &MotionPrior::rotation_only)
+      .def("__repr__", [](const MotionPrior& p) {
+        const Eigen::Vector3d& t = p.previous_from_current.translation;
+        const double angle = Eigen::AngleAxisd(p.previous_from_current.rotation).angle();
+        const auto sd = [&p](int first) { return std::sqrt(p.covariance.diagonal().segment<3>(first).maxCoeff()); };
+        if (p.rotation_only) return fmt::format("MotionPrior({:.4f} rad, sd {:.2g} rad)", angle, sd(3));
+        return fmt::format("MotionPrior(({:.4f}, {:.4f}, {:.4f}) m, {:.4f} rad, sd {:.2g} m and {:.2g} rad)", t.x(),
+                           t.y(), t.z(), angle, sd(0), sd(3));
+      });
 
   py::class_<PyFrame>(module, "Frame",
                       R"(Frame(camera, stamp_ns, rgb, depth, *, prior=None, depth_stamp_ns=None, bgr=False)
@@ -215,8 +248,13 @@ rotation_only: the translation is not known. Raises InputError for what is no mo
 A pair of images, checked, copied and never changed again: what Slam.process() takes and open() gives. May be made on
 another thread than the one that feeds Slam. Arguments as of Slam.process(). The arrays below are views without copies;
 they keep the frame alive and are read-only.)")
-      .def(py::init(&frame_from_arguments), py::arg("camera"), py::arg("stamp_ns"), py::arg("rgb"), py::arg("depth"),
-           py::kw_only(), py::arg("prior") = py::none(), py::arg("depth_stamp_ns") = py::none(), py::arg("bgr") = false)
+      .def(py::init([](const py::args& args, const py::kwargs& kwargs) {
+        const Call call("Frame", args, kwargs, {"camera", "stamp_ns", "rgb", "depth", "prior", "depth_stamp_ns", "bgr"},
+                        4);
+        return frame_from_arguments(
+            std::make_shared<const Camera>(argument<Camera>(call["camera"], "camera", "a dkb_slam.Camera")),
+            call["stamp_ns"], call);
+      }))
       .def_property_readonly(
           "stamp_ns", [](const PyFrame& f) { return f.frame.stamp_ns(); }, "int: of the colour image, [ns].")
       .def_property_readonly(
@@ -242,17 +280,18 @@ they keep the frame alive and are read-only.)")
 
 }  // namespace
 
-PyFrame frame_from_arguments(const Camera& camera, const py::object& stamp_ns, const py::object& rgb,
-                             const py::object& depth, const py::object& prior, const py::object& depth_stamp_ns,
-                             bool bgr) {
+PyFrame frame_from_arguments(const std::shared_ptr<const Camera>& camera, const py::object& stamp_ns,
+                             const Call& call) {
   FrameInput input;
   input.stamp_ns = stamp_of(stamp_ns);
+  const bool bgr = call.flag("bgr");
+  const py::object rgb = call["rgb"], depth = call["depth"];  // held while they are read
   input.colour = colour_view(rgb, bgr);
   input.depth = depth_view(depth);
-  input.prior = prior_of(prior);
-  if (!depth_stamp_ns.is_none()) input.depth_stamp_ns = stamp_of(depth_stamp_ns);
-  const Unlocked released;  // the caller holds the arrays
-  return {Frame(camera, input), stamp_text(input.stamp_ns), 0};
+  input.prior = prior_of(call["prior"]);
+  if (const py::object stamp = call["depth_stamp_ns"]; !stamp.is_none()) input.depth_stamp_ns = stamp_of(stamp);
+  const Unlocked released;
+  return {Frame(*camera, input), stamp_text(input.stamp_ns), 0, camera};
 }
 
 std::optional<MotionPrior> prior_of(const py::object& prior) {
@@ -267,8 +306,9 @@ void bind_frames(py::module_& module) {
   bind_frame(module);
   py::class_<PySource, std::shared_ptr<PySource>>(module, "Source", R"(An iterator over frames, as open() gives it.
 
-Closed at its end by close(), or by a `with` block. One thread at a time reads it. The same recording gives the same
-frames every time. Pairs that cannot be read are left out, with a SlamWarning each.)")
+Ended by close(), or by a `with` block: its camera, size and counts stay. One thread at a time reads it. The same
+recording gives the same frames every time. Pairs that cannot be read are left out, with a SlamWarning; of those with
+one reason in a row the first is told, then how many more.)")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__", &PySource::next)
       .def("__enter__", [](const py::object& self) { return self; })

@@ -129,7 +129,8 @@ void bind_map(py::module_& module) {
       .def_readonly("rgb", &Points::rgb, "uint8 [M, 3], as the keyframe that made the point sees it.")
       .def_readonly("ids", &Points::ids, "uint32 [M], lasting.")
       .def_readonly("observations", &Points::observations, "int32 [M]: keyframes that see the point.")
-      .def_readonly("maps", &Points::maps, "int32 [M], as Keyframe.map: in whose world its position is.");
+      .def_readonly("maps", &Points::maps, "int32 [M], as Keyframe.map: in whose world its position is.")
+      .def("__repr__", [](const Points& points) { return fmt::format("MapPoints({} points)", points.ids.size()); });
   py::class_<MapSnapshot>(module, "MapSnapshot",
                           "The map at one moment, unchanged from then on however tracking goes on.")
       .def_property_readonly("point_count", &MapSnapshot::point_count)

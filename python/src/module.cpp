@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "bindings.h"
+#include "dkb/util/settings.h"
 
 namespace dkb::python {
 namespace {
@@ -11,6 +14,23 @@ PyObject *slam_warning = nullptr, *input_error = nullptr, *invalid_option = null
 void warn(const std::string& text) {
   const InPython calling;
   if (PyErr_WarnEx(slam_warning, python_words(text).c_str(), 1) != 0) throw py::error_already_set();
+}
+
+Call::Call(const char* function, const py::args& args, const py::kwargs& kwargs, const std::vector<const char*>& names,
+           size_t positional) {
+  const auto fail = [&](const std::string& what) { throw py::type_error(function + (": " + what)); };
+  if (args.size() > positional)
+    fail(std::to_string(args.size()) + " arguments by their places, and " + std::to_string(positional) +
+         " can be: give the others by name");
+  for (size_t i = 0; i < args.size(); ++i) given_[names[i]] = args[i];
+  for (const auto& [key, value] : kwargs) {
+    const auto name = key.cast<std::string>();
+    const std::vector<std::string> known(names.begin(), names.end());
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      fail("there is no argument \"" + name + "\"" + did_you_mean(name, known));
+    if (given_.contains(name)) fail(name + " is given twice");
+    given_[key] = value;
+  }
 }
 
 std::string path_of(const py::handle& value, const char* name) {

@@ -31,6 +31,7 @@ constexpr std::array kWords{Word{"--preset", "preset", false},
                             Word{"--skip-pairs", "skip_pairs", false},
                             Word{"--start", "start", false},
                             Word{"--end", "end", false},
+                            Word{"--max-frames", "max_frames", false},
                             Word{"Options::dense_map", "dense=True", false}};
 
 bool goes_on(char c) {

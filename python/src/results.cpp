@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bindings.h"
+#include "dkb/dataset/movers_file.h"
 
 namespace dkb::python {
 namespace {
@@ -80,6 +81,8 @@ Raises InputError for what is no box.)")
       .def_property_readonly(
           "velocity_in_world", [](const Mover& m) { return vector_array(m.velocity_in_world); }, "float64 [3], [m/s].")
       .def_readonly("position_sd", &Mover::position_sd, "[m] standard deviation of each coordinate of the position.")
+      .def_property_readonly("velocity_sd", &velocity_sd,
+                             "[m/s] standard deviation of each coordinate of the velocity, as movers.csv has it.")
       .def_property_readonly(
           "covariance", [](const Mover& m) { return matrix_array(m.covariance); },
           "float64 [6, 6] of [position m, velocity m/s] in the world.")

@@ -26,7 +26,7 @@ void check_map(const Slam& slam, int map) {
 // other calls of the feeding thread take turns with, events kept for polling.
 class PySlam final : public Closable {
  public:
-  PySlam(const Camera& camera, const py::kwargs& a) : camera_(camera) {
+  PySlam(const Camera& camera, const py::kwargs& a) : camera_(std::make_shared<const Camera>(camera)) {
     const Options options = options_of(a);
     Detectors detectors = detectors_of(a, options, camera, interruption_);
     std::shared_ptr<Slam> made;  // close() sees a whole one or none
@@ -50,7 +50,7 @@ class PySlam final : public Closable {
     const Unlocked released(Entry::always);  // its threads may wait for the GIL, and it waits for them
     ended.reset();
   }
-  const Camera& camera() const { return camera_; }
+  const Camera& camera() const { return *camera_; }
   bool closed() const { return slam_ == nullptr; }
 
   // Work of the feeding thread, without the GIL.
@@ -99,21 +99,26 @@ class PySlam final : public Closable {
     work(*mine);
   }
 
-  PyResult process(const py::object& frame_or_stamp, const py::object& rgb, const py::object& depth,
-                   const py::object& prior, const py::object& depth_stamp_ns, bool bgr) {
+  PyResult process(const py::args& args, const py::kwargs& kwargs) {
     check_usable();
+    const Call call("process", args, kwargs, {"frame", "rgb", "depth", "prior", "stamp_ns", "depth_stamp_ns", "bgr"},
+                    4);
+    const py::object first = call[call.has("stamp_ns") ? "stamp_ns" : "frame"];
+    const bool is_frame = py::isinstance<PyFrame>(first);
+    if (first.is_none() || (call.has("frame") && call.has("stamp_ns")) ||
+        (is_frame && (call.has("rgb") || call.has("depth") || call.has("depth_stamp_ns"))))
+      throw py::type_error("process: give a frame, or stamp_ns, rgb and depth");
     PyFrame given;
-    if (py::isinstance<PyFrame>(frame_or_stamp)) {
-      if (!rgb.is_none() || !depth.is_none() || !depth_stamp_ns.is_none())
-        throw py::type_error("process: give a frame, or stamp_ns, rgb and depth");
-      given = frame_or_stamp.cast<const PyFrame&>();
-      if (!prior.is_none()) given.frame.set_prior(prior_of(prior));
+    if (is_frame) {
+      given = first.cast<const PyFrame&>();
+      check_same_view(*given.camera, *camera_);
+      if (const py::object prior = call["prior"]; !prior.is_none()) given.frame.set_prior(prior_of(prior));
     } else {
-      given = frame_from_arguments(camera_, frame_or_stamp, rgb, depth, prior, depth_stamp_ns, bgr);
+      given = frame_from_arguments(camera_, first, call);
     }
     PyResult result;
     feed([&](Slam& slam) {
-      result = {slam.process(given.frame), camera_.width, camera_.height};
+      result = {slam.process(given.frame), camera_->width, camera_->height};
       if (result.r.state == TrackingState::paused) return;
       const std::lock_guard lock(stamps_mutex_);
       stamps_.resize(static_cast<size_t>(result.r.frame));
@@ -194,7 +199,7 @@ class PySlam final : public Closable {
     if (events_.size() > 10000) events_.pop_front();
   }
 
-  const Camera camera_;
+  const std::shared_ptr<const Camera> camera_;
   std::shared_ptr<Slam> slam_;  // null when closed
   std::mutex feeding_;          // by whom no other may feed
   std::mutex turn_;             // for who calls what only one thread at a time may
@@ -320,8 +325,7 @@ DenseMap dense_map(PySlam& slam) {
 void bind_slam(py::module_& module) {
   py::class_<PySlam>(module, "Slam")
       .def(py::init<const Camera&, const py::kwargs&>())
-      .def("process", &PySlam::process, py::arg("frame"), py::arg("rgb") = py::none(), py::arg("depth") = py::none(),
-           py::arg("prior") = py::none(), py::kw_only(), py::arg("depth_stamp_ns") = py::none(), py::arg("bgr") = false,
+      .def("process", &PySlam::process,
            R"(process(frame, *, prior=None) -> FrameResult
 process(stamp_ns, rgb, depth, prior=None, *, depth_stamp_ns=None, bgr=False) -> FrameResult
 
@@ -335,8 +339,9 @@ depth: uint16 [H, W] in units of 1 / depth_factor m, or float32 [H, W] in m; 0 a
 prior: MotionPrior, or float64 [4, 4] previous_from_current, where something else knows of the motion.
 depth_stamp_ns: int, [ns] of the depth image; None = the colour image's.
 
-Other threads run meanwhile. Raises InputError for images that do not fit the camera and stamps that do not rise; the
-frame is not counted then and the next one goes on. Shows a SlamWarning when a detector fails.)")
+Other threads run meanwhile. Raises InputError for images that do not fit the camera, a frame of another camera and
+stamps that do not rise; the frame is not counted then and the next one goes on. Shows a SlamWarning when a detector
+fails.)")
       .def(
           "finish", [](PySlam& s) { s.feed([](Slam& slam) { slam.finish(); }); },
           "finish()\n\nWaits for all outstanding work: trajectory and map are complete then. process() may go on.")

@@ -13,6 +13,13 @@ std::string setting_text(const py::handle& value) {
   return py::str(value);
 }
 
+// Parts to switch off, by comma, without blanks.
+std::string disabled(const py::kwargs& a) {
+  auto list = argument<std::string>(a["disable"], "disable", "a str, parts by comma");
+  std::erase(list, ' ');
+  return list;
+}
+
 std::string text_or_empty(const py::kwargs& a, const char* name) {
   const py::object value = a[name];
   return value.is_none() ? "" : path_of(value, name);
@@ -21,13 +28,18 @@ std::string text_or_empty(const py::kwargs& a, const char* name) {
 }  // namespace
 
 Options options_of(const py::kwargs& a) {
-  Options options(argument<std::string>(a["preset"], "preset", "a str"));
+  const bool has_preset = !a["preset"].is_none();
+  const std::string preset = has_preset ? argument<std::string>(a["preset"], "preset", "a str") : "default";
+  Options options(preset);
   if (!a["config"].is_none()) options.load(path_of(a["config"], "config"));
   if (!a["settings"].is_none())
     for (const auto& [key, value] : argument<py::dict>(a["settings"], "settings", "a dict"))
       options.set(py::str(key), setting_text(value), "settings");
+  if (has_preset && options.preset() != preset)
+    throw InputError("preset: \"" + preset + "\", but the settings say `preset: " + options.preset() +
+                     "`; leave one of them out");
   if (!a["filter"].is_none()) options.set("dynamics.filter", py::str(a["filter"]), "filter");
-  options.disable(argument<std::string>(a["disable"], "disable", "a str, parts by comma"));
+  options.disable(disabled(a));
   if (!a["seed"].is_none()) options.set("seed", py::str(a["seed"]), "seed");
   if (argument<bool>(a["final_ba"], "final_ba", "a bool")) options.set("global_ba.final", "true", "final_ba");
   const int threads = argument<int>(a["threads"], "threads", "an int");
@@ -79,7 +91,7 @@ Detectors detectors_of(const py::kwargs& a, const Options& options, const Camera
   choice.masks = text_or_empty(a, "masks");
   choice.every = argument<int>(a["detect_every"], "detect_every", "an int");
   choice.latency = argument<int>(a["detect_latency"], "detect_latency", "an int");
-  choice = choice_beside(options, a["disable"].cast<std::string>(), std::move(choice));
+  choice = choice_beside(options, disabled(a), std::move(choice));
   Detectors made;
   {
     const Unlocked released;

@@ -108,7 +108,8 @@ def test_objects_are_told_when_a_new_world_begins(camera, frames):
     (lambda image: 5, "it returned a int"),
     (lambda image: [5], "its boxes hold a int"),
     (lambda image: np.zeros((480, 640)), "mask: it is float64"),
-    (lambda image: np.zeros((48, 64), bool), "mask"),
+    (lambda image: np.zeros((48, 64), bool), "failed: a mask is of 64 x 48 px, the images of 640 x 480; scale it"),
+    (lambda image: [dkb_slam.Detection("cat", 900, 0, 9, 9)], "failed: a box lies outside the image"),
 ])
 def test_a_failing_detector_is_a_warning_and_tracking_goes_on(camera, frames, answer, says):
     with pytest.warns(dkb_slam.SlamWarning) as shown:
@@ -132,7 +133,8 @@ def test_a_detector_that_fails_once_is_asked_again_and_ten_times_in_a_row_not(ca
         with warnings.catch_warnings(record=True) as shown:
             warnings.simplefilter("always")
             slam, _ = run(camera, list(dkb_slam.open(sequence, max_frames=20)), detector, **options)
-        assert len(asked) == calls
+        late = 1 if options and calls == 20 else 0  # the last image of a slow one may be dropped in finish()
+        assert calls - late <= len(asked) <= calls
         assert slam.statistics()["detector_failed"] == (calls == 13)
         assert ("motion" in slam.statistics()["detector"]) == (calls == 13)
         assert len(shown) == (2 if calls == 13 else 1), [str(w.message) for w in shown]

@@ -66,3 +66,7 @@ def test_a_plot_is_a_picture_for_notebooks(slam, sequence, tmp_path):
     assert "mine &amp; yours" in alone.svg and "APE" in beside.svg and "APE" not in alone.svg
     alone.save(tmp_path / "path.svg")
     assert (tmp_path / "path.svg").read_text() == alone.svg
+    with pytest.raises(dkb_slam.InputError, match="path.png: plots are SVG pictures; give a name that ends in .svg"):
+        alone.save(tmp_path / "path.png")
+    with pytest.raises(dkb_slam.InputError, match="path.svg"):
+        alone.save(tmp_path / "nowhere" / "path.svg")

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever goes in wrong comes back as one line."""
 import ast
+import copy
 import inspect
+import pickle
 import re
 from pathlib import Path
 
@@ -29,6 +31,7 @@ def slam(camera):
     (RGB[:, :320], DEPTH, "320 x 480 px, the camera of 640 x 480"),
     (np.zeros((0, 640, 3), np.uint8), DEPTH, "640 x 0 px"),
     (RGB, DEPTH.astype(np.float64), "depth: it is float64 [480, 640]"),
+    (RGB, DEPTH.astype(np.float64), "depth.astype(numpy.float32)"),
     (RGB, DEPTH.astype(">f4"), "depth: it is >f4 [480, 640]"),
     (RGB, DEPTH[..., None], "depth: it is float32 [480, 640, 1]"),
     (RGB, DEPTH[:, ::2], "depth: its rows are not contiguous"),
@@ -48,7 +51,18 @@ def test_images_that_do_not_fit_are_named(slam, rgb, depth, says):
     (lambda c: dkb_slam.Slam(c, detector="yol"), dkb_slam.InputError, "yolo"),
     (lambda c: dkb_slam.Slam(c, detector="yolo"), dkb_slam.InputError, "no model"),
     (lambda c: dkb_slam.Slam(c, detector=5), TypeError, "detector: must be"),
-    (lambda c: dkb_slam.Slam("fr1"), TypeError, "camera: must be a dkb_slam.Camera, not str"),
+    (lambda c: dkb_slam.Slam("fr1"), TypeError, 'camera: must be a dkb_slam.Camera, not str; Camera.named("fr1")'),
+    (lambda c: dkb_slam.Slam(c, "paper", settings={"preset": "orb"}), dkb_slam.InputError, "preset"),
+    (lambda c: dkb_slam.Camera(640, 480, 525, 525, 319.5, 239.5, 1000), TypeError, "give every field by name"),
+    (lambda c: dkb_slam.Frame(c, 1, RGB, DEPTH, None), TypeError, "5 arguments by their places, and 4 can be"),
+    (lambda c: dkb_slam.Frame("fr1", 1, RGB, DEPTH), TypeError, "camera: must be a dkb_slam.Camera, not str"),
+    (lambda c: dkb_slam.Frame(c, 1, RGB, DEPTH, rbg=True), TypeError, 'no argument "rbg" (did you mean "rgb"?)'),
+    (lambda c: dkb_slam.MotionPrior(np.eye(4), np.eye(6), True), TypeError, "MotionPrior: 3 arguments by their places"),
+    (lambda c: dkb_slam.Slam(c).process(1, RGB, DEPTH, None, 1), TypeError, "process: 5 arguments by their places"),
+    (lambda c: dkb_slam.Slam(c).process(1, RGB, DEPTH, rgb=RGB), TypeError, "process: rgb is given twice"),
+    (lambda c: dkb_slam.Slam(c).process(rgb=RGB, depth=DEPTH), TypeError, "give a frame, or stamp_ns, rgb and depth"),
+    (lambda c: dkb_slam.Slam(c).process(1, stamp_ns=1), TypeError, "give a frame, or stamp_ns, rgb and depth"),
+    (lambda c: dkb_slam.Slam(c).process(dkb_slam.Frame(c, 1, RGB, DEPTH), RGB), TypeError, "give a frame, or"),
     (lambda c: dkb_slam.Slam(c, seed="x"), dkb_slam.InputError, "seed"),
     (lambda c: dkb_slam.Slam(c, base_from_cam=np.ones((4, 4))), dkb_slam.InputError, "no rigid motion"),
     (lambda c: dkb_slam.Slam(c, base_from_cam=np.eye(3)), dkb_slam.InputError, "[3, 3]"),
@@ -68,6 +82,8 @@ def test_images_that_do_not_fit_are_named(slam, rgb, depth, says):
      'model: detector="motion" has no network'),
     (lambda c: dkb_slam.Slam(c, boxes="b.txt", detector="motion"), dkb_slam.InputError, 'add detector="file"'),
     (lambda c: dkb_slam.Slam(c).dense_map(), dkb_slam.InputError, "set dense=True"),
+    (lambda c: dkb_slam.Slam(c, detector="file", masks="m"), dkb_slam.InputError, 'detector="none" too'),
+    (lambda c: dkb_slam.Slam(c, disable="kf, bax"), dkb_slam.InputError, 'no part "bax"'),
     (lambda c: dkb_slam.Camera.named("fr4"), dkb_slam.InputError, "fr"),
     (lambda c: dkb_slam.Camera.load("/nothing.yaml"), dkb_slam.InputError, "/nothing.yaml"),
     (lambda c: dkb_slam.Camera(fx=1, fxx=2), dkb_slam.InputError, '"fxx" (did you mean "fx"?)'),
@@ -104,6 +120,29 @@ def test_stamps_are_whole_and_rise(slam):
     assert slam.process(11, RGB, DEPTH).frame == 1
 
 
+def test_a_frame_may_be_given_by_its_names(slam):
+    assert slam.process(stamp_ns=10, rgb=RGB, depth=DEPTH).stamp_ns == 10
+    assert slam.process(frame=20, rgb=RGB, depth=DEPTH, bgr=True).stamp_ns == 20
+    assert slam.process(frame=dkb_slam.Frame(slam.camera, 30, RGB, DEPTH)).stamp_ns == 30
+
+
+def test_a_frame_of_another_camera_is_refused_by_the_field_that_differs(slam, camera):
+    fields = {name: getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "depth_factor")}
+    frame = dkb_slam.Frame(dkb_slam.Camera(**dict(fields, fx=100)), 1, RGB, DEPTH)
+    with pytest.raises(dkb_slam.InputError, match=r"another camera \(fx 100\) than the Slam \(fx 525\)"):
+        slam.process(frame)
+    assert slam.process(dkb_slam.Frame(dkb_slam.Camera(**dict(fields, depth_factor=7)), 1, RGB, DEPTH)).frame == 0
+
+
+def test_a_preset_beside_a_config_of_another_is_refused(camera, tmp_path):
+    config = tmp_path / "config.yaml"
+    config.write_text("preset: paper\n")
+    with pytest.raises(dkb_slam.InputError, match='preset: "default", but the settings say `preset: paper`'):
+        dkb_slam.Slam(camera, "default", config=config)
+    for slam in (dkb_slam.Slam(camera, "paper", config=config), dkb_slam.Slam(camera, config=config)):
+        assert "preset: paper" in slam.config_yaml()
+
+
 def test_errors_are_of_pythons_kinds():
     assert issubclass(dkb_slam.InputError, ValueError) and issubclass(dkb_slam.InvalidOption, dkb_slam.InputError)
     assert issubclass(dkb_slam.SlamWarning, UserWarning)
@@ -117,6 +156,17 @@ def test_cameras_keep_their_fields():
     assert eval(repr(camera), {"Camera": dkb_slam.Camera}) == camera
     with pytest.raises(AttributeError):
         camera.fx = 1
+    assert pickle.loads(pickle.dumps(camera)) == copy.copy(camera) == camera
+    assert {camera: 1}[dkb_slam.Camera(**fields)] == 1 and hash(camera) != hash(dkb_slam.Camera.named("fr1"))
+
+
+def test_reprs_say_what_it_is(slam):
+    motion = np.eye(4)
+    motion[:3, 3] = [0.5, 0, 0]
+    prior = dkb_slam.MotionPrior(motion, np.eye(6) * 1e-4)
+    assert repr(prior) == "MotionPrior((0.5000, 0.0000, 0.0000) m, 0.0000 rad, sd 0.01 m and 0.01 rad)"
+    assert repr(dkb_slam.MotionPrior(motion, rotation_only=True)) == "MotionPrior(0.0000 rad, sd 1 rad)"
+    assert repr(slam.map().points()) == "MapPoints(0 points)"
 
 
 def test_the_stubs_name_what_there_is():

@@ -96,12 +96,22 @@ def test_pairs_that_cannot_be_read_are_left_out_with_a_warning(copy):
         assert next(source).index == 8
 
 
-def test_a_closed_source_is_at_its_end(sequence):
+def test_pairs_that_are_skipped_for_one_reason_are_one_warning_and_a_count(copy):
+    for image in images(copy)[7:]:
+        image.write_bytes(b"no image")
+    with pytest.warns(dkb_slam.SlamWarning) as shown:
+        assert len(list(dkb_slam.open(copy))) == 7
+    texts = [str(warning.message) for warning in shown]
+    assert len(texts) == 2 and texts[0].startswith("frame 7: ") and "more frames skipped: is not an image" in texts[1]
+
+
+def test_a_closed_source_keeps_what_it_was_and_gives_no_frames(sequence, camera):
     with dkb_slam.open(sequence) as source:
         next(source)
-    assert list(source) == []
-    with pytest.raises(dkb_slam.InputError, match="closed"):
-        source.camera
+    assert source.camera == camera and source.size == 40 and source.skipped == 0 and source.counts["late"] == 0
+    assert repr(source).startswith("Source(closed: 40 pairs by associations.txt")
+    with pytest.raises(dkb_slam.InputError, match="it is closed; open it again"):
+        next(source)
 
 
 def run_script(script, *arguments):

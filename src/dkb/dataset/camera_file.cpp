@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "dkb/dataset/calibration_file.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
@@ -38,7 +39,8 @@ void bind(Settings* settings, CameraModel* c, bool rational = true) {
   settings->bind("p1", &c->p1, "[1] tangential distortion");
   settings->bind("p2", &c->p2, "[1]");
   settings->bind("depth_factor", &c->depth_factor, "[units per metre] of integer depth images");
-  settings->bind("fps", &c->fps, "[1/s] nominal frame rate; 0 = as the first five stamps say");
+  settings->bind("fps", &c->fps,
+                 "[1/s] nominal frame rate; 0, or one that the first five stamps contradict = as they say");
   settings->bind("depth_min", &c->depth_min, "[m] nearer depth is treated as missing");
   settings->bind("readout", &c->readout,
                  "[s] rolling shutter: first row's exposure to the last row's; 0 = global shutter");
@@ -72,8 +74,10 @@ std::string camera_named_by(const std::string& folder_name) {
 }
 
 CameraChoice from_file(const fs::path& path) {
-  const Camera camera = Camera::load(path);
-  return {camera, path.string(), doubt_of(camera, path.string())};
+  const std::string name = path.string(), text = read_file(path);
+  const Camera camera = parse_camera(text, name);
+  const bool assumed = is_calibration(text) && parse_calibration(text, name).depth_assumed;
+  return {camera, name + (assumed ? ", depth in millimetres (it says no depth_factor)" : ""), doubt_of(camera, name)};
 }
 
 std::string folder_name(const fs::path& folder) {
@@ -84,6 +88,7 @@ std::string folder_name(const fs::path& folder) {
 }  // namespace
 
 CameraModel parse_camera(const std::string& text, const std::string& name) {
+  if (is_calibration(text)) return parse_calibration(text, name).camera;
   CameraModel camera;
   Settings settings;
   bind(&settings, &camera);

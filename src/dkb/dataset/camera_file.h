@@ -8,7 +8,8 @@
 
 namespace dkb {
 
-// The text of a camera file (Camera::load), which `name` stands for in messages.
+// The text of a camera file (Camera::load), ours or a calibration (calibration_file.h), which `name` stands for in
+// messages.
 Camera parse_camera(const std::string& text, const std::string& name);
 
 // A camera without limits of depth: what is read by it loses nothing.

@@ -37,6 +37,68 @@ TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
   EXPECT_EQ(c.depth_max, 4);
 }
 
+// As camera_calibration of ROS writes it.
+const std::string kRos =
+    "image_width: 640\nimage_height: 480\ncamera_name: head_camera\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+    "  data: [517.25, 0., 318.5, 0., 516.5, 255.25, 0., 0., 1.]\ndistortion_model: plumb_bob\n"
+    "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.05, 0.02, 0.001, -0.002, 0.003]\n"
+    "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+    "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [510, 0, 318, 0, 0, 511, 255, 0, 0, 0, 1, 0]\n";
+// As OpenCV's calibration sample writes it.
+const std::string kOpenCv =
+    "%YAML:1.0\n---\ncalibration_time: \"Fri 27 Nov 2026\"\nnframes: 20\nimage_width: 640\nimage_height: 480\n"
+    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 5.1725e+02, 0., 3.185e+02, 0.,\n"
+    "       516.5, 255.25, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 8\n   cols: 1\n   dt: d\n"
+    "   data: [ 0.1, 0.02, 0.001, -0.002, 0.003, 0.04, 0.05, 0.006 ]\navg_reprojection_error: 2.5e-01\n";
+
+TEST(CameraFile, ReadsCalibrationsOfRosAndOpenCv) {
+  const Camera ros = parse_camera(kRos, "c");
+  EXPECT_EQ(ros.fx, 517.25);
+  EXPECT_EQ(ros.fy, 516.5);
+  EXPECT_EQ(ros.cx, 318.5);
+  EXPECT_EQ(ros.cy, 255.25);
+  EXPECT_EQ(ros.width, 640);
+  EXPECT_EQ(ros.depth_factor, 1000) << "millimetres, as ROS has it";
+  EXPECT_EQ(ros.k1, -0.05);
+  EXPECT_EQ(ros.p1, 0.001);
+  EXPECT_EQ(ros.k3, 0.003);
+  const Camera opencv = parse_camera(kOpenCv + "depth_factor: 5000\nfps: 15\n", "c");
+  EXPECT_EQ(opencv.fx, 517.25);
+  EXPECT_EQ(opencv.k6, 0.006);
+  EXPECT_EQ(opencv.depth_factor, 5000);
+  EXPECT_EQ(opencv.fps, 15);
+  const std::string flow =
+      "image_width: 640\nimage_height: 480\ncamera_matrix: {rows: 3, cols: 3, data: [517, 0, 318, "
+      "0, 516, 255, 0, 0, 1]}\n";
+  EXPECT_EQ(parse_camera(flow, "c").fy, 516) << "a lens without distortion";
+}
+
+TEST(CameraFile, WhatIsWrongWithACalibrationIsNamed) {
+  EXPECT_EQ(parse_message(replaced(kRos, "image_height: 480\n", "")),
+            "camera.yaml: key \"image_height\" is missing; a calibration needs image_width, image_height and "
+            "camera_matrix");
+  EXPECT_EQ(parse_message(replaced(kRos, "image_width: 640", "image_width: 640.5")),
+            "camera.yaml:1: image_width: must be 16 ... 16384 whole pixels");
+  EXPECT_EQ(parse_message(replaced(kRos, "distortion_model", "distorsion_model")),
+            "camera.yaml:8: unknown key \"distorsion_model\" (did you mean \"distortion_model\"?)");
+  EXPECT_EQ(parse_message(replaced(kRos, "plumb_bob", "equidistant")),
+            "camera.yaml:9: distortion_coefficients: its distortion model equidistant is none of ours (plumb_bob, "
+            "rational_polynomial); rectify the images, and give the camera of those");
+  EXPECT_EQ(parse_message(replaced(kRos, "517.25, 0.,", "517.25, 0.5,")),
+            "camera.yaml:4: camera_matrix: must be fx, 0, cx, 0, fy, cy, 0, 0, 1, by rows");
+  EXPECT_EQ(parse_message(replaced(kRos, "517.25, ", "")),
+            "camera.yaml:4: camera_matrix: holds 8 numbers, and its rows and cols say 9");
+  EXPECT_EQ(parse_message(replaced(kRos, "517.25", "x")), "camera.yaml:4: camera_matrix: \"x\" is not a number");
+  EXPECT_EQ(parse_message(replaced(kRos, "517.25", "0.")),
+            "camera.yaml: fx: 0.000000 is out of range; it must be greater than 0 px");
+  EXPECT_EQ(parse_message(replaced(kRos, "cols: 5", "cols: 4")),
+            "camera.yaml:9: distortion_coefficients: holds 5 numbers, and its rows and cols say 4");
+  EXPECT_EQ(parse_message(kRos + "fx: 3\n"),
+            "camera.yaml:21: fx: a camera file has either camera_matrix or fx, fy, cx and cy; leave one out");
+  EXPECT_EQ(parse_message(kRos + "image_width: 3\n"), "camera.yaml:21: key \"image_width\" is given twice");
+  EXPECT_EQ(parse_message("image_width: [\n").substr(0, 33), "camera.yaml:2: is not valid YAML ");
+}
+
 TEST(CameraFile, StrangeNumbersAreDoubted) {
   const auto doubt = [](const std::string& text) { return doubt_of(parse_camera(text, "c"), "c"); };
   EXPECT_EQ(doubt(kCamera), "");
@@ -97,6 +159,9 @@ TEST_F(ChooseCamera, PrefersOptionThenFileThenFolderName) {
   EXPECT_EQ(choose_camera("", data).origin, (data / "camera.yaml").string());
   EXPECT_EQ(choose_camera("fr3", data).camera.fx, 535.4);
   EXPECT_EQ(choose_camera((data / "camera.yaml").string(), folder("else")).camera.fx, 400);
+  write_file_atomically(data / "camera.yaml", kRos);
+  EXPECT_EQ(choose_camera("", data).origin,
+            (data / "camera.yaml").string() + ", depth in millimetres (it says no depth_factor)");
 }
 
 TEST_F(ChooseCamera, KnowsFolderNamesAsWords) {
@@ -117,16 +182,18 @@ TEST_F(ChooseCamera, RefusalsNameTheFile) {
 TEST(CameraFile, MutatedFilesThrowNothingButInputErrors) {
   Random random(21);
   const std::string original = kCamera + "# comment\nk1: 0.5\nfps: 30\n";
-  int accepted = 0;
-  for (int i = 0; i < 4000; ++i) {
-    try {
-      parse_camera(mutated(original, random), "camera.yaml").check();
-      ++accepted;
-    } catch (const InputError& e) {
-      EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+  for (const std::string& text : {original, kRos, kOpenCv}) {
+    int accepted = 0;
+    for (int i = 0; i < 4000; ++i) {
+      try {
+        parse_camera(mutated(text, random), "camera.yaml").check();
+        ++accepted;
+      } catch (const InputError& e) {
+        EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+      }
     }
+    EXPECT_GT(accepted, 0);
   }
-  EXPECT_GT(accepted, 0);
 }
 
 }  // namespace

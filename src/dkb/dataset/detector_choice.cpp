@@ -26,9 +26,11 @@ std::vector<std::string> detector_kinds(const std::string& detector, bool has_mo
   if (detector == "auto") return {has_model ? "yolo" : "motion"};
   const std::vector<std::string> known = {"auto", "none", "yolo", "network", "motion", "file"};
   std::vector<std::string> kinds;
-  const size_t command =
-      ("+" + detector).find("+" + std::string(kExec));  // the last kind, since a command may hold a +
-  std::istringstream parts(detector.substr(0, command));
+  size_t command = ("+" + detector).find("+" + std::string(kExec));  // the last kind, since a command may hold a +
+  if (const size_t blank = detector.find("+ " + std::string(kExec)); blank < command) command = blank + 2;
+  std::string before = detector.substr(0, command);
+  std::erase(before, ' ');
+  std::istringstream parts(before);
   for (std::string kind; std::getline(parts, kind, '+');) {
     if (kind == "auto")
       throw InputError("--detector " + detector +
@@ -77,7 +79,9 @@ void check_kinds(const DetectorChoice& choice, bool has_model) {
   if (!choice.boxes.empty() && !has("file"))
     throw InputError("--boxes: --detector " + choice.kinds + " does not read boxes; add --detector file" +
                      (kinds.empty() || choice.kinds == "auto" ? "" : ", or join it: " + choice.kinds + "+file"));
-  if (has("file") && choice.boxes.empty()) throw InputError("--detector file: no boxes; name their file with --boxes");
+  if (has("file") && choice.boxes.empty())
+    throw InputError(std::string("--detector file: no boxes; name their file with --boxes") +
+                     (choice.masks.empty() ? "" : "; --masks goes with any other detector, --detector none too"));
 }
 
 DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {

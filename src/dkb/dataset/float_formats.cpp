@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of 32-bit floats: TIFF (Revision 6.0, without compression), PFM and NumPy's .npy (format 1.0 - 3.0).
+// Images of 32-bit floats, in NumPy's format also of 16-bit units: TIFF (Revision 6.0, without compression), PFM and
+// NumPy's .npy (format 1.0 - 3.0).
 #include <bit>
 #include <cstring>
 #include <map>
@@ -175,6 +176,7 @@ Npy parse_npy(std::string_view bytes, const std::string& name) {
   const std::string_view type = value_of("'descr'").substr(0, 5);
   npy.big_endian = type.substr(0, 2) == "'>";
   npy.header.floating = type.size() == 5 && type[2] == 'f';
+  npy.header.with_sign = type.size() == 5 && type[2] != 'f' && type[2] != 'u';
   npy.header.bits = type.size() == 5 && type[3] >= '1' && type[3] <= '8' ? 8 * (type[3] - '0') : 8;
   if (value_of("'fortran_order'").substr(0, 5) != "False")
     throw InputError(name + ": is an NPY file in Fortran order, which is not supported; store it in C order");
@@ -206,7 +208,8 @@ Npy parse_npy(std::string_view bytes, const std::string& name) {
 // Samples of an image stored whole from `data` on.
 std::string_view samples(std::string_view bytes, size_t data, const ImageHeader& header, const std::string& name,
                          const char* kind) {
-  const size_t size = static_cast<size_t>(header.width) * static_cast<size_t>(header.height) * sizeof(float);
+  const size_t size =
+      static_cast<size_t>(header.width) * static_cast<size_t>(header.height) * static_cast<size_t>(header.bits / 8);
   if (data > bytes.size() || size > bytes.size() - data) broken(name, kind, "the file is truncated");
   return bytes.substr(data, size);
 }
@@ -255,6 +258,17 @@ Image<float> decode_npy(std::string_view bytes, const std::string& name) {
   const std::string_view data = samples(bytes, npy.data, npy.header, name, "NPY");
   Image<float> image(npy.header.width, npy.header.height);
   copy_floats(data.data(), npy.big_endian, image.size(), image.data());
+  return image;
+}
+
+Image<uint16_t> decode_npy16(std::string_view bytes, const std::string& name) {
+  const Npy npy = parse_npy(bytes, name);
+  const std::string_view data = samples(bytes, npy.data, npy.header, name, "NPY");
+  Image<uint16_t> image(npy.header.width, npy.header.height);
+  for (size_t i = 0; i < image.size(); ++i) {
+    const auto byte = [&](size_t k) { return static_cast<unsigned>(static_cast<unsigned char>(data[2 * i + k])); };
+    image.data()[i] = static_cast<uint16_t>(npy.big_endian ? byte(0) << 8 | byte(1) : byte(1) << 8 | byte(0));
+  }
   return image;
 }
 

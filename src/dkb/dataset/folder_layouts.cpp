@@ -284,6 +284,25 @@ Opener opener_of(const fs::path& folder) {
   return nullptr;
 }
 
+// Throws where a folder that is no sequence is one of those that are taken for it. Called when nothing else is left.
+void refuse_other_folders(const fs::path& folder) {
+  if (there(folder / "depth.txt")) return;  // a list that has lost the other
+  if (there(folder / "trajectory.txt") && there(folder / "stats.json"))
+    throw InputError(folder.string() + ": is a result folder, which `run` wrote; give the folder of the sequence");
+  for (const char* colour : kColourFolders)
+    if (const std::string others = other_endings(folder / colour, kPictures);
+        there(folder / "depth") && !others.empty())
+      throw InputError((folder / colour).string() + ": holds no PNG or JPEG" + others);
+  std::vector<std::string> sequences;
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec))
+    if (it->is_directory(ec) && opener_of(it->path()) != nullptr) sequences.push_back(it->path().string());
+  if (sequences.empty()) return;
+  throw InputError(folder.string() + ": holds " + std::to_string(sequences.size()) +
+                   (sequences.size() == 1 ? " sequence: name it, " : " sequences: name one, such as ") +
+                   *std::min_element(sequences.begin(), sequences.end()));
+}
+
 }  // namespace
 
 bool has_folder_layout(const fs::path& folder) {
@@ -295,6 +314,7 @@ FolderLayout open_folder_layout(const fs::path& folder) {
   for (const char* colour : kColourFolders)  // images by the right folders, whose names tell nothing: the error says so
     if (!there(folder / "depth.txt") && there(folder / "depth") && holds_pictures(folder / colour))
       return open_stamped(folder, colour);
+  refuse_other_folders(folder);
   return open_tum(folder);
 }
 

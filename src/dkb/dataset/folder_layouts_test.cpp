@@ -110,7 +110,20 @@ TEST_F(Layouts, ACameraThatIsAssumedAndStampsThatAreNoSecondsAreWarnedOf) {
   write("associations.txt", "0 color/0.jpg 0 depth/0.png\n33.3 color/1.jpg 33.3 depth/1.png\n");
   const auto milliseconds = open()->take_warnings();
   ASSERT_EQ(milliseconds.size(), 1u);
-  EXPECT_NE(milliseconds[0].find("33.3 s apart"), std::string::npos) << milliseconds[0];
+  EXPECT_NE(milliseconds[0].find("33 s apart"), std::string::npos) << milliseconds[0];
+  // The camera's own rate is what the stamps are judged by later.
+  write("associations.txt", "0 color/0.jpg 0 depth/0.png\n0.000036 color/1.jpg 0.000036 depth/1.png\n");
+  for (const double fps : {0.0, 30.0}) {
+    Camera camera = guessed->camera();
+    camera.fps = fps;
+    write("camera.yaml", camera.to_yaml());
+    const auto close = open();
+    EXPECT_EQ(close->camera().fps, fps);
+    const auto doubts = close->take_warnings();
+    ASSERT_EQ(doubts.size(), 1u);
+    EXPECT_NE(doubts[0].find("are 3.6e-05 s apart in the median; they must be in seconds"), std::string::npos)
+        << doubts[0];
+  }
 }
 
 TEST_F(Layouts, AFolderOfResultsMakesNoReplica) {
@@ -205,6 +218,24 @@ TEST_F(Layouts, ACameraFileBesideTheDataGoesFirst) {
 TEST_F(Layouts, AnUnknownFolderIsToldWhatTumsLayoutLacks) {
   EXPECT_NE(error().find("rgb.txt: no such file; a dataset needs associations.txt, or rgb.txt and depth.txt"),
             std::string::npos);
+}
+
+TEST_F(Layouts, ImagesOfAnotherKindAreNamed) {
+  const std::string kinds = "; colour is PNG or JPEG, depth PNG, TIFF, PFM or NPY";
+  write("rgb/1.0.bmp", "BM"), write("rgb/2.0.bmp", "BM"), write("rgb/.hidden.x", ""), depth("depth/1.0.png");
+  EXPECT_EQ(error(), (folder / "rgb").string() + ": holds no PNG or JPEG, but .bmp" + kinds);
+  colour("rgb/1.0.png"), fs::remove(folder / "depth/1.0.png"), write("depth/1.0.exr", "");
+  EXPECT_EQ(error(), (folder / "depth").string() + ": holds no image STAMP.png, but .exr" + kinds);
+}
+
+TEST_F(Layouts, FoldersThatAreTakenForASequenceAreToldApart) {
+  write("trajectory.txt", ""), write("stats.json", "{}");
+  EXPECT_EQ(error(), folder.string() + ": is a result folder, which `run` wrote; give the folder of the sequence");
+  fs::remove(folder / "stats.json");
+  write("b/rgb.txt", ""), write("c/notes.txt", "");
+  EXPECT_EQ(error(), folder.string() + ": holds 1 sequence: name it, " + (folder / "b").string());
+  write("a/associations.txt", "");
+  EXPECT_EQ(error(), folder.string() + ": holds 2 sequences: name one, such as " + (folder / "a").string());
 }
 
 TEST_F(Layouts, ImagesNamedByTheirStampsNeedNoLists) {

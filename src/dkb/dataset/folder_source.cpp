@@ -24,14 +24,15 @@ std::string described(const TumDataset& dataset, const CameraChoice& camera) {
 
 // Why stamps may be no seconds; empty when nothing speaks for it.
 std::string doubt_of_stamps(const TumDataset& dataset) {
-  constexpr double kSlow = 2;  // [s] between frames; nothing can be tracked from one to the next
+  constexpr double kSlow = 2;     // [s] between frames; nothing can be tracked from one to the next
+  constexpr double kFast = 2e-3;  // [s] no camera of depth gives 500 frames a second
   std::vector<double> intervals;
   for (size_t i = 1; i < dataset.pairs.size(); ++i)
     intervals.push_back(dataset.pairs[i].timestamp - dataset.pairs[i - 1].timestamp);
   if (intervals.empty()) return "";
   const double median = upper_median(intervals);
-  if (median <= kSlow) return "";
-  return fmt::format("{}: the stamps of {} are {:g} s apart in the median; they must be in seconds",
+  if (median >= kFast && median <= kSlow) return "";
+  return fmt::format("{}: the stamps of {} are {:.2g} s apart in the median; they must be in seconds",
                      dataset.folder.string(), dataset.list, median);
 }
 

@@ -44,7 +44,7 @@ std::string kind_name(ImageKind kind) {
 // What a header describes, for messages: "an 8-bit grey PNG".
 std::string describe(const ImageHeader& h) {
   const std::string article = h.bits == 8 ? "an " : "a ";
-  const std::string type = h.floating ? "-bit float " : "-bit ";
+  const std::string type = h.floating ? "-bit float " : h.with_sign ? "-bit signed " : "-bit ";
   const std::string colours = h.palette ? "palette " : h.channels >= 3 ? "colour " : h.channels == 1 ? "grey " : "";
   return article + std::to_string(h.bits) + type + colours + kind_name(h.kind);
 }
@@ -94,9 +94,15 @@ std::string why_not_picture(const ImageHeader& h) {
 
 std::string why_not_depth(const ImageHeader& h) {
   const bool one_channel = h.channels == 1 && !h.palette;
-  if (h.kind == ImageKind::png && h.bits == 16 && one_channel) return "";
+  const bool units = h.kind == ImageKind::png || (h.kind == ImageKind::npy && !h.floating && !h.with_sign);
+  if (units && h.bits == 16 && one_channel) return "";
   if (h.floating && h.bits == 32 && one_channel) return "";
   return describe(h);
+}
+
+std::string depth_remedy(const ImageHeader& h) {
+  return std::string("; depth must be 16-bit grey PNG, 32-bit float in TIFF or PFM, or uint16 or float32 in NPY") +
+         (h.kind == ImageKind::npy ? ": store depth.astype(np.float32) in metres" : "");
 }
 
 Picture decode_picture(std::string_view bytes, const std::string& name) {
@@ -180,7 +186,7 @@ GreyImage read_grey(const std::filesystem::path& path) {
 DepthImage decode_depth(std::string_view bytes, const std::string& name, const CameraModel& camera) {
   const ImageHeader header = read_image_header(bytes, name);
   if (const std::string kind = why_not_depth(header); !kind.empty())
-    throw InputError(name + ": is " + kind + "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY");
+    throw InputError(name + ": is " + kind + depth_remedy(header));
   switch (header.kind) {
     case ImageKind::png:
       return metres(formats::decode_png16(bytes, name, header), camera);
@@ -189,7 +195,8 @@ DepthImage decode_depth(std::string_view bytes, const std::string& name, const C
     case ImageKind::pfm:
       return metres(formats::decode_pfm(bytes, name), camera);
     default:
-      return metres(formats::decode_npy(bytes, name), camera);
+      return header.floating ? metres(formats::decode_npy(bytes, name), camera)
+                             : metres(formats::decode_npy16(bytes, name), camera);
   }
 }
 

@@ -22,7 +22,8 @@ struct ImageHeader {
   int width = 0, height = 0;  // [px]
   int channels = 1;           // as stored: 1 grey or palette, 2 grey + alpha, 3 colour, 4 colour + alpha
   int bits = 8;               // per channel; 8 also stands for 1, 2 and 4
-  bool floating = false;      // 32-bit float samples
+  bool floating = false;      // float samples
+  bool with_sign = false;     // of whole numbers
   bool palette = false;
 };
 
@@ -43,14 +44,15 @@ Picture resampled(const Picture& picture, int width, int height);
 // Grey of any picture (masks).
 GreyImage read_grey(const std::filesystem::path& path);
 
-// Depth [m], 0 = no data. 16-bit grey PNG: value / camera.depth_factor. 32-bit float (TIFF with one channel and without
-// compression; PFM; NumPy .npy): metres. Values outside camera.depth_min ... depth_max and values that
-// are not finite become 0. Any other type throws InputError.
+// Depth [m], 0 = no data. 16-bit grey PNG and NumPy .npy of uint16: value / camera.depth_factor. 32-bit float (TIFF
+// with one channel and without compression; PFM; NumPy .npy): metres. Values outside camera.depth_min ... depth_max and
+// values that are not finite become 0. Any other type throws InputError.
 DepthImage decode_depth(std::string_view bytes, const std::string& name, const CameraModel& camera);
 DepthImage read_depth(const std::filesystem::path& path, const CameraModel& camera);
 
 // Empty when a file of this header can be a depth image; otherwise what it is instead, e.g. "an 8-bit PNG".
 std::string why_not_depth(const ImageHeader& header);
+std::string depth_remedy(const ImageHeader& header);  // then: "; depth must be ..."
 // The same for a picture.
 std::string why_not_picture(const ImageHeader& header);
 

@@ -45,15 +45,16 @@ std::string encode_pfm(const Image<float>& image) {
          bytes_of(upside_down);
 }
 
-// Bytes of a .npy file of float32, little endian.
-std::string encode_npy(const Image<float>& image) {
-  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + std::to_string(image.height()) + ", " +
-                       std::to_string(image.width()) + "), }";
+// Bytes of a .npy file, of these samples as they are in memory, little endian.
+template <class Sample>
+std::string encode_npy(const Image<Sample>& image, const std::string& type = "<f4") {
+  std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (" + std::to_string(image.height()) +
+                       ", " + std::to_string(image.width()) + "), }";
   header += std::string(64 - (header.size() + 11) % 64, ' ') + "\n";
   std::string out("\x93NUMPY\x01\x00", 8);
   out += static_cast<char>(header.size());
   out += '\0';
-  return out + header + bytes_of(image);
+  return out + header + std::string(reinterpret_cast<const char*>(image.data()), image.size() * sizeof(Sample));
 }
 
 TEST(Png, ColourAndGreyComeBackExactly) {
@@ -141,6 +142,23 @@ TEST(FloatDepth, EveryFormatGivesTheSameMetres) {
   }
 }
 
+TEST(UnitDepth, NumpysUint16IsAsAPng) {
+  Image<uint16_t> units(4, 2, 2000);
+  units(1, 1) = 0x0203, units(2, 1) = 0;
+  CameraModel camera;
+  camera.depth_factor = 1000;
+  const DepthImage png = decode_depth(encode_png(units), "d", camera);
+  EXPECT_EQ(decode_depth(encode_npy(units, "<u2"), "d", camera), png);
+  Image<uint16_t> swapped = units;
+  for (size_t i = 0; i < swapped.size(); ++i)
+    swapped.data()[i] = static_cast<uint16_t>(units.data()[i] << 8 | units.data()[i] >> 8);
+  EXPECT_EQ(decode_depth(encode_npy(swapped, ">u2"), "d", camera), png);
+  std::string cut = encode_npy(units, "<u2");
+  cut.pop_back();
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(cut, "d.npy", camera); }),
+            "d.npy: is a broken NPY (the file is truncated)");
+}
+
 TEST(FloatDepth, BigEndianTiffInSeveralStripsIsRead) {
   // 1 x 2 pixels, 1.0 and 2.0 m, one row a strip; the strips stand after the directory in reverse order.
   std::string t("MM\0*\0\0\0\x08", 8);
@@ -181,7 +199,13 @@ TEST(FloatDepth, ATiffHoldsAsManySamplesAsItShows) {
 
 TEST(ImageCodecs, WrongTypesAreCalledByName) {
   const CameraModel camera;
-  const std::string ending = "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY";
+  const std::string ending =
+      "; depth must be 16-bit grey PNG, 32-bit float in TIFF or PFM, or uint16 or float32 in NPY";
+  const std::string numpys = ending + ": store depth.astype(np.float32) in metres";
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_npy(Image<double>(20, 20), "<f8"), "d.npy", camera); }),
+            "d.npy: is a 64-bit float grey NPY" + numpys);
+  EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_npy(Image<uint16_t>(20, 20), "<i2"), "d.npy", camera); }),
+            "d.npy: is a 16-bit signed grey NPY" + numpys);
   EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_png(GreyImage(20, 20)), "d.png", camera); }),
             "d.png: is an 8-bit grey PNG" + ending);
   EXPECT_EQ(test::input_error_of([&] { decode_depth(encode_jpeg(colour_picture()), "d.png", camera); }),

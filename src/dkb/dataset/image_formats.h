@@ -29,5 +29,6 @@ ImageHeader pfm_header(std::string_view bytes, const std::string& name);
 Image<float> decode_pfm(std::string_view bytes, const std::string& name);
 ImageHeader npy_header(std::string_view bytes, const std::string& name);
 Image<float> decode_npy(std::string_view bytes, const std::string& name);
+Image<uint16_t> decode_npy16(std::string_view bytes, const std::string& name);
 
 }  // namespace dkb::formats

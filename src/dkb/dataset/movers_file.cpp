@@ -73,12 +73,11 @@ MoverRow parse_row(const std::vector<std::string_view>& columns, const std::stri
   return row;
 }
 
-// [m/s] of each coordinate.
+}  // namespace
+
 double velocity_sd(const Mover& mover) {
   return std::sqrt(mover.covariance.bottomRightCorner<3, 3>().trace() / 3);
 }
-
-}  // namespace
 
 std::string written_class(std::string name) {
   if (name.empty()) return "object";

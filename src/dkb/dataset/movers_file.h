@@ -23,6 +23,7 @@ using MoverRows = std::vector<MoverRow>;  // by time; within a frame in the file
 // one line per mover and frame: position [m] and velocity [m/s] in the world with the standard deviations of their
 // coordinates, box [px] with its top-left corner. Metres are written with 4 decimals, pixels with 2. Commas, quotes and
 // white space in class names become '_'; an empty class, "object".
+double velocity_sd(const Mover& mover);  // [m/s] of each coordinate, as the file has it
 std::string movers_to_csv(const MoverRows& rows);
 std::string written_class(std::string class_name);                            // in one word, as it stands there
 void write_movers(const std::filesystem::path& path, const MoverRows& rows);  // throws OutputError

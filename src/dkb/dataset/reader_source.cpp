@@ -10,6 +10,7 @@ namespace dkb {
 namespace {
 
 constexpr double kOtherRate = 1.4;  // less is taken for gaps among the first images
+constexpr double kNoRate = 1000;    // [1/s] frame_rate_of() says no more: the stamps are of another unit
 
 }  // namespace
 
@@ -18,6 +19,7 @@ void ReaderSource::start(PairStream pairs, const Camera& camera, bool threaded) 
   reader_ = std::make_unique<RgbdReader>(std::move(pairs), RgbdReaderOptions{.threaded = threaded});
   // A recording may hold every third image of a camera that is known to give 30 a second.
   const double told = frame_rate_of(reader_->first_stamps());
+  if (told >= kNoRate) return;  // what the camera tells is kept, which whoever doubts the stamps needs
   if (camera_.fps == 0 || std::max(told, camera_.fps) > kOtherRate * std::min(told, camera_.fps)) camera_.fps = told;
 }
 

@@ -23,7 +23,7 @@ class ReaderSource : public Source {
 
  protected:
   // To be called once, by the constructor. A camera that tells no frame rate, or one that the first stamps contradict
-  // by a factor of more than 1.4, gets theirs.
+  // by a factor of more than 1.4, gets theirs, unless it is no camera's.
   void start(PairStream pairs, const Camera& camera, bool threaded);
   // Ends the thread that calls the stream of pairs, before what the stream needs is gone.
   void end() { reader_.reset(); }

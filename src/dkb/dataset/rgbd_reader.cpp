@@ -8,6 +8,13 @@
 #include "dkb/util/thrown.h"
 
 namespace dkb {
+namespace {
+
+constexpr size_t kQueue = 4;  // [pairs] ahead of the consumer, decoded or being decoded
+constexpr int kWorkers = 2;   // [threads] that decode a pair each
+constexpr int kProbed = 5;    // [pairs] looked at before the first is handed out
+
+}  // namespace
 
 struct RgbdReader::Decoded {
   std::shared_ptr<const RgbdImage> image;  // null when skipped
@@ -22,19 +29,13 @@ struct RgbdReader::Slot {
   std::optional<Decoded> decoded;
 };
 
-void RgbdReaderOptions::check() const {
-  require_option(queue >= 1 && queue <= 1000, "reader.queue", queue, "1 ... 1000 pairs");
-  require_option(workers >= 1 && workers <= 16, "reader.workers", workers, "1 ... 16 threads");
-  require_option(probed >= 1, "reader.probed", probed, "at least 1 pair");
-}
-
 RgbdReader::RgbdReader(PairStream pairs, const RgbdReaderOptions& options)
-    : pairs_(std::move(pairs)), options_((options.check(), options)) {
+    : pairs_(std::move(pairs)), options_(options) {
   probe();
   if (!options_.threaded) return;
   try {
     threads_.emplace_back([this] { fetch_ahead(); });
-    for (int i = 0; i < options_.workers; ++i) threads_.emplace_back([this] { decode_ahead(); });
+    for (int i = 0; i < kWorkers; ++i) threads_.emplace_back([this] { decode_ahead(); });
   } catch (...) {
     end();
     throw;
@@ -68,7 +69,7 @@ void RgbdReader::stop() {
 void RgbdReader::probe() {
   std::string first_failure;
   bool found_sound = false;
-  for (int i = 0; i < options_.probed; ++i) {
+  for (int i = 0; i < kProbed; ++i) {
     std::optional<StoredPair> pair = pairs_();
     if (!pair) break;
     first_stamps_.push_back(pair->stamp_ns);
@@ -184,7 +185,7 @@ bool RgbdReader::oldest_ready() const {
 }
 
 bool RgbdReader::full() const {
-  return ended_ || ahead_.size() >= static_cast<size_t>(options_.queue);
+  return ended_ || ahead_.size() >= kQueue;
 }
 
 void RgbdReader::fill(std::unique_lock<std::mutex>& lock, const std::shared_ptr<Slot>& slot) {

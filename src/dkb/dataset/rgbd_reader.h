@@ -18,11 +18,7 @@
 namespace dkb {
 
 struct RgbdReaderOptions {
-  int queue = 4;         // [pairs] ahead of the consumer, decoded or being decoded, 1 ... 1000
-  int workers = 2;       // [threads] that decode a pair each, 1 ... 16
   bool threaded = true;  // false: next() decodes on the caller's thread; the frames are the same
-  int probed = 5;        // [pairs] looked at before the first is handed out, >= 1
-  void check() const;    // throws InvalidOption
 };
 
 // One pair of the recording, in order, decoded or skipped.

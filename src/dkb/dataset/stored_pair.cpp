@@ -31,9 +31,7 @@ std::string mismatch(const OpenedImage& image, bool is_depth, const CameraModel&
   const ImageHeader& h = image.header;
   const std::string other = is_depth ? why_not_depth(h) : why_not_picture(h);
   if (!other.empty())
-    return image.name + ": is " + other +
-           (is_depth ? "; depth must be 16-bit grey PNG, or 32-bit float in TIFF, PFM or NPY"
-                     : "; colour images must be PNG or JPEG");
+    return image.name + ": is " + other + (is_depth ? depth_remedy(h) : "; colour images must be PNG or JPEG");
   return fit_colour && !is_depth ? "" : size_mismatch(image.name, h.width, h.height, camera);
 }
 
@@ -70,8 +68,10 @@ std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& ca
   const auto open = [&](const std::filesystem::path& path, bool is_depth) {
     OpenedImage opened = open_image(path);
     const std::string wrong = mismatch(opened, is_depth, camera, fit_colour);
-    if (!wrong.empty()) throw InputError(wrong);
-    return opened;
+    if (wrong.empty()) return opened;
+    const ImageHeader& h = opened.header;
+    const std::string size = size_change(opened.name, h.width, h.height, camera);
+    throw InputError((is_depth ? why_not_depth(h) : why_not_picture(h)).empty() ? size : wrong);
   };
   const OpenedImage colour = open(pair.colour_path, false), depth = open(pair.depth_path, true);
   Picture picture = decode_picture(colour.bytes, colour.name);
@@ -87,6 +87,12 @@ std::string size_mismatch(const std::string& name, int width, int height, const 
   if (width == camera.width && height == camera.height) return "";
   return name + ": is of " + size_text(width, height) + " px, the camera of " + size_text(camera.width, camera.height) +
          "; give the camera of this dataset, and depth registered to colour";
+}
+
+std::string size_change(const std::string& name, int width, int height, const CameraModel& camera) {
+  if (width == camera.width && height == camera.height) return "";
+  return name + ": is of " + size_text(width, height) + " px, of another size than the frames before (" +
+         size_text(camera.width, camera.height) + ")";
 }
 
 PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera, bool fit_colour) {

@@ -37,5 +37,7 @@ PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& cam
 
 // Empty when an image has the camera's size; else what is wrong, for people.
 std::string size_mismatch(const std::string& name, int width, int height, const CameraModel& camera);
+// The same of an image amid others that fit.
+std::string size_change(const std::string& name, int width, int height, const CameraModel& camera);
 
 }  // namespace dkb

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/dataset/tum_dataset.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <iterator>
 #include <queue>
+#include <set>
 #include <tuple>
 
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/stamps.h"
 #include "dkb/util/text_rows.h"
@@ -64,6 +68,8 @@ void set_exact_stamps(std::vector<DatasetPair>& pairs, const std::string& name) 
 const std::vector<std::string> kColourEndings = {".png", ".jpg", ".jpeg"},
                                kDepthEndings = {".png", ".tiff", ".tif", ".pfm", ".npy"};
 
+const char* const kKinds = "colour is PNG or JPEG, depth PNG, TIFF, PFM or NPY";
+
 // As of a list: an image by its stamp, the name of the file, for each image of a folder; by rising stamps.
 std::vector<ListRow> rows_by_name(const fs::path& folder, const std::string& images,
                                   const std::vector<std::string>& endings) {
@@ -83,7 +89,9 @@ std::vector<ListRow> rows_by_name(const fs::path& folder, const std::string& ima
     rows.push_back({seconds, stamp, (fs::path(images) / name).string()});
   }
   if (error) throw InputError((folder / images).string() + ": cannot be read (" + error.message() + ")");
-  if (rows.empty()) throw InputError((folder / images).string() + ": holds no image STAMP" + endings.front());
+  if (rows.empty())
+    throw InputError((folder / images).string() + ": holds no image STAMP" + endings.front() +
+                     other_endings(folder / images, endings));
   std::sort(rows.begin(), rows.end(), [](const ListRow& a, const ListRow& b) {
     return std::tie(a.timestamp, a.path) < std::tie(b.timestamp, b.path);
   });
@@ -118,10 +126,11 @@ TumDataset pair_rows(const fs::path& folder, const std::vector<ListRow>& colour,
 }  // namespace
 
 void DatasetSelection::check() const {
-  require_option(skip_pairs >= 0, "skip-pairs", skip_pairs, "at least 0");
-  require_option(std::isfinite(start) && start >= 0, "start", start, "at least 0 s");
-  require_option(end >= start, "end", end, "at least start");
-  if (max_frames) require_option(*max_frames >= 1, "max-frames", *max_frames, "at least 1");
+  if (skip_pairs < 0) throw InvalidOption("--skip-pairs", std::to_string(skip_pairs), "at least 0");
+  if (!(std::isfinite(start) && start >= 0)) throw InvalidOption("--start", fmt::format("{:g}", start), "at least 0 s");
+  if (!(end >= start))
+    throw InvalidOption("--end", fmt::format("{:g}", end), fmt::format("at least that of --start, {:g} s", start));
+  if (max_frames && *max_frames < 1) throw InvalidOption("--max-frames", std::to_string(*max_frames), "at least 1");
 }
 
 std::vector<ListRow> parse_image_list(const std::string& text, const std::string& name) {
@@ -206,6 +215,22 @@ std::vector<std::pair<size_t, size_t>> associate(const std::vector<double>& a, c
   return result;
 }
 
+std::string other_endings(const fs::path& folder, const std::vector<std::string>& endings) {
+  std::set<std::string> others;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string ending = it->path().extension().string();
+    if (!ending.empty() && !it->path().filename().string().starts_with('.') &&
+        std::find(endings.begin(), endings.end(), ending) == endings.end())
+      others.insert(excerpt(ending));
+  }
+  if (others.empty()) return "";
+  std::string text;
+  for (const std::string& ending : others)
+    if (text.size() < 40) text += (text.empty() ? "" : ", ") + ending;
+  return ", but " + text + "; " + kKinds;
+}
+
 bool has_tum_lists(const fs::path& folder) {
   std::error_code error;
   return fs::exists(folder / "associations.txt", error) || fs::exists(folder / "rgb.txt", error);
@@ -232,8 +257,8 @@ TumDataset open_tum_dataset(const fs::path& folder) {
     if (!fs::exists(list, ec))
       throw InputError(list.string() +
                        ": no such file; a dataset needs associations.txt, or rgb.txt and depth.txt, with a line " +
-                       "`seconds image` for each image, or images named rgb/STAMP.png and depth/STAMP.png "
-                       "(docs/sources.md, \"Your own images\")");
+                       "`seconds image` for each image, or images named rgb/STAMP.png and depth/STAMP.png; " + kKinds +
+                       " (docs/sources.md, \"Your own images\")");
   return pair_image_lists(folder, "rgb.txt", "depth.txt");
 }
 

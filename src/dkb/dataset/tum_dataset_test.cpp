@@ -209,6 +209,8 @@ TEST(SelectPairs, NonsenseIsRefused) {
   TumDataset d = ten_pairs();
   EXPECT_THROW(select_pairs({.start = -1, .max_frames = {}}, &d), InvalidOption);
   EXPECT_THROW(select_pairs({.start = 2, .end = 1, .max_frames = {}}, &d), InvalidOption);
+  EXPECT_EQ(test::input_error_of([&] { select_pairs({.start = 2.5, .end = 1, .max_frames = {}}, &d); }),
+            "--end: 1 is out of range; it must be at least that of --start, 2.5 s");
   EXPECT_THROW(select_pairs({.max_frames = 0}, &d), InvalidOption);
   EXPECT_THROW(select_pairs({.start = 100, .max_frames = {}}, &d), InputError);
 }

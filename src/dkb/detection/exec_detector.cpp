@@ -66,6 +66,12 @@ Detections ExecDetector::detect(const DetectorInput& image) {
     if (answered_) throw DetectorEnded(what);
     throw NeverStarted("--detector exec: " + what +
                        "; give a command that a shell can execute, with its path, or leave the detector out");
+  } catch (const CommandEnded& e) {
+    process_.reset();
+    if (answered_) throw DetectorEnded("\"" + excerpt(command_) + "\": it " + e.what());
+    throw NeverStarted("--detector exec: \"" + excerpt(command_) + "\" " + e.what() +
+                       " before its first answer; what it wrote to its standard error says why: mend it, or leave the "
+                       "detector out");
   } catch (const InputError& e) {
     process_.reset();
     throw DetectorEnded("\"" + excerpt(command_) + "\": " + e.what());

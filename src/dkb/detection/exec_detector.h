@@ -25,7 +25,7 @@ class ExecDetector final : public Detector {
   explicit ExecDetector(std::string command, ExecPatience patience = {});
 
   // Throws InputError when the command ends, stalls, or answers in another format; it is ended then. NeverStarted when
-  // there is no such command and never was one.
+  // there is no such command and never was one, and when it ends before it has ever answered.
   Detections detect(const DetectorInput& image) override;
   std::string kind() const override { return "exec"; }
   // Starts a command that was ended once more.

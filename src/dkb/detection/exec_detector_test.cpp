@@ -76,7 +76,7 @@ TEST_F(ExecDetectorTest, ShowsRowsThatArePaddedAndGreyImagesAsRgb) {
 TEST_F(ExecDetectorTest, ACommandThatEndsIsAnErrorUntilItIsStartedAnew) {
   ExecDetector detector("read -r line; head -c 24 >/dev/null; printf 'answer 0 0\\nend\\n'; exit 3");
   EXPECT_EQ(detector.detect(image_), Detections());
-  EXPECT_NE(error_of(detector, image_).find("it ended"), std::string::npos);
+  EXPECT_NE(error_of(detector, image_).find(": it ended"), std::string::npos);
   EXPECT_FALSE(has_children());
   EXPECT_NE(error_of(detector, image_).find("has ended"), std::string::npos);
   detector.reset();
@@ -87,7 +87,7 @@ TEST_F(ExecDetectorTest, NobodyWhoReadsIsAnErrorAndNoSignal) {
   const GreyImage large(1000, 1000);
   for (const char* command : {"exit 0", "exec <&-; sleep 0.05"}) {
     ExecDetector detector(command);
-    EXPECT_NE(error_of(detector, input({}, large)).find("it ended"), std::string::npos) << command;
+    EXPECT_NE(refusal_of(detector, input({}, large)).find("before its first answer"), std::string::npos) << command;
   }
   EXPECT_FALSE(has_children());
 }
@@ -103,6 +103,15 @@ TEST_F(ExecDetectorTest, ACommandThatNoShellCanStartNeverWasADetector) {
               "--detector exec: \"" + command + "\" cannot be started (" + why +
                   "); give a command that a shell can execute, with its path, or leave the detector out");
   }
+  EXPECT_FALSE(has_children());
+}
+
+// Such as a script whose module is missing.
+TEST_F(ExecDetectorTest, ACommandThatEndsBeforeItsFirstAnswerNeverWasADetector) {
+  ExecDetector script("read -r line; exit 1");
+  EXPECT_EQ(refusal_of(script, image_),
+            "--detector exec: \"read -r line; exit 1\" ended (exit status 1) before its first answer; what it wrote to "
+            "its standard error says why: mend it, or leave the detector out");
   EXPECT_FALSE(has_children());
 }
 

@@ -160,7 +160,7 @@ std::string PipedCommand::ask(std::string_view request, const std::function<size
       const int status = kill();
       if (const std::string why = why_not_started(status); !why.empty() && !spoke_) throw NeverStarted(why);
       const std::string how = end_of(status);
-      throw InputError("it ended" + (how.empty() ? "" : " (" + how + ")"));
+      throw CommandEnded("ended" + (how.empty() ? "" : " (" + how + ")"));
     }
   }
 }

@@ -9,7 +9,15 @@
 #include <string>
 #include <string_view>
 
+#include "dkb/util/errors.h"
+
 namespace dkb {
+
+// What a command makes of an ask() that it ends in: "ended (exit status 1)".
+class CommandEnded : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 // A command of the shell, in a process group of its own, that is told something on its standard input and answers on
 // its standard output. Its standard error is ours.
@@ -22,9 +30,10 @@ class PipedCommand {
   PipedCommand(const PipedCommand&) = delete;
   PipedCommand& operator=(const PipedCommand&) = delete;
 
-  // Tells it `request` and returns its answer, which is there once `size_of(received)` is not 0. Throws InputError when
-  // it ends before, takes longer than `patience`, or says more than `max_bytes`; of no use from then on. Throws
-  // NeverStarted when it ended without a word in the way in which a shell says that there is no such command.
+  // Tells it `request` and returns its answer, which is there once `size_of(received)` is not 0. Throws CommandEnded
+  // when it ends before, InputError when it takes longer than `patience`, or says more than `max_bytes`; of no use from
+  // then on. Throws NeverStarted when it ended without a word in the way in which a shell says that there is no such
+  // command.
   std::string ask(std::string_view request, const std::function<size_t(std::string_view)>& size_of, size_t max_bytes,
                   std::chrono::milliseconds patience);
 

@@ -42,6 +42,8 @@ inline Matrix6d axis_covariance(double position_sd, double rotation_sd) {
 // acceleration that lasts (Bar-Shalom, Li and Kirubarajan, 2001, section 6.2.2).
 class VelocityFilter {
  public:
+  VelocityFilter() = default;
+  VelocityFilter(const Vector6d& velocity, const Matrix6d& covariance) : velocity_(velocity), covariance_(covariance) {}
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second.
   const Vector6d& velocity() const { return velocity_; }
   // The same `after` seconds without a pose, of which it was told `since` already.
@@ -49,6 +51,8 @@ class VelocityFilter {
     const auto change = [](double t) { return axis_covariance(velocity_change_sd(t), kAngularAccelerationSd * t); };
     return covariance_ + change(after) - change(since);
   }
+  // `seconds` pass of which nothing is told.
+  void go_on(double seconds) { covariance_ = covariance(0, seconds); }
   // A velocity was measured over `seconds`.
   void update(const Vector6d& measured, const Matrix6d& measured_covariance, double seconds) {
     const Matrix6d predicted = covariance(0, seconds);
@@ -57,7 +61,6 @@ class VelocityFilter {
     covariance_ = predicted - gain * predicted;
     covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
   }
-  void set(const Vector6d& velocity, const Matrix6d& covariance) { velocity_ = velocity, covariance_ = covariance; }
 
  private:
   Vector6d velocity_ = Vector6d::Zero();

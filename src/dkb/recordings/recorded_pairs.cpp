@@ -69,7 +69,7 @@ std::string RecordedPairs::Decoder::mismatch(const StampPairing::Pair& pair) con
 std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pair& pair) const {
   const auto checked = [](const Channel& channel, const StampPairing::Stored& message) {
     RecordedImage image = channel.read(message);
-    const std::string wrong = size_mismatch(image.name, image.width, image.height, channel.camera);
+    const std::string wrong = size_change(image.name, image.width, image.height, channel.camera);
     if (image.content == channel.topic.content && !wrong.empty()) throw InputError(wrong);
     return image;
   };

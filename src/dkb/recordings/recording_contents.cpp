@@ -194,7 +194,8 @@ class Chooser {
       return picked;
     }
     if (topics.size() == 1) return topics.begin()->first;
-    if (asked && topics.empty()) throw InputError(name_ + ": --prior: has no " + kind);
+    if (asked && topics.empty())
+      throw InputError(name_ + ": has no " + kind + "; leave --prior out, or give --prior-file FILE");
     if (topics.empty()) return "";
     const std::string several =
         name_ + ": has several topics of " + kind + ": " + names_of(topics) + "; pick one with " + option;

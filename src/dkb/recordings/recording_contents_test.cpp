@@ -314,7 +314,8 @@ TEST_F(MotionOfARecording, OfAnInertialUnitThatIsLinkedGoesBeforeOdometryThatIsN
 }
 
 TEST_F(MotionOfARecording, ThatWasAskedForMustBeThere) {
-  EXPECT_EQ(refused(list, with(PriorKind::imu)), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
+  EXPECT_EQ(refused(list, with(PriorKind::imu)),
+            "r.bag: has no sensor_msgs/Imu with angular rates; leave --prior out, or give --prior-file FILE");
   list.add("/wheels", "nav_msgs/Odometry", kFirst, odometry);
   const std::string several =
       "r.bag: has several topics of nav_msgs/Odometry: /odom, /wheels; pick one with --odom-topic";
@@ -353,7 +354,8 @@ TEST(RecordingContents, AnInertialUnitWithoutAGyroscopeIsNoMotion) {
   options.imu_topic = "/accel";
   EXPECT_EQ(refused(list, options), "--imu-topic /accel: tells no angular rates (covariance -1); pick another");
   options.imu_topic = "", options.prior = PriorKind::imu;
-  EXPECT_EQ(refused(list, options), "r.bag: --prior: has no sensor_msgs/Imu with angular rates");
+  EXPECT_EQ(refused(list, options),
+            "r.bag: has no sensor_msgs/Imu with angular rates; leave --prior out, or give --prior-file FILE");
   imu.angular_velocity_covariance[0] = 0;
   list.add("/gyro", "sensor_msgs/Imu", kFirst, imu);
   EXPECT_EQ(contents_of(list).motion->name, "/gyro");

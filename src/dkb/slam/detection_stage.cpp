@@ -18,12 +18,13 @@ bool finite(const Box& b) {
 
 }  // namespace
 
-std::string make_fit(Detections& detections, int width, int height) {
+Misfit make_fit(Detections& detections, int width, int height) {
+  const bool said_something = !detections.boxes.empty() || !detections.mask.empty();
   std::string wrong;
   std::erase_if(detections.boxes, [&](Detection& d) {
     const Box inside = finite(d.box) ? clip(d.box, width, height) : Box{};
     if (!(inside.w > 0 && inside.h > 0)) {
-      wrong = "a box lies outside the image; it is left out";
+      wrong = "a box lies outside the image; give left, top, width and height in pixels of the image";
       return true;
     }
     d.box = inside;
@@ -32,10 +33,10 @@ std::string make_fit(Detections& detections, int width, int height) {
   if (!detections.mask.empty() && (detections.mask.width() != width || detections.mask.height() != height)) {
     wrong = "a mask is of " + std::to_string(detections.mask.width()) + " x " +
             std::to_string(detections.mask.height()) + " px, the images of " + std::to_string(width) + " x " +
-            std::to_string(height) + "; it is left out";
+            std::to_string(height) + "; scale it to the image";
     detections.mask = {};
   }
-  return wrong;
+  return {wrong, said_something && detections.boxes.empty() && detections.mask.empty()};
 }
 
 std::string DetectorFailures::told(const std::string& what) {
@@ -69,7 +70,11 @@ Detections asked(Detector& detector, const Frame& frame, int width, int height, 
     warning = failures.failed(what_was_thrown());
     return {};
   }
-  warning = failures.answered(make_fit(found, width, height));
+  const Misfit misfit = make_fit(found, width, height);
+  if (misfit.nothing_left)
+    warning = failures.failed(misfit.what);
+  else
+    warning = failures.answered(misfit.what.empty() ? "" : misfit.what + "; it is left out");
   return found;
 }
 

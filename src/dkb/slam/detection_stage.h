@@ -104,12 +104,18 @@ class DetectionStage {
   DueStage<Task, Answer> stage_;  // last: its thread uses the above
 };
 
-// What the detector says of a frame, as far as it fits the image; nothing when it fails or is given up. `warning`
-// becomes what to tell people after the detector's name, if anything.
+// What the detector says of a frame, as far as it fits the image; nothing when it fails, which an answer does of which
+// nothing fits, or is given up. `warning` becomes what to tell people after the detector's name, if anything.
 Detections asked(Detector& detector, const Frame& frame, int width, int height, DetectorFailures& failures,
                  std::string& warning);
 
-// Takes what lies outside the image out of `detections`, and a mask of another size; what was wrong, or nothing.
-std::string make_fit(Detections& detections, int width, int height);
+// What did not fit the image in a detector's answer.
+struct Misfit {
+  std::string what;           // with the remedy; empty = all fits
+  bool nothing_left = false;  // of an answer that said something: it is none, not that nobody is there
+};
+
+// Takes what lies outside the image out of `detections`, and a mask of another size.
+Misfit make_fit(Detections& detections, int width, int height);
 
 }  // namespace dkb

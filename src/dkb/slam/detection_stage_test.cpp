@@ -278,18 +278,52 @@ TEST(DetectionStage, WhatDoesNotFitTheImageIsLeftOutWithAWarning) {
   EXPECT_TRUE(due[0].detections.mask.empty());
   const auto warnings = stage->take_warnings();
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_EQ(warnings[0], "the detector: a mask is of 320 x 240 px, the images of 640 x 480; it is left out");
+  EXPECT_EQ(warnings[0],
+            "the detector: a mask is of 320 x 240 px, the images of 640 x 480; scale it to the image; it is left out");
+  EXPECT_FALSE(stage->failing());
+}
+
+// Else it would count as "nobody is there", and people would get into the map.
+TEST(DetectionStage, AnAnswerOfWhichNothingFitsIsAFailure) {
+  Detections mask, boxes;
+  mask.mask = GreyImage(320, 240, 255);
+  boxes.boxes = {{"person", {700, 20, 30, 40}, 1}, {"person", {20, 500, 30, 40}, 1}};
+  for (const auto& [answer, cause] :
+       {std::pair{mask, "a mask is of 320 x 240 px, the images of 640 x 480; scale it to the image"},
+        std::pair{boxes, "a box lies outside the image; give left, top, width and height in pixels of the image"}}) {
+    FixedDetector detector(answer);
+    const auto stage = stage_of(detector, {.every = 1, .latency = 0}, {.threaded = false});
+    for (FrameIndex frame = 0; frame < 9; ++frame) exchange(*stage, frame, frame_at(frame));
+    EXPECT_TRUE(stage->failing());
+    EXPECT_FALSE(stage->failed());
+    exchange(*stage, 9, frame_at(9));
+    EXPECT_TRUE(stage->failed());
+    const auto warnings = stage->take_warnings();
+    ASSERT_EQ(warnings.size(), 2u);
+    EXPECT_EQ(warnings[0], std::string("the detector failed: ") + cause);
+    EXPECT_EQ(warnings[1], std::string("the detector failed 10 times in a row: ") + cause + "; it is not asked again");
+  }
+}
+
+TEST(DetectionStage, NobodyThereIsAnAnswer) {
+  FixedDetector detector({});
+  const auto stage = stage_of(detector, {.every = 1, .latency = 0}, {.threaded = false});
+  exchange(*stage, 0, frame_at(0));
+  EXPECT_FALSE(stage->failing());
+  EXPECT_TRUE(stage->take_warnings().empty());
 }
 
 TEST(MakeFit, SaysNothingOfWhatFits) {
   Detections found;
   found.boxes = {{"person", {0, 0, 640, 480}, 1}, {"dog", {600, 400, 100, 100}, 1}};
   found.mask = GreyImage(640, 480);
-  EXPECT_EQ(make_fit(found, 640, 480), "");
+  EXPECT_EQ(make_fit(found, 640, 480).what, "");
   EXPECT_EQ(found.boxes.size(), 2u);
   EXPECT_FALSE(found.mask.empty());
   found.boxes.push_back({"ghost", {0, -10, 5, 10}, 1});
-  EXPECT_EQ(make_fit(found, 640, 480), "a box lies outside the image; it is left out");
+  const Misfit misfit = make_fit(found, 640, 480);
+  EXPECT_EQ(misfit.what, "a box lies outside the image; give left, top, width and height in pixels of the image");
+  EXPECT_FALSE(misfit.nothing_left);
   EXPECT_EQ(found.boxes.size(), 2u);
 }
 

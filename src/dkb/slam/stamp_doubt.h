@@ -39,7 +39,7 @@ class StampDoubt {
     std::ostringstream text;
     text << std::setprecision(2) << "the stamps of the first frames are " << median << " s apart in the median, and "
          << (told_ ? "the camera gives " : "cameras give about ") << rate_
-         << " frames a second; stamps must be in nanoseconds";
+         << " frames a second; stamps must be in nanoseconds, those of a folder's lists in seconds";
     return text.str();
   }
 

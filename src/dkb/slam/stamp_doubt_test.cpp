@@ -18,7 +18,7 @@ std::string told(double rate, int64_t interval_ns) {
 TEST(StampDoubt, ToldOnceOfStampsInAnotherUnit) {
   EXPECT_EQ(told(30, 33'333),
             "30: the stamps of the first frames are 3.3e-05 s apart in the median, and the camera gives 30 frames a "
-            "second; stamps must be in nanoseconds");
+            "second; stamps must be in nanoseconds, those of a folder's lists in seconds");
   EXPECT_NE(told(30, 33), "") << "milliseconds";
   EXPECT_NE(told(30, 33'333'333'000), "") << "a thousand too many";
   EXPECT_NE(told(0, 33'333).find("cameras give about 30"), std::string::npos);

@@ -95,13 +95,8 @@ int Tracker::reference_point_count(KeyframeId reference) const {
   return count;
 }
 
-void Tracker::forget_velocity() {
-  velocity_.reset();
-  filter_ = {};
-}
-
 void Tracker::reset_motion() {
-  forget_velocity();
+  velocity_.reset();
   last_.reset();
   odometry_.clear();
   place_evidence_.clear();
@@ -134,7 +129,9 @@ PoseEstimate Tracker::refine(const Rigid3& initial, const std::vector<Pair>& pai
   const PosePrior prior{expected->cam_from_world, inverse(expected->covariance)};
   const PoseEstimate estimate = optimise_pose(optics_.camera, initial, observations, {}, &prior);
   if (!expected->told || !estimate.by_observations || expected->allows(*estimate.by_observations)) return estimate;
-  return optimise_pose(optics_.camera, initial, observations);
+  PoseEstimate alone = optimise_pose(optics_.camera, initial, observations);
+  if (alone.ok) alone.by_observations = {alone.cam_from_world, inverse(alone.covariance)};
+  return alone;
 }
 
 double Tracker::squared_error(const Pair& pair, const Rigid3& cam_from_world, const RgbdFeatures& features) const {
@@ -333,9 +330,23 @@ void Tracker::finish(TrackedFrame& frame) {
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(reference).inverse();
 }
 
-Vector6d Tracker::velocity_to(const PosedFrame& frame) const {
-  const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
-  return tangent_from_rigid3(step) / (frame.timestamp - last_->timestamp);
+// The velocity with the step to `frame` taken along. Over a short interval the step tells next to nothing of it.
+VelocityFilter Tracker::velocity_by(const TrackedFrame& frame) const {
+  VelocityFilter filter = velocity_.value_or(VelocityFilter{});
+  // After a stretch without images the step holds what the prior was off by as well: its own velocity is better.
+  if (last_->state == TrackingState::predicted) return filter;
+  const double seconds = frame.timestamp - last_->timestamp;
+  // What was predicted comes of this filter: it measures nothing.
+  const bool expected = frame.predicted && frame.predicted->weighs;
+  if (expected && !frame.by_observations) {
+    filter.go_on(seconds);
+    return filter;
+  }
+  const Rigid3& pose = expected ? frame.by_observations->cam_from_world : frame.cam_from_world;
+  const Matrix6d covariance = expected ? inverse(frame.by_observations->information) : frame.covariance;
+  filter.update(tangent_from_rigid3(pose * last_->cam_from_world.inverse()) / seconds,
+                (covariance + last_->covariance) / (seconds * seconds), seconds);
+  return filter;
 }
 
 // Features and pose as they are when the camera's motion within the image is known. The frame keeps what it has when
@@ -426,6 +437,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     // At once where it was expected, or where it is but a step from the frame before, if that one was seen; else when
     // the next frame agrees.
     const bool near = last_ && last_->index + 1 == frame.index && state_ == TrackingState::tracking &&
+                      frame.timestamp - last_->timestamp <= kEvenMotion &&
                       plausible_motion(frame.cam_from_world, frame.timestamp);
     followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world));
     found_again = followed;
@@ -459,20 +471,16 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   unconfirmed_.reset();
   place_evidence_.clear();
   if (!last_ || frame.timestamp <= last_->timestamp) {
-    forget_velocity();
+    velocity_.reset();
   } else {
-    // The step just made tells the velocity half a frame ago; a share of its change since the step before brings it to
-    // now. The full half would carry the noise of both steps into every feature.
-    // After a stretch without images the step holds what the prior was off by as well: its own velocity is better.
-    const bool seen_before = last_->state != TrackingState::predicted;
-    const Vector6d step = seen_before || !velocity_ ? velocity_to(frame) : *velocity_;
-    const Vector6d before = velocity_.value_or(step);
-    if (input.start != nullptr && last_->starts_map) remake_start(input.start->at(step), frame);
-    refine_at_velocity(step + kAccelerationShare * (step - before), input.features, frame);
-    if (seen_before && input.movers) leave_out_mover(input.features, frame);
-    velocity_ = seen_before ? velocity_to(frame) : step;
-    const double seconds = frame.timestamp - last_->timestamp;
-    if (seen_before) filter_.update(*velocity_, (frame.covariance + last_->covariance) / (seconds * seconds), seconds);
+    // The step just made tells the velocity half a frame ago; a share of its change brings it to now. The full half
+    // would carry the noise of both steps into every feature.
+    const Vector6d now = velocity_by(frame).velocity();
+    const Vector6d change = velocity_ ? Vector6d(now - velocity_->velocity()) : Vector6d::Zero();
+    if (input.start != nullptr && last_->starts_map) remake_start(input.start->at(now), frame);
+    refine_at_velocity(now + kAccelerationShare * change, input.features, frame);
+    if (last_->state != TrackingState::predicted && input.movers) leave_out_mover(input.features, frame);
+    velocity_ = velocity_by(frame);
   }
   drop_unmatched_suspects(frame);
   finish(frame);

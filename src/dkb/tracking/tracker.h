@@ -53,7 +53,7 @@ class Tracker {
   // Nothing without a last frame.
   std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
-  Vector6d velocity() const { return velocity_.value_or(Vector6d::Zero()); }
+  Vector6d velocity() const { return velocity_ ? velocity_->velocity() : Vector6d(Vector6d::Zero()); }
 
   // The frame's features are made for the expected velocity, and again for the one that the first pose shows.
   TrackedFrame track(const TrackingInput& input);
@@ -110,7 +110,6 @@ class Tracker {
   PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
-  void forget_velocity();
   double reach_px(double radius, const Matrix6d& covariance) const;
   std::vector<double> widening_radii(const Matrix6d& covariance) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features) const;
@@ -124,7 +123,7 @@ class Tracker {
   bool is_retracted(PointId id) const;
   void refresh_candidates(const std::vector<PointId>& points, double now);
   std::vector<uint8_t> candidates_to_skip(const std::vector<PointId>& matched) const;
-  Vector6d velocity_to(const PosedFrame& frame) const;
+  VelocityFilter velocity_by(const TrackedFrame& frame) const;
   bool refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
   void leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const;
   void remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next);
@@ -149,8 +148,7 @@ class Tracker {
   OdometryPoints odometry_;                  // from the last frame
   PlaceEvidence place_evidence_;             // of the frames since the camera was lost
   std::optional<PosedFrame> unconfirmed_;    // where the frame before was found again, to be confirmed
-  std::optional<Vector6d> velocity_;         // [m/s, rad/s] tangent of now_cam_from_before_cam
-  VelocityFilter filter_;                    // of the same, with its covariance
+  std::optional<VelocityFilter> velocity_;   // nothing while nobody knows it
   double last_seen_ = 0;                     // [s] when the images told the pose last
   std::optional<PosePrediction> suggested_;  // by the user
   std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map

@@ -37,8 +37,9 @@ std::optional<MotionPrior> Tracker::expected_step(double timestamp, const Motion
   if (prior != nullptr && !prior->rotation_only) return *prior;
   MotionPrior step;
   const double seconds = timestamp - last_->timestamp;
-  step.previous_from_current = rigid3_from_tangent(filter_.velocity() * seconds).inverse();
-  step.covariance = seconds * seconds * filter_.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
+  const VelocityFilter filter = velocity_.value_or(VelocityFilter{});
+  step.previous_from_current = rigid3_from_tangent(filter.velocity() * seconds).inverse();
+  step.covariance = seconds * seconds * filter.covariance(last_->timestamp - last_seen_, timestamp - last_seen_);
   if (prior == nullptr) return step;
   // Nothing corrects the translation.
   const auto off = [](double t) { return position_change_sd(t) * position_change_sd(t); };
@@ -85,7 +86,7 @@ bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
 void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told,
                            TrackedFrame& frame) {
   if (!prediction) {
-    forget_velocity();
+    velocity_.reset();
     if (state_ != TrackingState::initialising) state_ = TrackingState::lost;
     frame.state = state_;
     return;
@@ -96,9 +97,8 @@ void Tracker::go_on_unseen(const std::optional<PosePrediction>& prediction, cons
   frame.reference = last_->reference;
   frame.cam_from_reference = frame.cam_from_world * map_.cam_from_world(frame.reference).inverse();
   const Rigid3 step = frame.cam_from_world * last_->cam_from_world.inverse();
-  velocity_ = velocity_to(frame);
   const double seconds = frame.timestamp - last_->timestamp;
-  filter_.set(*velocity_, told->covariance / (seconds * seconds));
+  velocity_ = VelocityFilter(tangent_from_rigid3(step) / seconds, told->covariance / (seconds * seconds));
   // What was seen last is still what the camera may see next.
   last_->seen_cam_from_cam = last_->seen_cam_from_cam * step.inverse();
   last_->index = frame.index;

@@ -50,7 +50,7 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   }
   drop_unmatched_suspects(frame);
   candidates_made_.reset();
-  if (expected == nullptr) forget_velocity();
+  if (expected == nullptr) velocity_.reset();
   return true;
 }
 

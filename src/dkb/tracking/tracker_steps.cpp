@@ -60,8 +60,9 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   if (input.step != nullptr)
     fit = fit_near(input.step->previous_from_current.inverse() * last_->cam_from_world, radius);
   if (!fit && velocity_)
-    fit = fit_near(rigid3_from_tangent(*velocity_ * (frame.timestamp - last_->timestamp)) * last_->cam_from_world,
-                   radius);
+    fit = fit_near(
+        rigid3_from_tangent(velocity_->velocity() * (frame.timestamp - last_->timestamp)) * last_->cam_from_world,
+        radius);
   const auto surface = [&](const PlaceFit& of) {
     double sum = 0;
     for (PointId id : of.points)
@@ -124,7 +125,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   // So are some of the points that are followed from frame to frame: those that fit are the room's.
   const auto followed =
       std::exchange(by_still.odometry, std::vector<std::optional<OdometryMatch>>(frame.odometry.size()));
-  if (!refine_at_velocity(velocity_to(frame), features, by_still)) return;
+  if (!refine_at_velocity(velocity_by(frame).velocity(), features, by_still)) return;
   for (size_t f = 0; f < followed.size(); ++f) {
     if (!followed[f]) continue;
     const Pair pair = odometry_pair(static_cast<int>(f), *followed[f], by_still.cam_from_world);
