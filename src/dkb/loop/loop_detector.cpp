@@ -29,9 +29,6 @@ constexpr double kDriftTranslationShare = 0.08;  // of the path's length
 constexpr double kDriftRotationBase = 8;         // [deg]
 constexpr double kDriftRotationPerMetre = 1.5;   // [deg/m]
 constexpr double kMaxDriftRotation = 30;         // [deg] however long the path is
-// And what both can be off by, over the standard deviations that they know of: three, of covariances that are too small
-// by a factor of seven (NEES, docs/benchmarks.md). True loops of `building` are off by 2.5.
-constexpr double kDriftOverKnown = 8;
 
 // Between maps that are not joined there is no path, and appearance alone decides.
 constexpr int kMergeMinInliers = 80;
@@ -130,24 +127,13 @@ std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from, c
   return paths;
 }
 
-DriftBound drift_bound(const Map& map, KeyframeId from, KeyframeId to, const PathThroughMap& path) {
+DriftBound drift_bound(const PathThroughMap& path) {
   const double turned_sd = std::sqrt(path.rotation_variance);
   const double moved_sd = std::hypot(std::sqrt(path.position_variance), turned_sd * path.length);
   DriftBound bound;
   bound.translation = kDriftTranslationBase + kDriftTranslationShare * path.length + 3 * moved_sd;
   bound.rotation =
       std::min(kDriftRotationBase + kDriftRotationPerMetre * path.length, kMaxDriftRotation) + kDegrees * 3 * turned_sd;
-  Matrix6d known = Matrix6d::Zero();
-  for (const Keyframe* k : {map.keyframe(from), map.keyframe(to)}) {
-    // Where a map was loaded nobody knows what it is off by.
-    if (k->frame < 0 || (k->parent != kNoKeyframe && k->covariance.isZero(0))) return bound;
-    known += k->covariance;
-  }
-  bound.translation = std::min(
-      bound.translation, kDriftTranslationBase + kDriftOverKnown * std::sqrt(known.topLeftCorner<3, 3>().trace()));
-  bound.rotation =
-      std::min(bound.rotation,
-               kDriftRotationBase + kDegrees * kDriftOverKnown * std::sqrt(known.bottomRightCorner<3, 3>().trace()));
   return bound;
 }
 
@@ -189,7 +175,7 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
     if (!located) continue;
     if (!merge) {
       if (paths.empty()) paths = paths_through_map(map, id, candidates);
-      const DriftBound drift = drift_bound(map, id, far, paths[static_cast<size_t>(far)]);
+      const DriftBound drift = drift_bound(paths[static_cast<size_t>(far)]);
       const double shift = (centre_in_world(located->cam_from_world) - centre_in_world(newest->cam_from_world)).norm();
       const double rotation =
           kDegrees *

@@ -32,13 +32,12 @@ struct PathThroughMap {
 // others is no less than it should be.
 std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from, const std::vector<KeyframeId>& to = {});
 
-// The most that the way from one keyframe to another may be off by: by its length, and by the covariances of both where
-// they are known.
+// The most that a way may be off by.
 struct DriftBound {
   double translation = 0;  // [m]
   double rotation = 0;     // [deg]
 };
-DriftBound drift_bound(const Map& map, KeyframeId from, KeyframeId to, const PathThroughMap& path);
+DriftBound drift_bound(const PathThroughMap& path);
 
 // Does keyframe `id` show a place that the map knows, but does not know to be the same? Candidates are the keyframes
 // that look most like it (PlaceIndex), its neighbours apart. Each is verified as a camera that was lost is found: a

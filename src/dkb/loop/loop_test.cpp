@@ -381,23 +381,12 @@ TEST(LoopDetection, ALookAlikeRoomIsNotTheSameRoom) {
   EXPECT_GT(deceived, 0) << "by looks alone it would be";
 }
 
-// After 200 m nearly any pose could be explained by the length of the way.
-TEST(LoopDetection, ALongWayIsNotOffByMoreThanWhatIsKnownOfIt) {
-  Twins world;
+// After 200 m any rotation could be explained by the length of the way.
+TEST(LoopDetection, ALongWayDoesNotExplainAnyRotation) {
   PathThroughMap path;
   path.length = 200;
-  const DriftBound by_length = drift_bound(world.map, 30, 0, path);
-  EXPECT_NEAR(by_length.translation, 0.2 + 0.08 * 200, 1e-9);
-  EXPECT_NEAR(by_length.rotation, 30, 1e-9);
-  world.map.set_covariance(30, axis_covariance(0.1, 0.01));
-  const DriftBound known = drift_bound(world.map, 30, 0, path);
-  EXPECT_NEAR(known.translation, 0.2 + 8 * std::sqrt(3) * 0.1, 1e-9);
-  EXPECT_NEAR(known.rotation, 8 + 8 * std::sqrt(3) * 0.01 * 180 / M_PI, 1e-9);
-  path.length = 1;
-  EXPECT_NEAR(drift_bound(world.map, 30, 0, path).translation, 0.28, 1e-9) << "a short way still says more";
-  path.length = 200;
-  world.map.date_back();  // to an earlier session
-  EXPECT_EQ(drift_bound(world.map, 30, 0, path).translation, by_length.translation);
+  EXPECT_NEAR(drift_bound(path).translation, 0.2 + 0.08 * 200, 1e-9);
+  EXPECT_NEAR(drift_bound(path).rotation, 30, 1e-9);
 }
 
 TEST(LoopDetection, WaysLeadThroughTheMap) {
