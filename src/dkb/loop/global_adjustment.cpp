@@ -17,7 +17,6 @@ namespace {
 std::vector<KeyframeId> keyframes_around(const Map& map, const std::vector<KeyframeId>& places,
                                          size_t most_neighbours) {
   std::vector<KeyframeId> taken;
-  const std::vector<std::vector<KeyframeId>> children = map.children_of_each();
   std::vector<KeyframeId> starts = map.live_keyframes();
   std::reverse(starts.begin(), starts.end());
 
@@ -44,9 +43,9 @@ std::vector<KeyframeId> keyframes_around(const Map& map, const std::vector<Keyfr
       const Keyframe& k = *map.keyframe(id);
       for (const Covisible& c : k.covisible) take(c.keyframe);
       if (k.motion) take(k.motion->previous);
-      take(map.moved_on_from(id));
+      for (KeyframeId next_one : k.followers) take(next_one);
       take(k.parent);
-      for (KeyframeId child : children[static_cast<size_t>(id)]) take(child);
+      for (KeyframeId child : k.children) take(child);
     }
   }
   std::sort(taken.begin(), taken.end());
@@ -62,7 +61,8 @@ std::vector<uint8_t> those_that_stay(const Map& map, const std::vector<KeyframeI
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
     fixed.push_back(
-        k.parent == kNoKeyframe || (k.motion && left_out(k.motion->previous)) || left_out(map.moved_on_from(id)) ||
+        k.parent == kNoKeyframe || (k.motion && left_out(k.motion->previous)) ||
+        std::any_of(k.followers.begin(), k.followers.end(), left_out) ||
         std::any_of(k.covisible.begin(), k.covisible.end(), [&](const Covisible& c) { return left_out(c.keyframe); }));
   }
   if (std::find(fixed.begin(), fixed.end(), 1) == fixed.end()) fixed.front() = 1;

@@ -11,29 +11,12 @@
 namespace dkb {
 namespace {
 
-constexpr int kEssentialSharedPoints = 100;  // [points] shared by two keyframes whose relative pose is an edge
-// Standard deviation of an edge: what tracking drifts over its length and turn, images of a turning camera being
-// sheared.
-constexpr double kEdgePositionSd = 0.005;      // [m]
-constexpr double kEdgePositionShare = 0.01;    // of the edge's length
-constexpr double kEdgeRotationSd = 0.002;      // [rad]
-constexpr double kEdgeRotationGrowth = 0.004;  // [rad/m]
-constexpr double kEdgeRotationShare = 0.02;    // of the edge's rotation
-
 PoseEdge graph_edge(int a, int b, const Rigid3& b_from_a, int shared_points) {
   PoseEdge e;
   e.a = a;
   e.b = b;
   e.b_from_a = b_from_a;
-  const double length = b_from_a.translation.norm();
-  const double position = kEdgePositionSd + kEdgePositionShare * length;
-  const double rotation = kEdgeRotationSd + kEdgeRotationGrowth * length +
-                          kEdgeRotationShare * vector_from_rotation(b_from_a.rotation).norm();
-  // Keyframes that share many points hang together firmly.
-  const double share = std::clamp(shared_points / static_cast<double>(kEssentialSharedPoints), 0.1, 4.0);
-  e.information.setZero();
-  e.information.diagonal().head<3>().setConstant(share / (position * position));
-  e.information.diagonal().tail<3>().setConstant(share / (rotation * rotation));
+  e.information = edge_covariance(b_from_a, shared_points).diagonal().cwiseInverse().asDiagonal();
   return e;
 }
 

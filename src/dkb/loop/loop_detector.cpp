@@ -24,9 +24,11 @@ constexpr double kMaxSupportTranslation = 0.08;  // [m] by which they may differ
 constexpr double kMaxSupportRotation = 3;        // [deg]
 
 // What can have drifted along the shortest path through the map from the one keyframe to the other.
+constexpr double kDriftTranslationBase = 0.2;    // [m]
 constexpr double kDriftTranslationShare = 0.08;  // of the path's length
 constexpr double kDriftRotationBase = 8;         // [deg]
 constexpr double kDriftRotationPerMetre = 1.5;   // [deg/m]
+constexpr double kMaxDriftRotation = 30;         // [deg] however long the path is
 
 // Between maps that are not joined there is no path, and appearance alone decides.
 constexpr int kMergeMinInliers = 80;
@@ -90,20 +92,21 @@ std::vector<uint8_t> neighbourhood_of(const Map& map, KeyframeId id) {
 
 }  // namespace
 
-std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
+std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from, const std::vector<KeyframeId>& to) {
   const auto count = static_cast<size_t>(map.keyframe_count());
   std::vector<PathThroughMap> paths(count);
-  const std::vector<std::vector<KeyframeId>> children = map.children_of_each();
   using Entry = std::pair<double, KeyframeId>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   paths[static_cast<size_t>(from)].length = 0;
   open.emplace(0.0, from);
+  size_t wanted = to.size();
   while (!open.empty()) {
     const double path_length = open.top().first;
     const KeyframeId at = open.top().second;
     open.pop();
     const PathThroughMap path = paths[static_cast<size_t>(at)];
     if (path_length > path.length) continue;
+    if (std::find(to.begin(), to.end(), at) != to.end() && --wanted == 0) break;
     const Keyframe& k = *map.keyframe(at);
     const Eigen::Vector3d centre = centre_in_world(k.cam_from_world);
     const auto go = [&](KeyframeId next, const KeyframeMotion* motion) {
@@ -118,10 +121,20 @@ std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from) {
       open.emplace(there, next);
     };
     for (const Covisible& c : k.covisible) go(c.keyframe, nullptr);
-    for (KeyframeId child : children[static_cast<size_t>(at)]) go(child, motion_between(map, child, at));
+    for (KeyframeId child : k.children) go(child, motion_between(map, child, at));
     if (k.parent != kNoKeyframe) go(k.parent, motion_between(map, k.parent, at));
   }
   return paths;
+}
+
+DriftBound drift_bound(const PathThroughMap& path) {
+  const double turned_sd = std::sqrt(path.rotation_variance);
+  const double moved_sd = std::hypot(std::sqrt(path.position_variance), turned_sd * path.length);
+  DriftBound bound;
+  bound.translation = kDriftTranslationBase + kDriftTranslationShare * path.length + 3 * moved_sd;
+  bound.rotation =
+      std::min(kDriftRotationBase + kDriftRotationPerMetre * path.length, kMaxDriftRotation) + kDegrees * 3 * turned_sd;
+  return bound;
 }
 
 std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics& optics, const LoopOptions& options,
@@ -161,17 +174,13 @@ std::optional<LoopFinding> find_loop(const Map& map, KeyframeId id, const Optics
                            {.min_inliers = kMinPlaceMatches, .seed = seed + static_cast<uint64_t>(id)});
     if (!located) continue;
     if (!merge) {
-      if (paths.empty()) paths = paths_through_map(map, id);
-      const PathThroughMap& path = paths[static_cast<size_t>(far)];
-      const double turned_sd = std::sqrt(path.rotation_variance);
-      const double moved_sd = std::hypot(std::sqrt(path.position_variance), turned_sd * path.length);
+      if (paths.empty()) paths = paths_through_map(map, id, candidates);
+      const DriftBound drift = drift_bound(paths[static_cast<size_t>(far)]);
       const double shift = (centre_in_world(located->cam_from_world) - centre_in_world(newest->cam_from_world)).norm();
       const double rotation =
           kDegrees *
           vector_from_rotation(located->cam_from_world.rotation.conjugate() * newest->cam_from_world.rotation).norm();
-      if (shift > options.drift_translation_base + kDriftTranslationShare * path.length + 3 * moved_sd ||
-          rotation > kDriftRotationBase + kDriftRotationPerMetre * path.length + kDegrees * 3 * turned_sd)
-        continue;
+      if (shift > drift.translation || rotation > drift.rotation) continue;
     }
     const auto fit = fit_by_projection(area.points, *newest->features, optics, located->cam_from_world, kSearchRadii);
     if (!fit || fit->inliers < (merge ? kMergeMinInliers : options.min_inliers) ||

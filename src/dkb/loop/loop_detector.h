@@ -28,8 +28,16 @@ struct PathThroughMap {
   // [m^2, rad^2] in all axes together, of the motions that it takes where no points tie keyframes together.
   double position_variance = 0, rotation_variance = 0;
 };
-// From `from` to every keyframe.
-std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from);
+// From `from` to every keyframe, or as far as to those of `to`: it ends when each of them is reached. What it tells of
+// others is no less than it should be.
+std::vector<PathThroughMap> paths_through_map(const Map& map, KeyframeId from, const std::vector<KeyframeId>& to = {});
+
+// The most that a way may be off by.
+struct DriftBound {
+  double translation = 0;  // [m]
+  double rotation = 0;     // [deg]
+};
+DriftBound drift_bound(const PathThroughMap& path);
 
 // Does keyframe `id` show a place that the map knows, but does not know to be the same? Candidates are the keyframes
 // that look most like it (PlaceIndex), its neighbours apart. Each is verified as a camera that was lost is found: a

@@ -12,8 +12,6 @@ struct LoopOptions {
   bool enabled = true;
   int min_inliers = 50;  // map points that the refined pose rests on, >= 10
   int min_support = 2;   // keyframes around the newest one that must show the area just there as well, >= 0
-  // [m] what can have drifted without any path, >= 0; its growth with the path is the detector's.
-  double drift_translation_base = 0.2;
 };
 
 }  // namespace dkb

@@ -87,6 +87,7 @@ TEST(GlobalAdjustment, OfALargeMapTakesWhatIsAroundTheNewestKeyframeAndHoldsItsB
   EXPECT_EQ(moved.front(), last + 1 - static_cast<KeyframeId>(moved.size()));
   Map after = world.map;
   move_map(after, part);
+  EXPECT_EQ(after.keyframe(0), world.map.keyframe(0)) << "what stays is not copied";
   int of_the_border = 0;
   for (const MapCorrection::Position& p : part.positions) {
     of_the_border += birth_keyframe(p.point) < moved.front() && p.before != p.after;
@@ -354,7 +355,8 @@ TEST(LoopCorrection, WherePointsTieNothingTheWayBendsWhereTheMotionIsKnownWorst)
 // Two rooms with the same pictures, and a corridor with others between them.
 struct Twins : OdometryWorld {
   static constexpr double kPitch = 7;
-  Twins() : OdometryWorld(1500) {
+  // `apart`: what follows after so many keyframes is a map of its own.
+  explicit Twins(int apart = -1) : OdometryWorld(1500) {
     Random random(9);
     for (size_t i = 0; i < 500; ++i) {
       scene.points[i] = {random.uniform(-1.5, 2.5), random.uniform(-1.2, 1.2), random.uniform(2.0, 3.0)};
@@ -364,21 +366,27 @@ struct Twins : OdometryWorld {
     }
     for (int k = 0; k < 31; ++k) {
       const Rigid3 at = TestScene::camera_at({0.3 * k, 0, 0});
-      add(at, at);
+      add(at, at, k == apart);
     }
   }
 };
 
 TEST(LoopDetection, ALookAlikeRoomIsNotTheSameRoom) {
-  const Twins world;
-  LoopOptions credulous;
-  credulous.drift_translation_base = 100;
+  const Twins world, without_a_way(18);
   int deceived = 0;
   for (KeyframeId k = 0; k < world.map.keyframe_count(); ++k) {
     EXPECT_FALSE(find_loop(world.map, k, world.optics(), {}, 1)) << "keyframe " << k;
-    deceived += find_loop(world.map, k, world.optics(), credulous, 1).has_value();
+    deceived += find_loop(without_a_way.map, k, world.optics(), {}, 1).has_value();
   }
   EXPECT_GT(deceived, 0) << "by looks alone it would be";
+}
+
+// After 200 m any rotation could be explained by the length of the way.
+TEST(LoopDetection, ALongWayDoesNotExplainAnyRotation) {
+  PathThroughMap path;
+  path.length = 200;
+  EXPECT_NEAR(drift_bound(path).translation, 0.2 + 0.08 * 200, 1e-9);
+  EXPECT_NEAR(drift_bound(path).rotation, 30, 1e-9);
 }
 
 TEST(LoopDetection, WaysLeadThroughTheMap) {
@@ -388,6 +396,10 @@ TEST(LoopDetection, WaysLeadThroughTheMap) {
   EXPECT_NEAR(paths[0].length, 9, 1e-6);
   EXPECT_NEAR(paths[20].length, 3, 1e-6);
   EXPECT_EQ(paths[0].position_variance, 0) << "points tie all of it together";
+  const auto some = paths_through_map(world.map, 30, {20, 25});
+  EXPECT_EQ(some[20].length, paths[20].length);
+  EXPECT_EQ(some[25].length, paths[25].length);
+  EXPECT_TRUE(std::isinf(some[0].length)) << "nobody asked how far that is";
 }
 
 // Where nothing but a motion joins two keyframes, the way is as uncertain as the motion.

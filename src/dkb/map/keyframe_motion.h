@@ -21,4 +21,15 @@ struct KeyframeMotion {
   }
 };
 
+// How uncertain the relative pose of two keyframes of a map is that share so many points, [translation m, rotation
+// rad]: what tracking drifts over its length and turn, images of a turning camera being sheared. Keyframes that share
+// many points hang together firmly.
+Matrix6d edge_covariance(const Rigid3& b_from_a, int shared_points);
+
+// The pose of a keyframe beside its parent, with which it shared so many points, as a motion.
+MotionPrior ride_on(const Rigid3& cam_from_parent, int shared_points);
+
+// Two keyframes that share so many points hang together as any others do.
+inline constexpr int kEssentialSharedPoints = 100;
+
 }  // namespace dkb

@@ -14,6 +14,11 @@ bool shares_more(const Covisible& a, const Covisible& b) {
   return a.shared_points != b.shared_points ? a.shared_points > b.shared_points : a.keyframe < b.keyframe;
 }
 
+void enlist(std::vector<KeyframeId>& list, KeyframeId id) {
+  const auto at = std::lower_bound(list.begin(), list.end(), id);
+  if (at == list.end() || *at != id) list.insert(at, id);
+}
+
 void drop_covisible(std::vector<Covisible>& list, KeyframeId id) {
   std::erase_if(list, [id](const Covisible& c) { return c.keyframe == id; });
 }
@@ -78,6 +83,7 @@ Rigid3 Map::cam_from_world(KeyframeId id) const {
 KeyframeId Map::root(KeyframeId id) const {
   const Keyframe* k = keyframe(id);
   if (k == nullptr) throw std::logic_error("map: no keyframe " + std::to_string(id));
+  if (roots_.size() == 1) return roots_.front();
   while (k->parent != kNoKeyframe) k = keyframe(k->parent);
   return k->id;
 }
@@ -95,21 +101,6 @@ std::vector<KeyframeId> Map::root_of_each() const {
     for (KeyframeId k : path) roots[static_cast<size_t>(k)] = roots[static_cast<size_t>(at)];
   }
   return roots;
-}
-
-std::vector<KeyframeId> Map::roots() const {
-  std::vector<KeyframeId> ids;
-  for (const auto& k : keyframes_)
-    if (k.value->parent == kNoKeyframe) ids.push_back(k.value->id);
-  return ids;
-}
-
-std::vector<std::vector<KeyframeId>> Map::children_of_each() const {
-  std::vector<std::vector<KeyframeId>> children(keyframes_.size());
-  for (KeyframeId id : live_keyframes())
-    if (const KeyframeId parent = keyframe(id)->parent; parent != kNoKeyframe)
-      children[static_cast<size_t>(parent)].push_back(id);
-  return children;
 }
 
 std::vector<KeyframeId> Map::best_covisible(KeyframeId id, size_t most) const {
@@ -219,11 +210,34 @@ void Map::add_keyframe(Keyframe keyframe) {
   // Beyond that the place of a keyframe is found by those around it.
   if (!places_.full()) places_.add(id, keyframe.features->descriptors);
   keyframes_.push_back({std::make_shared<Keyframe>(std::move(keyframe)), epoch_.value()});
+  enter_tree(id);
   ++live_keyframe_count_;
   for (size_t i = 0; i < points.size(); ++i) {
     const PointId p = resolve(points[i]);
     if (p != kNoPoint) observe(p, id, static_cast<int>(i));
   }
+}
+
+// What the keyframe says of others is told to them.
+void Map::enter_tree(KeyframeId id) {
+  Keyframe& k = edit(id);
+  k.children.clear();
+  k.followers.clear();
+  if (k.parent == kNoKeyframe) enlist(roots_, id);
+  if (!k.culled && keyframe(k.parent) != nullptr) enlist(edit(k.parent).children, id);
+  if (k.motion && keyframe(k.motion->previous) != nullptr) enlist(edit(k.motion->previous).followers, id);
+}
+
+void Map::hang(KeyframeId id, KeyframeId parent) {
+  const KeyframeId before = std::exchange(edit(id).parent, parent);
+  std::erase(before == kNoKeyframe ? roots_ : edit(before).children, id);
+  enlist(parent == kNoKeyframe ? roots_ : edit(parent).children, id);
+}
+
+void Map::tell_motion(KeyframeId id, std::shared_ptr<const KeyframeMotion> motion) {
+  const auto before = std::exchange(edit(id).motion, motion);
+  if (before && keyframe(before->previous) != nullptr) std::erase(edit(before->previous).followers, id);
+  if (motion) enlist(edit(motion->previous).followers, id);
 }
 
 void Map::add_point(MapPoint point) {
@@ -343,30 +357,24 @@ void Map::set_parent(KeyframeId id, KeyframeId parent) {
   for (const Keyframe* k = keyframe(parent); k != nullptr; k = keyframe(k->parent))
     if (k->id == id)
       throw std::logic_error("map: keyframe " + std::to_string(id) + " cannot hang on its own descendant");
-  edit(id).parent = parent;
+  hang(id, parent);
 }
 
-KeyframeId Map::moved_on_from(KeyframeId id) const {
-  KeyframeId next = id + 1;
-  while (next < keyframe_count() && keyframe(next)->culled) ++next;
-  if (next >= keyframe_count() || !keyframe(next)->motion) return kNoKeyframe;
-  return keyframe(next)->motion->previous == id ? next : kNoKeyframe;
-}
-
-// What told of the way to this keyframe and from it tells of the way past it. Where nothing tells of the way to it, the
-// way from it begins at its parent, on which it rides: as when a keyframe comes whose motion began at a culled one.
+// What told of the way to this keyframe and from it tells of the way past it: of the first that follows, since what is
+// known of the way to it must not count twice. Others, and where nothing tells of the way to it, begin at its parent,
+// on which it rides: as when a keyframe comes whose motion began at a culled one.
 void Map::hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent) {
-  const std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
-  for (KeyframeId next = id + 1; next < keyframe_count(); ++next) {
-    const Keyframe& k = *keyframe(next);
-    if (k.culled || k.motion == nullptr || k.motion->previous != id) continue;
-    KeyframeMotion past{parent, k.motion->since};
-    if (before)
-      past = {before->previous, joined(before->since, past.since)};
-    else
-      past.since.previous_from_current = cam_from_parent.inverse() * past.since.previous_from_current;
+  std::shared_ptr<const KeyframeMotion> before = keyframe(id)->motion;
+  const MotionPrior since_parent = ride_on(cam_from_parent, points_shared_with(parent, keyframe(id)->covisible));
+  const std::vector<KeyframeId> followers = keyframe(id)->followers;
+  tell_motion(id, nullptr);
+  for (KeyframeId next : followers) {
+    const MotionPrior& since = keyframe(next)->motion->since;
+    const KeyframeMotion past = before ? KeyframeMotion{before->previous, joined(before->since, since)}
+                                       : KeyframeMotion{parent, joined(since_parent, since)};
+    before.reset();
     // Where two maps were joined a parent may be the younger one.
-    edit(next).motion = past.previous < next ? std::make_shared<const KeyframeMotion>(past) : nullptr;
+    tell_motion(next, past.previous < next ? std::make_shared<const KeyframeMotion>(past) : nullptr);
   }
 }
 
@@ -398,18 +406,18 @@ void Map::cull_keyframe(KeyframeId id) {
   for (PointId p : points)
     if (p != kNoPoint) forget(p, id);
   for (const Covisible& c : keyframe(id)->covisible) drop_covisible(edit(c.keyframe).covisible, id);
-  for (const auto& other : keyframes_)
-    if (!other.value->culled && other.value->parent == id) edit(other.value->id).parent = parent;
+  for (KeyframeId child : std::vector<KeyframeId>(keyframe(id)->children)) hang(child, parent);
   hand_on_motion(id, parent, cam_from_parent);
+  std::erase(edit(parent).children, id);
   Keyframe& me = edit(id);
   me.culled = true;
   me.cam_from_parent = cam_from_parent;
   me.features.reset();
   me.points = std::vector<PointId>();  // {} would keep the memory
   me.covisible = std::vector<Covisible>();
-  me.motion.reset();
   me.planes.reset();
   me.plane_of_patch = std::vector<PlaneId>();
+  me.children = me.followers = std::vector<KeyframeId>();
   --live_keyframe_count_;
   places_.remove(id);
 }

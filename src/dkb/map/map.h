@@ -62,7 +62,9 @@ struct Keyframe {
   std::vector<PointId> points;       // per feature; kNoPoint where it shows none
   std::vector<Covisible> covisible;  // by decreasing shared_points, then increasing id
   KeyframeId parent = kNoKeyframe;   // spanning tree; the first keyframe has none
-  Rigid3 cam_from_parent;            // frozen when culled: the pose then follows the parent
+  // Kept by the map, increasing: live keyframes that hang on it, and those whose motion is told since it.
+  std::vector<KeyframeId> children, followers;
+  Rigid3 cam_from_parent;  // frozen when culled: the pose then follows the parent
   bool culled = false;
   // Since the live keyframe made just before it; null where nothing tells of it.
   std::shared_ptr<const KeyframeMotion> motion;
@@ -110,17 +112,13 @@ class Map {
   std::vector<KeyframeId> live_keyframes() const;    // increasing
   std::vector<PointId> live_points() const;          // increasing
   std::vector<RemovedPoint> removed_points() const;  // by increasing id
-  // The live keyframe whose motion is told since this one; kNoKeyframe if there is none.
-  KeyframeId moved_on_from(KeyframeId id) const;
   // The plane that stands for this one since planes turned out to be the same; must exist.
   PlaneId plane(PlaneId id) const;
   // The keyframe at the top of the spanning tree: keyframes of one map have one root, which has no parent.
   KeyframeId root(KeyframeId id) const;  // must exist
   // Of all keyframes ever made: whoever asks for many walks no path twice.
   std::vector<KeyframeId> root_of_each() const;
-  std::vector<KeyframeId> roots() const;  // of the maps that are not joined, increasing
-  // Per keyframe ever made, the live ones that hang on it in the spanning tree, increasing.
-  std::vector<std::vector<KeyframeId>> children_of_each() const;
+  const std::vector<KeyframeId>& roots() const { return roots_; }  // of the maps that are not joined, increasing
   // Of the keyframes that share points with this one, which must exist, those that share most; `most` at most.
   std::vector<KeyframeId> best_covisible(KeyframeId id, size_t most) const;
   // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.
@@ -191,6 +189,9 @@ class Map {
   void add_live(MapPoint point);
   void add_gone(RemovedPoint point);
   void remove_point(PointId point, PointId replaced_by);
+  void hang(KeyframeId id, KeyframeId parent);
+  void tell_motion(KeyframeId id, std::shared_ptr<const KeyframeMotion> motion);
+  void enter_tree(KeyframeId id);
   void hand_on_motion(KeyframeId id, KeyframeId parent, const Rigid3& cam_from_parent);
   void check_keyframes() const;
   void check_forwarding() const;
@@ -200,6 +201,7 @@ class Map {
   std::vector<Shared<PointBlock>> blocks_;  // by birth keyframe
   std::vector<PlaneId> joined_to_;          // per plane; itself where it stands for itself
   PlaceIndex places_;                       // of the live keyframes
+  std::vector<KeyframeId> roots_;           // increasing
   size_t point_count_ = 0;
   int live_keyframe_count_ = 0;
 };

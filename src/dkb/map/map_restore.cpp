@@ -116,6 +116,7 @@ Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, 
     if (!k.culled && !map.places_.full()) map.places_.add(k.id, k.features->descriptors);
     map.keyframes_.push_back({std::make_shared<Keyframe>(std::move(k)), map.epoch_.value()});
   }
+  for (KeyframeId id = 0; id < count; ++id) map.enter_tree(id);
   PlaneId planes = 0;
   for (const auto& k : map.keyframes_)
     for (PlaneId p : k.value->plane_of_patch) planes = std::max(planes, p + 1);

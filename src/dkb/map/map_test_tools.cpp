@@ -121,6 +121,21 @@ std::string tree_broken(const Map& map) {
   const std::vector<KeyframeId> roots = map.root_of_each();
   for (KeyframeId id = 0; id < map.keyframe_count(); ++id)
     if (roots[static_cast<size_t>(id)] != map.root(id)) return "roots are told in two ways";
+  std::vector<KeyframeId> tops;
+  std::vector<std::vector<KeyframeId>> children(roots.size()), followers(roots.size());
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
+    const Keyframe& k = *map.keyframe(id);
+    if (k.parent == kNoKeyframe)
+      tops.push_back(id);
+    else if (!k.culled)
+      children[static_cast<size_t>(k.parent)].push_back(id);
+    if (k.motion) followers[static_cast<size_t>(k.motion->previous)].push_back(id);
+  }
+  if (tops != map.roots()) return "a root is not listed";
+  for (KeyframeId id = 0; id < map.keyframe_count(); ++id)
+    if (map.keyframe(id)->children != children[static_cast<size_t>(id)] ||
+        map.keyframe(id)->followers != followers[static_cast<size_t>(id)])
+      return "who hangs on a keyframe is told in two ways";
   if (live != map.live_keyframe_count() || static_cast<size_t>(live) != map.live_keyframes().size())
     return "live keyframes are counted wrongly";
   return "";

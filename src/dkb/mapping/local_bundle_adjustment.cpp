@@ -49,8 +49,9 @@ std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const 
 
   // A keyframe that a motion joins to the window holds it too, though they may share no point.
   for (KeyframeId k : keyframes) {
-    const auto& motion = map.keyframe(k)->motion;
-    for (const KeyframeId other : {motion ? motion->previous : kNoKeyframe, map.moved_on_from(k)})
+    std::vector<KeyframeId> joined_to = map.keyframe(k)->followers;
+    if (const auto& motion = map.keyframe(k)->motion) joined_to.insert(joined_to.begin(), motion->previous);
+    for (const KeyframeId other : joined_to)
       if (map.live_keyframe(other) != nullptr && !in_window(other) &&
           std::none_of(around.begin(), around.end(), [other](const Covisible& c) { return c.keyframe == other; }))
         around.push_back({other, 0});

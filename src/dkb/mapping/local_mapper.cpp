@@ -131,9 +131,10 @@ void LocalMapper::insert(const KeyframePacket& packet) {
   if (packet.motion && packet.reference != kNoKeyframe && map_.keyframe(packet.motion->previous) != nullptr &&
       map_.root(packet.motion->previous) == map_.root(packet.reference)) {
     const Map::Ancestor from = map_.live_ancestor(packet.motion->previous);
-    MotionPrior since = packet.motion->since;
-    since.previous_from_current = from.cam_from_ancestor.inverse() * since.previous_from_current;
-    k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{from.id, since});
+    const MotionPrior& since = packet.motion->since;
+    const bool rides = from.id != packet.motion->previous;
+    k.motion = std::make_shared<const KeyframeMotion>(KeyframeMotion{
+        from.id, rides ? joined(ride_on(from.cam_from_ancestor, kEssentialSharedPoints), since) : since});
   }
   // As uncertain as what it hangs on and the way from there, until adjustment knows better; where nothing ties it to
   // the map, it never does.

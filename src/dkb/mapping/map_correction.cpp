@@ -26,15 +26,17 @@ void move_map(Map& map, const MapCorrection& correction) {
   const bool adjusts = correction.kind == MapCorrection::Kind::adjustment;
   // How the world moves at each keyframe: new_world_from_old_world.
   std::vector<std::optional<Rigid3>> motion(count);
+  std::vector<uint8_t> done(count, 0);  // by 1: each is asked once, however long the way to a root
   for (const MapCorrection::Pose& p : correction.poses) {
     const Keyframe* k = map.live_keyframe(p.keyframe);
     if (k == nullptr) continue;
-    const Rigid3 after =
-        adjusts && !same(p.before, p.after) ? p.after : k->cam_from_world * p.before.inverse() * p.after;
+    // What an adjustment leaves where it was is not touched, nor what hangs on it.
+    done[static_cast<size_t>(p.keyframe)] = adjusts && same(p.before, p.after);
+    if (done[static_cast<size_t>(p.keyframe)]) continue;
+    const Rigid3 after = adjusts ? p.after : k->cam_from_world * p.before.inverse() * p.after;
     motion[static_cast<size_t>(p.keyframe)] = after.inverse() * k->cam_from_world;
   }
   // The others move as the nearest ancestor does that has a correction; trees without one stay.
-  std::vector<uint8_t> done(count, 0);  // each is asked once, however long the way to a root
   for (size_t k = 0; k < count; ++k) {
     std::vector<size_t> path;
     KeyframeId at = static_cast<KeyframeId>(k);
@@ -55,8 +57,8 @@ void move_map(Map& map, const MapCorrection& correction) {
     const MapPoint& p = *map.point(id);
     KeyframeId guide = birth_keyframe(id);
     if (map.live_keyframe(guide) == nullptr && !p.observations.empty()) guide = p.observations.front().keyframe;
-    if (!motion[static_cast<size_t>(guide)]) continue;
-    const Rigid3& moves = *motion[static_cast<size_t>(guide)];
+    if (!motion[static_cast<size_t>(guide)] && !(adjusts && own)) continue;
+    const Rigid3 moves = motion[static_cast<size_t>(guide)].value_or(Rigid3());
     MapPoint& moved = map.edit_point(id);
     if (own) {
       const MapCorrection::Position& c = correction.positions[next];

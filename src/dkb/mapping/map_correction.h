@@ -41,9 +41,9 @@ struct MapCorrection {
 // Moves keyframes and points of `map`, and hangs one tree on another where two maps merge. What mapping did since the
 // snapshot stays where a loop is closed or two maps merge: a keyframe's correction is applied on top of its present
 // pose. An adjustment takes its place: local adjustment relieved the same tension meanwhile, which on top of it would
-// count twice. What a correction leaves where it was stays as mapping has it by now. Keyframes made meanwhile follow
-// their parents in the spanning tree; points without a correction of their own follow the keyframe that they were born
-// at, or else the oldest that sees them. Ids that are gone by now are passed over. Deterministic.
+// count twice. What an adjustment leaves where it was stays as mapping has it by now, and is not copied. Keyframes made
+// meanwhile follow their parents in the spanning tree; points without a correction of their own follow the keyframe
+// that they were born at, or else the oldest that sees them. Ids that are gone by now are passed over. Deterministic.
 void move_map(Map& map, const MapCorrection& correction);
 
 }  // namespace dkb

@@ -26,6 +26,7 @@ LoopStage::LoopStage(const Optics& optics, const LoopStageOptions& options, cons
       search_(
           [this](const Task& task) {
             Result result;
+            result.generation = task.generation;
             const KeyframeId keyframe = task.keyframes.front();
             if (task.generation == closed_generation_) {  // the map is about to move
               if (!closer_.rests(keyframe)) result.skipped = keyframe;
@@ -68,10 +69,21 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;
   if (adjustment_wanted_ && adjustment_.outstanding() == 0 && !may_be_overtaken) {
-    adjustment_.push({view, adjust_around_, generation_},
+    adjustment_.push({view, adjust_around_, moves_},
                      now + rate.frames(options_.global_ba_latency(adjusted_keyframes(*view))));
     adjustment_wanted_ = false;
   }
+}
+
+void LoopStage::moved_by(const MapCorrection& correction) {
+  ++moves_;
+  adjustment_wanted_ = true;
+  adjust_around_.push_back(correction.near_side.front());
+}
+
+void LoopStage::merged(const MapCorrection& merge) {
+  void_below_ = ++generation_;
+  moved_by(merge);
 }
 
 std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex now, bool wait) {
@@ -80,14 +92,17 @@ std::vector<std::shared_ptr<const MapCorrection>> LoopStage::take_due(FrameIndex
     if (found->skipped != kNoKeyframe) again_.push_back(found->skipped);
     if (found->ms) times_.add("loop", *found->ms);
     if (!found->correction) continue;
+    if (found->generation < void_below_) {
+      again_.push_back(found->correction->near_side.front());
+      continue;
+    }
     ++generation_;
-    adjustment_wanted_ = true;
-    adjust_around_.push_back(found->correction->near_side.front());
+    if (found->correction->kind == MapCorrection::Kind::loop) moved_by(*found->correction);
     corrections.push_back(std::move(found->correction));
   }
   while (auto adjusted = adjustment_.take_due(now, wait)) {
     times_.add("global_ba", *adjusted->ms);
-    adjustment_overtaken_ = adjusted->generation != generation_;
+    adjustment_overtaken_ = adjusted->generation != moves_;
     if (adjustment_overtaken_) continue;
     adjust_around_.clear();
     corrections.push_back(std::move(adjusted->correction));

@@ -46,8 +46,11 @@ class LoopStage {
     adjust_around_.clear();
   }
 
-  // Corrections due at `now`, in the order in which mapping must take them.
+  // Corrections due at `now`, in the order in which mapping must take them. A loop is closed at once; a merge may wait
+  // or not be made at all.
   std::vector<std::shared_ptr<const MapCorrection>> take_due(FrameIndex now, bool wait);
+  // The maps were joined by a merge that was handed out.
+  void merged(const MapCorrection& merge);
   bool idle() const {
     return search_.outstanding() == 0 && adjustment_.outstanding() == 0 && !adjustment_wanted_ && again_.empty();
   }
@@ -58,19 +61,23 @@ class LoopStage {
   struct Task {
     MapView view;
     std::vector<KeyframeId> keyframes;  // the one that is searched, or those adjusted around
-    int generation = 0;
+    int generation = 0;                 // of an adjustment: moves by then
   };
   struct Result {
     std::shared_ptr<const MapCorrection> correction;  // none when nothing was found
-    int generation = 0;                               // of an adjustment
+    int generation = 0;                               // of the task
     KeyframeId skipped = kNoKeyframe;                 // to be searched when the loop found before it has moved the map
     std::optional<double> ms;                         // of a search that was made
   };
 
+  void moved_by(const MapCorrection& correction);
+
   LoopStageOptions options_;
   LoopCloser closer_;              // of the search's thread
   int closed_generation_ = -1;     // likewise: where it found the last loop
-  int generation_ = 0;             // corrections handed out that moved the map by a loop or a merge
+  int generation_ = 0;             // loops and merges handed out, and merges made
+  int void_below_ = 0;             // generation: what is found on views from before a merge was made is of no use
+  int moves_ = 0;                  // of the map, by loops and merges
   KeyframeId next_ = 0;            // the first keyframe that was not offered yet
   std::vector<KeyframeId> again_;  // those before it that were skipped, increasing
   bool adjustment_wanted_ = false, adjustment_overtaken_ = false;

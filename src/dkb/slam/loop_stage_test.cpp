@@ -171,6 +171,41 @@ TEST(LoopStage, AnAdjustmentIsDueByTheNeighboursOfItsKeyframes) {
   EXPECT_EQ(stage.take_due(due, true).size(), 1U);
 }
 
+// A second map comes round to where the first one began.
+TEST(LoopStage, AMergeIsAdjustedOnceItIsMadeAndWhatWasFoundBeforeIsOfNoUse) {
+  test::RoundTrip world;
+  world.go(12);
+  LoopStage stage(world.optics(), prompt(), {}, 1, false);
+  stage.start_at(world.map.keyframe_count());
+  const Rigid3 other_from_world(rotation_from_vector({0.1, 1.2, -0.3}), {2, -1, 5});
+  const auto go = [&](int keyframes) {
+    for (int i = 0; i < keyframes; ++i) {
+      const int k = world.map.keyframe_count();
+      const Rigid3 truth = test::RoundTrip::truth_at(k - 20);
+      world.add(truth, truth * other_from_world.inverse(), k == 12);
+    }
+  };
+  std::vector<std::shared_ptr<const MapCorrection>> found;
+  FrameIndex frame = 0;
+  while (found.empty() && world.map.keyframe_count() < 30) {
+    go(1);
+    stage.offer(world.map.snapshot(), frame += 100, FrameRate(30), false);
+    found = stage.take_due(frame + 99, true);
+  }
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0]->kind, MapCorrection::Kind::merge);
+  EXPECT_TRUE(stage.idle()) << "nothing has moved";
+  go(6);  // which show the same
+  stage.offer(world.map.snapshot(), frame += 100, FrameRate(30), false);
+  stage.merged(*found[0]);
+  move_map(world.map, *found[0]);
+  for (const auto& later : stage.take_due(frame + 99, true)) EXPECT_NE(later->kind, MapCorrection::Kind::merge);
+  stage.offer(world.map.snapshot(), frame += 100, FrameRate(30), false);
+  found = stage.take_due(frame + 99, true);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0]->kind, MapCorrection::Kind::adjustment);
+}
+
 TEST(LoopStage, EndsWithWorkOutstanding) {
   test::RoundTrip world;
   world.go(10);

@@ -17,6 +17,7 @@
 #include "dkb/slam/load_shedding.h"
 #include "dkb/slam/loop_stage.h"
 #include "dkb/slam/mapping_stage.h"
+#include "dkb/slam/merge_hold.h"
 #include "dkb/slam/mover_stage.h"
 #include "dkb/slam/odometry_frame.h"
 #include "dkb/slam/options.h"
@@ -80,6 +81,8 @@ class Pipeline {
   double take_due_map(bool wait);
   void take_view(const MapView& view);
   void correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due);
+  void apply(std::shared_ptr<const MapCorrection> correction, FrameIndex due);
+  void weigh_merge(const TrackedFrame& tracked, PointAppearance& appearance);
   int features_wanted() const;
   ExtractedFrame extract(const Frame& frame);
   Expectation expect(const Frame& frame) const;
@@ -106,6 +109,7 @@ class Pipeline {
   OrbExtractor extractor_;
   PlaneFinder planes_;
   Tracker tracker_;
+  MergeHold merge_hold_;
   std::unique_ptr<KeyframeDecider> decider_;
   SceneStage scenes_;
   PointEvidence evidence_;

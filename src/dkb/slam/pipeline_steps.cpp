@@ -37,6 +37,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       extractor_(options_.features, best_simd(), options_.pipeline.threaded),
       planes_(context.camera, options_.noise),
       tracker_(optics_of(context), options_.tracking, options_.seed),
+      merge_hold_(optics_of(context), options_.seed),
       decider_(make_decider(context)),
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
@@ -122,16 +123,35 @@ int Pipeline::map_number(KeyframeId reference) {
 
 void Pipeline::correct(std::vector<std::shared_ptr<const MapCorrection>> corrections, FrameIndex due) {
   for (auto& correction : corrections) {
-    if (correction->kind != MapCorrection::Kind::adjustment) {
-      const bool merge = correction->kind == MapCorrection::Kind::merge;
-      const LoopInfo loop{correction->near_side.front(), correction->far_side.front(), merge};
-      record_.add(loop);
-      note(merge ? Event::Kind::merge : Event::Kind::loop,
-           "keyframe " + std::to_string(loop.keyframe) + " shows the place of " + std::to_string(loop.earlier_keyframe),
-           loop.keyframe);
+    if (correction->kind == MapCorrection::Kind::merge) {
+      merge_hold_.hold(std::move(correction), tracker_.map().view());
+      continue;
     }
-    mapping_.push(std::move(correction), due);
+    if (correction->kind == MapCorrection::Kind::loop) merge_hold_.drop();
+    apply(std::move(correction), due);
   }
+}
+
+void Pipeline::apply(std::shared_ptr<const MapCorrection> correction, FrameIndex due) {
+  if (correction->kind != MapCorrection::Kind::adjustment) {
+    const bool merge = correction->kind == MapCorrection::Kind::merge;
+    const LoopInfo loop{correction->near_side.front(), correction->far_side.front(), merge};
+    record_.add(loop);
+    note(merge ? Event::Kind::merge : Event::Kind::loop,
+         "keyframe " + std::to_string(loop.keyframe) + " shows the place of " + std::to_string(loop.earlier_keyframe),
+         loop.keyframe);
+  }
+  mapping_.push(std::move(correction), due);
+}
+
+// Whether the frame shows what a merge that waits says it must.
+void Pipeline::weigh_merge(const TrackedFrame& tracked, PointAppearance& appearance) {
+  if (!merge_hold_.waits() || !tracked.tracked() || tracked.starts_map) return;
+  const TrackingMap& map = tracker_.map();
+  auto merge = merge_hold_.look(map.view(), map.root(tracked.reference), tracked, &appearance);
+  if (!merge) return;
+  loop_.merged(*merge);
+  apply(std::move(merge), mapping_due());
 }
 
 int Pipeline::features_wanted() const {
@@ -223,6 +243,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                                          .movers = scenes_.compares_depth(),
                                          .may_start_map = may_make_keyframes()});
   if (start_) push_start(&tracked);
+  weigh_merge(tracked, appearance);
   if (!tracked.tracked()) return tracked;
   if (before && !tracked.starts_map) {  // one that does stands where the prior says
     const auto& seen = tracked.by_observations;

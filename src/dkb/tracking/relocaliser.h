@@ -51,6 +51,9 @@ class Relocaliser {
                                          double radius, const MatchableFeatures& features,
                                          const IgnoresPoint& ignores) const;
 
+  // How the map looks from a proposed pose.
+  void look_around(const Map& map, PointAppearance* appearance, PoseProposal& proposal) const;
+
  private:
   // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
   std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
@@ -58,7 +61,6 @@ class Relocaliser {
   std::optional<PoseProposal> fit_around(const Map& map, const std::vector<PointId>& points,
                                          const MatchableFeatures& features, const IgnoresPoint& ignores,
                                          const Rigid3& expected_cam_from_world, std::span<const float> radii) const;
-  void look_around(const Map& map, PointAppearance* appearance, PoseProposal& proposal) const;
 
   Optics optics_;
   uint64_t seed_;
