@@ -65,9 +65,9 @@ TEST(LiveCommand, WrongDevicesAreBadUsage) {
 TEST(LiveCommand, FramesThatAreDroppedAreToldOfWithAPriorFileToo) {
   const TempFolder temp;
   // The first frame waits for its detection; meanwhile more come than the queue holds.
-  const Finished finished =
-      run_program({"live", fake("speed=100"), "--detector", "exec:sleep 2", "--no-record", "--out",
-                   (temp / "out").string(), "--prior-file", (sequence() / "groundtruth.txt").string()});
+  const Finished finished = run_program(
+      {"live", fake("speed=100"), "--detector", "exec:sleep 2; echo answer 0 0; echo end; cat >/dev/null",
+       "--no-record", "--out", (temp / "out").string(), "--prior-file", (sequence() / "groundtruth.txt").string()});
   ASSERT_EQ(finished.exit_code, 0) << finished.err;
   const auto stats = nlohmann::json::parse(read_text(temp / "out" / "stats.json"));
   const bool dropped = stats["realtime"]["dropped"].get<int>() > 0;

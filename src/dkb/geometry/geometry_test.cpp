@@ -57,6 +57,16 @@ TEST(VelocityFilter, WeighsWhatIsMeasuredByItsNoise) {
   EXPECT_NEAR(later(5, 5), 36 * (0.04 - 0.01), 1e-9);
 }
 
+TEST(VelocityFilter, AStepOverAMillisecondTellsNextToNothing) {
+  VelocityFilter filter(Vector6d::Constant(0.2), axis_covariance(0.05, 0.05));
+  // Two poses of 1 mm, 1 mrad: 1.4 m/s, against 0.05.
+  filter.update(Vector6d::Constant(3), axis_covariance(std::sqrt(2.0), std::sqrt(2.0)), 0.001);
+  EXPECT_LT((filter.velocity() - Vector6d::Constant(0.2)).norm(), 0.01);
+  filter.go_on(0.1);
+  EXPECT_NEAR(filter.covariance(0, 0)(0, 0), 0.0025 + 0.04, 1e-4);
+  EXPECT_NEAR(filter.velocity()[0], 0.2, 0.01);
+}
+
 TEST(MotionModel, AHandKeepsItsSpeedsInBounds) {
   EXPECT_NEAR(velocity_change_sd(0.05), 0.1, 1e-12);
   EXPECT_NEAR(velocity_change_sd(10), std::sqrt(0.08), 1e-12);

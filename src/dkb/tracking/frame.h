@@ -78,7 +78,7 @@ struct TrackedFrame : PosedFrame {
   std::vector<uint8_t> outlier;                        // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
   std::vector<uint8_t> makes_point;          // per feature: 1 = it made a map point, when the frame became a keyframe
-  std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that weighed in it
+  std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that was weighed
   int inliers = 0;                           // among `points`
 
   // None of its features shows anything.

@@ -87,13 +87,10 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
     Point p;
     p.feature = static_cast<int>(f);
     p.guessed = !(k.depth > 0) && (!before || before->guessed);
-    if (before && !before->guessed) {
-      p.point_in_cam = frame.cam_from_world * before->point_in_world;
-    } else {
-      const float depth = k.depth > 0 ? k.depth : k.lent_depth > 0 ? k.lent_depth : depth_around(frame, k);
-      p.point_in_cam = optics_.camera.unproject(k.pixel.cast<double>(), depth);
-    }
-    if (!(p.point_in_cam.z() > 0) || p.point_in_cam.z() > max_depth_) continue;
+    const float depth = k.depth > 0 ? k.depth : k.lent_depth > 0 ? k.lent_depth : depth_around(frame, k);
+    if (!(depth > 0) || depth > max_depth_) continue;
+    p.point_in_cam = before && !before->guessed ? frame.cam_from_world * before->point_in_world
+                                                : optics_.camera.unproject(k.pixel.cast<double>(), depth);
     if (p.guessed) {
       p.moves = before && before->moves;
       p.first_in_cam = before ? transformed(frame.cam_from_world, before->first)

@@ -142,13 +142,25 @@ TEST_F(TrackerTest, ATakenViewMovesPoseVelocityAndPendingKeyframesWithTheWorld) 
 TEST_F(TrackerTest, VelocityIsThatOfTheCameraPerSecond) {
   publish(start(on_path(0)));
   EXPECT_TRUE(tracker.velocity().isZero());
-  for (int f = 1; f <= 3; ++f) track(on_path(f));
-  const Rigid3 step = on_path(3) * on_path(2).inverse();
+  for (int f = 1; f <= 9; ++f) track(on_path(f));
+  const Rigid3 step = on_path(9) * on_path(8).inverse();
   Vector6d per_second;
   per_second << step.translation, vector_from_rotation(step.rotation);
   per_second /= kFrameTime;
-  EXPECT_LT((tracker.velocity() - per_second).norm(), 1e-3);
-  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.3, 1e-3);  // [rad/s] as the path turns
+  EXPECT_LT((tracker.velocity() - per_second).norm(), 0.01);
+  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.3, 0.003);  // [rad/s] as the path turns
+}
+
+// Stamps of a driver under load come in bursts. A step over 1 ms is the noise of two poses.
+TEST_F(TrackerTest, AStampRightAfterAnotherTellsNothingOfTheVelocity) {
+  publish(start(on_path(0), kNoisy));
+  for (int f = 1; f <= 5; ++f) track(on_path(f), kNoisy);
+  const Vector6d before = tracker.velocity();
+  for (int f = 6; f <= 10; ++f) {
+    stalled -= kFrameTime - 0.001;
+    ASSERT_EQ(track(on_path(5), kNoisy).state, TrackingState::tracking);
+    EXPECT_LT((tracker.velocity() - before).norm(), 0.2) << f;
+  }
 }
 
 TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredOne) {
@@ -164,7 +176,7 @@ TEST_F(TrackerTest, FeaturesAreMadeForTheExpectedVelocityAndAgainForTheMeasuredO
   EXPECT_TRUE(asked[0].isApprox(expected));
   EXPECT_GT(asked[1].tail<3>().norm(), 0.55);  // at least the 0.6 rad/s of this step, up to rounding
   EXPECT_LT(asked[1].tail<3>().norm(), 0.80);
-  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.6, 0.01);
+  EXPECT_NEAR(tracker.velocity().tail<3>().norm(), 0.6, 0.1);  // by what a turn is taken to change in a frame
 }
 
 TEST_F(TrackerTest, PosesHangOnTheirReferenceKeyframe) {
@@ -238,6 +250,12 @@ TEST_F(TrackerTest, ANewMapStartsWhereTheOldOneStaysOutOfSight) {
   EXPECT_EQ(o.state, TrackingState::relocalised) << "the old map is not forgotten";
   EXPECT_EQ(tracker.map().root(o.reference), 0);
   EXPECT_LT(distance_between(o.cam_from_world, on_path(2)), 1e-4);
+  scene = TestScene(700, 99);
+  stalled = 2;
+  EXPECT_EQ(track(on_path(2)).state, TrackingState::lost) << "two seconds later its velocity is anyone's guess";
+  o = track(on_path(2));
+  EXPECT_EQ(o.state, TrackingState::relocalised);
+  EXPECT_EQ(tracker.map().root(o.reference), 1);
 }
 
 TEST_F(TrackerTest, ANewMapBeginsWhereTheCameraWasSuggestedToBe) {

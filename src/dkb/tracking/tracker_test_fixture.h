@@ -43,7 +43,7 @@ class TrackerTest : public ::testing::Test {
   }
   // The frame `index` with these features.
   TrackedFrame track(const FrameFeatures& features) {
-    return tracker.track({.index = index, .timestamp = index * kFrameTime, .features = features});
+    return tracker.track({.index = index, .timestamp = index * kFrameTime + stalled, .features = features});
   }
   // The first frame and its keyframe.
   KeyframePacket start(const Rigid3& cam_from_world = {}, const ViewOptions& options = {}) {
@@ -94,6 +94,7 @@ class TrackerTest : public ::testing::Test {
     return TestScene::camera_at({0.02 * frames, 0.005 * frames, 0}, {0, 0.01 * frames, 0});
   }
 
+  double stalled = 0;  // [s] the stamps of all frames from now on are later by it
   TestScene scene{700};
   Tracker tracker{scene.optics(), {}, 1};
   Map map;
