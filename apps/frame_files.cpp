@@ -43,9 +43,8 @@ std::string row_of_log(const std::string& stamp, const FrameResult& result) {
 }  // namespace
 
 FrameFiles::File::File(const std::filesystem::path& folder, std::string file_name, const std::string& header)
-    : name(std::move(file_name)) {
-  growing.emplace(folder / name, kUnfinished);
-  growing->append(header);
+    : name(std::move(file_name)), growing(folder / name, kUnfinished) {
+  growing.append(header);
 }
 
 FrameFiles::FrameFiles(const std::filesystem::path& folder, const Wanted& wanted) {
@@ -58,7 +57,7 @@ FrameFiles::FrameFiles(const std::filesystem::path& folder, const Wanted& wanted
 void FrameFiles::write(std::optional<File>& file, const std::string& rows) {
   if (!file || file->lost) return;
   file->lost = true;
-  file->growing->append(rows);
+  file->growing.append(rows);
   file->lost = false;
 }
 
@@ -71,7 +70,7 @@ void FrameFiles::add(const std::string& stamp, const FrameResult& result) {
 
 void FrameFiles::commit() {
   for (auto* file : {&movers_, &features_, &detections_, &log_})
-    if (*file && !(*file)->lost) (*file)->growing->commit();
+    if (*file && !(*file)->lost) (*file)->growing.commit();
 }
 
 std::set<std::string> FrameFiles::names() const {

@@ -31,7 +31,7 @@ class FrameFiles {
   struct File {
     File(const std::filesystem::path& folder, std::string file_name, const std::string& header);
     std::string name;
-    std::optional<GrowingFile> growing;
+    GrowingFile growing;
     bool lost = false;
   };
   static void write(std::optional<File>& file, const std::string& rows);

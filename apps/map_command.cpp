@@ -157,13 +157,10 @@ void export_map(const MapExportArguments& arguments) {
     return;
   }
   const std::vector<PointId> points = points_by_map(map).front();
-  const auto keyframes = map.live_keyframes();
-  const auto of_first = std::count_if(keyframes.begin(), keyframes.end(),
-                                      [&](KeyframeId id) { return map.root(id) == map.roots().front(); });
   write_file_atomically(arguments.out,
                         arguments.format == "ply" ? point_cloud_ply(map, points) : point_cloud_pcd(map, points));
   tell(stdout, "{}: {}{}\n", arguments.out, plural(points.size(), "point", "points"),
-       left_out(map, points.size(), static_cast<size_t>(of_first)));
+       left_out(map, points.size(), map.keyframes_by_map().front().size()));
 }
 
 struct MergeArguments {

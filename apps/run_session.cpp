@@ -221,18 +221,6 @@ std::shared_ptr<const FileDetector> boxes_of(const RunArguments& args, const Det
 
 }  // namespace
 
-void NewFolders::note(const fs::path& path) {
-  std::error_code ignored;
-  for (fs::path at = path; !at.empty() && at != at.root_path() && !fs::exists(at, ignored); at = at.parent_path())
-    paths_.insert(paths_.begin(), at);
-}
-
-NewFolders::~NewFolders() {
-  std::error_code ignored;
-  for (auto path = paths_.rbegin(); path != paths_.rend(); ++path)
-    if (fs::is_directory(*path, ignored)) fs::remove(*path, ignored);  // one that holds something stays
-}
-
 RunSession::RunSession(const RunArguments& args)
     : args_(args),
       warnings_([this](const std::string& line) {

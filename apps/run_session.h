@@ -15,6 +15,7 @@
 #include "dkb/detection/mask_folder.h"
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/log.h"
+#include "dkb/util/new_folder.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
 #include "dkb_slam/source.h"
@@ -57,20 +58,6 @@ void check_detector(const DetectorChoice& choice, bool has_model);
 
 // Whether no option leaves out a part: of the images of a part, boxes and masks may show nobody.
 bool takes_all_images(const RunArguments& args);
-
-// Folders that a run makes: they go again where nothing came into them.
-class NewFolders {
- public:
-  NewFolders() = default;
-  ~NewFolders();
-  NewFolders(const NewFolders&) = delete;
-  NewFolders& operator=(const NewFolders&) = delete;
-  void note(const std::filesystem::path& path);  // before it is made, with those that it lies in
-  void add(const std::filesystem::path& path) { paths_.push_back(path); }
-
- private:
-  std::vector<std::filesystem::path> paths_;  // the outermost first
-};
 
 // One run of `run` or `live`: a source is opened, tracked to its end or to Ctrl-C, and its results are written.
 class RunSession {

@@ -44,10 +44,7 @@ std::string picture_name(const Keyframe& keyframe) {
 }
 
 std::vector<KeyframeId> keyframes_of_largest_map(const Map& map) {
-  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
-  std::vector<std::vector<KeyframeId>> by_map(std::max<size_t>(1, roots.size()));
-  for (KeyframeId id : map.live_keyframes())
-    by_map[static_cast<size_t>(map_number(roots, root_of[static_cast<size_t>(id)]))].push_back(id);
+  const std::vector<std::vector<KeyframeId>> by_map = map.keyframes_by_map();
   return *std::max_element(by_map.begin(), by_map.end(), [](auto& a, auto& b) { return a.size() < b.size(); });
 }
 

@@ -75,9 +75,9 @@ std::string camera_named_by(const std::string& folder_name) {
 
 CameraChoice from_file(const fs::path& path) {
   const std::string name = path.string(), text = read_file(path);
-  const Camera camera = parse_camera(text, name);
-  const bool assumed = is_calibration(text) && parse_calibration(text, name).depth_assumed;
-  return {camera, name + (assumed ? ", depth in millimetres (it says no depth_factor)" : ""), doubt_of(camera, name)};
+  const Calibration read = is_calibration(text) ? parse_calibration(text, name) : Calibration{parse_camera(text, name)};
+  return {read.camera, name + (read.depth_assumed ? ", depth in millimetres (it says no depth_factor)" : ""),
+          doubt_of(read.camera, name)};
 }
 
 std::string folder_name(const fs::path& folder) {

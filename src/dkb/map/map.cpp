@@ -103,6 +103,14 @@ std::vector<KeyframeId> Map::root_of_each() const {
   return roots;
 }
 
+std::vector<std::vector<KeyframeId>> Map::keyframes_by_map() const {
+  const std::vector<KeyframeId> root_of = root_of_each();
+  std::vector<std::vector<KeyframeId>> by_map(std::max<size_t>(1, roots_.size()));
+  for (KeyframeId id : live_keyframes())
+    by_map[static_cast<size_t>(map_number(roots_, root_of[static_cast<size_t>(id)]))].push_back(id);
+  return by_map;
+}
+
 std::vector<KeyframeId> Map::best_covisible(KeyframeId id, size_t most) const {
   const std::vector<Covisible>& all = keyframe(id)->covisible;
   std::vector<KeyframeId> best;

@@ -119,6 +119,8 @@ class Map {
   // Of all keyframes ever made: whoever asks for many walks no path twice.
   std::vector<KeyframeId> root_of_each() const;
   const std::vector<KeyframeId>& roots() const { return roots_; }  // of the maps that are not joined, increasing
+  // The live keyframes of each map that is not joined, by its number and then increasing; one empty list of no map.
+  std::vector<std::vector<KeyframeId>> keyframes_by_map() const;
   // Of the keyframes that share points with this one, which must exist, those that share most; `most` at most.
   std::vector<KeyframeId> best_covisible(KeyframeId id, size_t most) const;
   // The newest live keyframes of the map that `id` is in, `most` at most, increasing. None of an unknown one.

@@ -53,7 +53,7 @@ class Tracker {
   // Nothing without a last frame.
   std::optional<MotionPrior> expected_step(double timestamp, const MotionPrior* prior) const;
   // [m/s, rad/s] tangent of later_cam_from_earlier_cam over one second; zero while unknown.
-  Vector6d velocity() const { return velocity_ ? velocity_->velocity() : Vector6d(Vector6d::Zero()); }
+  Vector6d velocity() const { return velocity_.value_or(VelocityFilter{}).velocity(); }
 
   // The frame's features are made for the expected velocity, and again for the one that the first pose shows.
   TrackedFrame track(const TrackingInput& input);

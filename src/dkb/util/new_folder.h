@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace dkb {
 
@@ -26,6 +27,30 @@ class NewFolder {
  private:
   std::filesystem::path path_;
   bool kept_ = false;
+};
+
+// Folders that are made on the way: they go again where nothing came into them.
+class NewFolders {
+ public:
+  NewFolders() = default;
+  ~NewFolders() {
+    std::error_code ignored;
+    for (auto path = paths_.rbegin(); path != paths_.rend(); ++path)
+      if (std::filesystem::is_directory(*path, ignored)) std::filesystem::remove(*path, ignored);
+  }
+  NewFolders(const NewFolders&) = delete;
+  NewFolders& operator=(const NewFolders&) = delete;
+  // Before it is made, with those that it lies in.
+  void note(const std::filesystem::path& path) {
+    std::error_code ignored;
+    for (std::filesystem::path at = path; !at.empty() && at != at.root_path() && !std::filesystem::exists(at, ignored);
+         at = at.parent_path())
+      paths_.insert(paths_.begin(), at);
+  }
+  void add(const std::filesystem::path& path) { paths_.push_back(path); }
+
+ private:
+  std::vector<std::filesystem::path> paths_;  // the outermost first
 };
 
 }  // namespace dkb
