@@ -158,6 +158,35 @@ SlamRun::SlamRun(const fs::path& dataset, const fs::path& out_folder, const std:
   if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
 }
 
+int shell(std::string line) {
+  for (size_t at = 0; (at = line.find('@', at)) != std::string::npos;) line.replace(at, 1, DKB_SLAM_EXECUTABLE);
+  const int status = std::system(("exec 2>/dev/null; " + line).c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+}
+
+std::string told_to_a_terminal(const std::string& line) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) throw std::runtime_error("no terminals here");
+  const std::string name = ptsname(terminal);
+  const int held = open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  shell(line + " 2>" + name);
+  // The kernel hands bytes over some time after they were written, and in parts. They keep their order, so that all
+  // are here once a byte written after them is.
+  constexpr char kEnd = '\x04';
+  if (write(held, &kEnd, 1) != 1) throw std::runtime_error("a terminal cannot be written to");
+  std::string told;
+  while (told.empty() || told.back() != kEnd) {
+    char part[4096];
+    const ssize_t size = read(terminal, part, sizeof part);
+    if (size <= 0) throw std::runtime_error("a terminal cannot be read");
+    told.append(part, static_cast<size_t>(size));
+  }
+  told.pop_back();
+  close(held);
+  close(terminal);
+  return told;
+}
+
 std::vector<std::vector<std::string>> rows_of(const fs::path& file) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream text(read_text(file));

@@ -59,6 +59,11 @@ std::string no_outside_data(const std::string& name);
 // `own_images`, else links to them.
 void copy_sequence(const std::filesystem::path& folder, int frames, bool own_images);
 
+// The exit code of a shell's line, in which `@` stands for the program.
+int shell(std::string line);
+// What such a line prints to standard error where that is a terminal.
+std::string told_to_a_terminal(const std::string& line);
+
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
 // `run` on `dataset`, finished, with its results in `out`; without a detector unless `more` names one.

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `dkb-slam run` on recordings of ROS messages.
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cstdlib>
 
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/image_codecs.h"
@@ -121,16 +116,8 @@ TEST(RecordCommand, OnATerminalWarningsBeginALineOfTheirOwn) {
   const TempFolder temp;
   copy_sequence(temp / "in", kSequenceFrames, true);
   write_text(temp / "in" / rows_of(temp / "in/rgb.txt").at(34).at(1), "broken");  // frames are counted at the 30th
-  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
-  ASSERT_GE(terminal, 0);
-  ASSERT_TRUE(grantpt(terminal) == 0 && unlockpt(terminal) == 0);
-  const std::string line = std::string(DKB_SLAM_EXECUTABLE " record ") + (temp / "in").string() + " --out " +
-                           (temp / "out.bag").string() + " >" + (temp / "said").string() + " 2>" + ptsname(terminal);
-  EXPECT_EQ(std::system(line.c_str()), 0);
-  std::string shown(4096, '\0');
-  const ssize_t size = read(terminal, shown.data(), shown.size());
-  close(terminal);
-  shown.resize(static_cast<size_t>(std::max<ssize_t>(size, 0)));
+  const std::string shown = told_to_a_terminal("@ record " + (temp / "in").string() + " --out " +
+                                               (temp / "out.bag").string() + " >" + (temp / "said").string());
   EXPECT_NE(shown.find("30 frames\r\nwarning: "), std::string::npos) << shown;
   EXPECT_EQ(shown.find("\n\r\n"), std::string::npos) << "no empty line: " << shown;
 }

@@ -5,7 +5,6 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -57,13 +56,6 @@ class Endless {
 bool wait_for_first_frame(Program& program) {
   while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause_ms(5);
   return !program.ended();
-}
-
-// The exit code of a shell's line, in which `@` stands for the program.
-int shell(std::string line) {
-  for (size_t at = 0; (at = line.find('@', at)) != std::string::npos;) line.replace(at, 1, DKB_SLAM_EXECUTABLE);
-  const int status = std::system(("exec 2>/dev/null; " + line).c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
 }
 
 TEST(RunEnding, ATerminalThatGoesAwayEndsARunWithItsResults) {
@@ -238,19 +230,6 @@ TEST(RunEnding, RunsThatStartTogetherHaveFoldersOfTheirOwn) {
     EXPECT_TRUE(fs::exists(entry.path() / "report.html")) << entry.path();
   }
   EXPECT_EQ(folders, 3U);
-}
-
-// What the shell's line prints to standard error where that is a terminal.
-std::string told_to_a_terminal(const std::string& line) {
-  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
-  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) throw std::runtime_error("no terminals here");
-  const int held = open(ptsname(terminal), O_RDWR | O_NOCTTY);  // else what was told is lost with the program
-  shell(line + " 2>" + ptsname(terminal));
-  std::string told(1 << 16, '\0');
-  told.resize(static_cast<size_t>(std::max<ssize_t>(0, read(terminal, told.data(), told.size()))));
-  close(held);
-  close(terminal);
-  return told;
 }
 
 TEST(RunEnding, OnATerminalWarningsAndErrorsHaveLinesOfTheirOwn) {
