@@ -64,8 +64,9 @@ bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypo
   return (seen - from - t * along).squaredNorm() > limit * variance;
 }
 
-// Harmonic mean of the depths of the features nearby, since parallax goes with the inverse depth; 0 when there is none.
-float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& keypoint) {
+// Harmonic mean of the depths of the features nearby, since parallax goes with the inverse depth. Where none has any,
+// what is seen there lies beyond the reach of depth, or about as far.
+float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& keypoint) const {
   float sum = 0;
   int count = 0;
   frame.features->grid.for_each_near({keypoint.pixel.x(), keypoint.pixel.y(), kSurroundings}, [&](int f) {
@@ -74,7 +75,7 @@ float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& ke
     sum += 1.0f / k.depth;
     ++count;
   });
-  return count > 0 ? static_cast<float>(count) / sum : 0.0f;
+  return count > 0 ? static_cast<float>(count) / sum : static_cast<float>(reach_);
 }
 
 void OdometryPoints::remember(const TrackedFrame& frame) {
@@ -88,7 +89,7 @@ void OdometryPoints::remember(const TrackedFrame& frame) {
     p.feature = static_cast<int>(f);
     p.guessed = !(k.depth > 0) && (!before || before->guessed);
     const float depth = k.depth > 0 ? k.depth : k.lent_depth > 0 ? k.lent_depth : depth_around(frame, k);
-    if (!(depth > 0) || depth > max_depth_) continue;
+    if (depth > reach_) continue;
     p.point_in_cam = before && !before->guessed ? frame.cam_from_world * before->point_in_world
                                                 : optics_.camera.unproject(k.pixel.cast<double>(), depth);
     if (p.guessed) {

@@ -11,14 +11,16 @@ namespace dkb {
 
 // Visual-odometry points: features that show no map point are followed from frame to frame until a keyframe makes map
 // points of them, so that what has just come into view steadies the pose at once. They never enter the map. Features
-// without depth of their own are taken at that of the features around them, which between two frames is near enough to
-// tell the camera's rotation. As long as they are followed they must stay on the ray of their first sighting, whatever
+// without depth of their own are taken at that of the features around them, and at the reach of depth where these have
+// none either: between two frames that is near enough to tell the camera's rotation, which of all that is seen what is
+// far tells best. As long as they are followed they must stay on the ray of their first sighting, whatever
 // their depth: what leaves it moves (the epipolar constraint; Hartley and Zisserman, 2004, section 9.1).
 //
 // Deterministic.
 class OdometryPoints {
  public:
-  OdometryPoints(const Optics& optics, double max_depth) : optics_(optics), max_depth_(max_depth) {}
+  // `reach` [m]: points whose depth is farther are not followed.
+  OdometryPoints(const Optics& optics, double reach) : optics_(optics), reach_(reach) {}
 
   // The points as matching wants them, in the world that `frame`, the one last remembered, lives in now. Candidate ids
   // are kNoPoint.
@@ -51,10 +53,10 @@ class OdometryPoints {
   };
   double sight_variance(const Keypoint& keypoint, const Eigen::Vector3d& point_in_cam,
                         const Matrix6d& covariance) const;
-  static float depth_around(const TrackedFrame& frame, const Keypoint& keypoint);
+  float depth_around(const TrackedFrame& frame, const Keypoint& keypoint) const;
 
   Optics optics_;
-  double max_depth_;
+  double reach_;
   std::vector<Point> points_;  // by feature
 };
 

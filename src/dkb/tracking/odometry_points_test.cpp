@@ -46,9 +46,11 @@ TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
   const TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 1}, {100, 90, 3}, {300, 80, 2}, {500, 400, 0}});
   points.remember(frame);
   const auto candidates = points.candidates(frame);
-  ASSERT_EQ(candidates.size(), 4u);  // nothing is near the last
+  ASSERT_EQ(candidates.size(), 5u);
   EXPECT_TRUE(points.match(0, frame).guessed);
   EXPECT_NEAR(candidates[0].position.z(), 1.5, 1e-6);  // 2 / (1/1 + 1/3)
+  EXPECT_TRUE(points.match(4, frame).guessed);
+  EXPECT_NEAR(candidates[4].position.z(), 4.0, 1e-6);  // no depth is near
 }
 
 TEST(OdometryPoints, ASurfaceBesideLendsItsDepthBeforeTheSurroundingsDo) {

@@ -19,7 +19,6 @@ constexpr double kEstablishedAfter = 0.5;
 constexpr double kRefreshAfter = 0.15;       // [s] the choice of local map points is renewed at least so often
 constexpr double kAccelerationShare = 0.25;  // chosen by measurement among 0, 0.25 and 0.5 (fr1_xyz)
 constexpr double kOdometryWeight = 1.0 / 4;  // of visual-odometry points beside map points
-constexpr double kGuessWeight = 1.0 / 4;     // beside it of points at a guessed depth, which err together
 constexpr float kMatchRatio = 0.8f;          // best over second best distance of a match with a map point
 
 double square(double a) {
@@ -107,9 +106,7 @@ void Tracker::reset_motion() {
 
 Tracker::Pair Tracker::odometry_pair(int feature, const OdometryMatch& match, const Rigid3& cam_from_world) const {
   Pair pair{feature, match.point_in_world, kOdometryWeight, !match.guessed};
-  if (!match.guessed) return pair;
-  pair.weight *= kGuessWeight;
-  pair.parallax_sigma = odometry_.parallax_sigma(match, last_->cam_from_world, cam_from_world);
+  if (match.guessed) pair.parallax_sigma = odometry_.parallax_sigma(match, last_->cam_from_world, cam_from_world);
   return pair;
 }
 
