@@ -428,7 +428,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   const bool has_map = state_ != TrackingState::initialising;
   const auto predicted = frame.predicted = predict(input);
   const PosePrediction* expected = predicted ? &*predicted : suggested_ ? &*suggested_ : nullptr;
-  bool followed = has_map && (track_from_last(frame, input) || (predicted && track_expected(*predicted, frame)));
+  bool followed = has_map && (track_from_last(frame, input) || (predicted && track_expected(*predicted, frame)) ||
+                              track_among_suspects(frame, input));
   bool found_again = has_map && !followed && confirm_relocalisation(frame, input);
   if (has_map && !followed && !found_again && relocalise(frame, input.appearance, expected)) {
     // At once where it was expected, or where it is but a step from the frame before, if that one was seen; else when

@@ -105,6 +105,7 @@ class Tracker {
   double radius_last_frame() const { return std::max(kRadiusLocalMap, std::round(10 * optics_.camera.fx / 525)); }
   std::vector<Candidate> points_shown_last() const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
+  bool track_among_suspects(TrackedFrame& frame, const TrackingInput& input);
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame

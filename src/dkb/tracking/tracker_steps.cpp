@@ -89,6 +89,17 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   return fit && track_local_map(fit->cam_from_world, kRadiusLocalMap, options_.min_inliers, fit->points, frame);
 }
 
+// Depth that was aligned wrongly takes the room for moved and leaves nothing to track by, most of all between the first
+// two frames, when no velocity is known. What the last frame showed of the map is then sought among all features:
+// nobody who moves is in the map, but for who stood still when he came into it, and he is found as a second motion.
+bool Tracker::track_among_suspects(TrackedFrame& frame, const TrackingInput& input) {
+  if (std::find(frame.motion.begin(), frame.motion.end(), FeatureMotion::on_mover) == frame.motion.end()) return false;
+  auto told = std::exchange(frame.motion, std::vector<FeatureMotion>(frame.motion.size(), FeatureMotion::still));
+  const bool followed = track_from_last(frame, input);
+  frame.motion = std::move(told);
+  return followed;
+}
+
 // Where something else says where the camera is, fewer points need vouch for it: half as many, if they agree with what
 // is expected and most of what matches agrees with them. Down a blank corridor they are what holds the camera.
 bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame) {

@@ -325,6 +325,20 @@ TEST_F(TrackerTest, AMapsFirstFrameIsMadeAnewWithoutTheCornersOfMovers) {
             std::count_if(second.points.begin(), second.points.end(), [](PointId p) { return p != kNoPoint; }));
 }
 
+TEST_F(TrackerTest, WhereAllIsTakenForMovedTheMapIsFoundAllTheSame) {
+  publish(start(on_path(0)));
+  ++index;
+  view = scene.look(on_path(1), {});
+  FakeFeatures seen(view.features);
+  seen.motion.assign(view.features->size(), FeatureMotion::on_mover);
+  const TrackedFrame frame = track(seen);
+  ASSERT_EQ(frame.state, TrackingState::tracking);
+  EXPECT_FALSE(frame.starts_map);
+  EXPECT_LT((frame.cam_from_world.inverse() * on_path(1)).translation.norm(), 0.005);
+  for (size_t f = 0; f < frame.points.size(); ++f)
+    EXPECT_NE(frame.points[f], kNoPoint) << "what shows nothing of the map makes no map points";
+}
+
 TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
   view = scene.look({});
   const FakeFeatures features(view.features);
