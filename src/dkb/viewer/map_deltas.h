@@ -101,6 +101,9 @@ class MapDeltas {
   // Returns whether nothing is left.
   bool write(Client& client, StreamWriter& out, size_t budget) const;
 
+  // Updates that moved more keyframes at once than a local adjustment does.
+  uint64_t corrections() const { return corrections_; }
+
   double unit() const { return unit_; }  // [m]
   int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
   uint64_t world() const { return world_; }  // its number: another one after clear()
@@ -131,7 +134,7 @@ class MapDeltas {
   void update_points(const Map& map);
 
   const double unit_;  // [m]
-  uint64_t world_ = 1, version_ = 0, loops_version_ = 0;
+  uint64_t world_ = 1, version_ = 0, loops_version_ = 0, corrections_ = 0;
   std::vector<Keyframe> keyframes_;
   std::vector<Block> blocks_;
   std::vector<LoopInfo> loops_;

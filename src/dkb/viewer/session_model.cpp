@@ -240,6 +240,20 @@ std::string SessionModel::hello() const {
        {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}}});
 }
 
+void SessionModel::align_truth(const Map& map) {
+  const size_t points = history_.path_size();
+  const KeyframeId root = history_.current_root(map);
+  // It settles soon, and a long path takes a while. A path that was thinned has fewer points than before.
+  const bool holds = world_from_truth_ && !ended_ && aligned_root_ == root &&
+                     aligned_corrections_ == map_.corrections() && points >= aligned_at_ &&
+                     points <= aligned_at_ + aligned_at_ / 50 + 10;
+  if (holds) return;
+  world_from_truth_ = history_.world_from_truth(map, options_.truth);
+  aligned_at_ = points;
+  aligned_root_ = root;
+  aligned_corrections_ = map_.corrections();
+}
+
 const std::string& SessionModel::frame_message() {
   if (!frame_message_.empty() || shown_ == nullptr) return frame_message_;
   const FrameResult& result = shown_->result;
@@ -257,11 +271,7 @@ const std::string& SessionModel::frame_message() {
   for (const Detection& d : result.detections)
     json["boxes"].push_back({{"class", d.class_name}, {"box", json_of(d.box)}});
   if (!options_.truth.empty() && shown_->map.map() != nullptr) {
-    // It settles soon, and a long path takes a while.
-    if (!world_from_truth_ || history_.path_size() > aligned_at_ + aligned_at_ / 50 + 10) {
-      world_from_truth_ = history_.world_from_truth(*shown_->map.map(), options_.truth);
-      aligned_at_ = history_.path_size();
-    }
+    align_truth(*shown_->map.map());
     if (world_from_truth_) json["world_from_truth"] = json_of(*world_from_truth_);
   }
   std::string text = text_of(json);

@@ -75,6 +75,7 @@ class SessionModel {
   void forget_world();
   std::string hello() const;
   void write_truth(StreamWriter& out) const;
+  void align_truth(const Map& map);
   const std::string& frame_message();
   const std::string& image_message(bool depth);
 
@@ -94,7 +95,10 @@ class SessionModel {
   std::chrono::steady_clock::duration map_cost_{};
   SessionHistory history_;
   std::optional<Rigid3> world_from_truth_;
-  size_t aligned_at_ = 0;  // points of the path when it was computed
+  // Of what it was computed: points of the path, the root of their map, corrections of it.
+  size_t aligned_at_ = 0;
+  KeyframeId aligned_root_ = kNoKeyframe;
+  uint64_t aligned_corrections_ = 0;
   std::string dense_;
   uint64_t dense_number_ = 0;
   std::string frame_message_, image_messages_[2];
