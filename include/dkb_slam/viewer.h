@@ -59,6 +59,8 @@ class DKB_SLAM_API Viewer {
   /// A frame of the source, and what came of it. Hands over and returns: of frames that come faster than clients take
   /// them, the newest is shown. Only a recording that is not in real time takes every frame, and may keep this waiting.
   virtual void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events) = 0;
+  /// Of the source's frames so far, those that there is no result of: unreadable or dropped ones.
+  virtual void skipped(size_t frames) = 0;
   virtual void say(const std::string& line) = 0;  ///< one line for the list of events
   virtual void ended(MapSnapshot map) = 0;        ///< there will be no further frame; the map as it is at the end
 

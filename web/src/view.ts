@@ -6,7 +6,7 @@ import { Cloud, HostedLines, Poses } from "./hosted";
 
 export type Mover = { id: number; class: string; position: number[]; velocity: number[]; size: number[]; box: number[] };
 export type Hello = {
-  version: string; source: string; realtime: boolean; budget_ms: number; unit: number;
+  version: string; source: string; realtime: boolean; budget_ms: number; unit: number; feature_unit?: number;
   camera: { width: number; height: number; fx: number; fy: number; cx: number; cy: number };
 };
 export type Mode = "follow" | "free" | "top";

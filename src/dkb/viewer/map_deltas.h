@@ -26,8 +26,8 @@ enum class StreamMessage : uint8_t {
   path = 6,          // {uint32 frame; int32 keyframe; float32 x y z}: camera positions in a keyframe's axes
   facts = 7,         // {uint32 frame; float32 tracking_ms, waiting_ms, time; uint16 inliers; uint8 state, keyframe}
   events = 8,        // JSON array
-  frame = 9,         // uint32 length of JSON, JSON padded to 4; uint32 n, n x {uint16 x, y (1/16 px); uint8 state,
-                     // reason; uint16 0}; uint32 cell, width, height of the mask, its bits by rows
+  frame = 9,         // uint32 length of JSON, JSON padded to 4; uint32 n, n x {uint16 x, y in units of the hello's;
+                     // uint8 state, reason; uint16 0}; uint32 cell, width, height of the mask, its bits by rows
   image = 10,        // uint32 frame, uint32 0 colour or 1 depth, JPEG
   truth = 11,        // {float32 time, x, y, z}: the whole of it
   path_reset = 12,   // empty: the path comes anew

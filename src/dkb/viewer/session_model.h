@@ -24,6 +24,7 @@ class SessionModel {
 
   // --- The feeding thread.
   void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events);
+  void skipped(size_t frames);  // of the source, so far
   void say(const std::string& line);
   void end(MapSnapshot map);
 
@@ -68,6 +69,7 @@ class SessionModel {
     std::vector<FrameFact> facts;
     std::vector<SessionEvent> events;
     int offered = 0, tracked = 0, lost = 0;
+    size_t skipped = 0;
     int64_t stamp_ns = 0;
     bool ended = false, paused = false;
   };
@@ -88,6 +90,7 @@ class SessionModel {
   std::shared_ptr<const Shown> shown_;
   uint64_t shown_number_ = 0;
   int offered_ = 0, tracked_ = 0, lost_ = 0;
+  size_t skipped_ = 0;
   bool ended_ = false, paused_ = false;
   MapDeltas map_;
   std::atomic<uint64_t> world_;  // map_.world(), for those who do not hold the lock

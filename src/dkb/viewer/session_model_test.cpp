@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "dkb/viewer/stream_test_tools.h"
 
@@ -79,6 +81,44 @@ TEST(SessionModel, ANewWorldBeginsWithoutWhatLayInTheOneBefore) {
   tell(model, client, page);
   EXPECT_EQ(page.counts[kSurface], 1);
   EXPECT_TRUE(is_aligned(page)) << "as soon as the new path is long enough";
+}
+
+TEST(SessionModel, ProgressReachesItsEndWhereFramesCannotBeRead) {
+  ViewerOptions options = options_with_truth();
+  options.frames = 10;
+  SessionModel model(options);
+  show(model, 1, 0, 0);
+  EXPECT_EQ(model.state()["frames"], 10);
+  model.skipped(7);
+  for (int i = 1; i < 3; ++i) show(model, 1, i, i);
+  EXPECT_EQ(model.state()["frames"], 3);
+  EXPECT_EQ(model.frame() + 1, 3);
+}
+
+TEST(SessionModel, FeaturesOfALargeImageAreWhereTheyAre) {
+  ViewerOptions options = options_with_truth();
+  options.camera.width = 7680;
+  options.camera.height = 4320;
+  SessionModel model(options);
+  FrameResult result;
+  FeatureReport feature;
+  feature.image_x = 7000;
+  feature.image_y = 4300;
+  result.features.push_back(feature);
+  model.show(std::move(result), Frame(), {test::world(1, 1).snapshot(), {}}, {});
+  model.take_in();
+  SessionModel::Client client;
+  StreamReader page;
+  tell(model, client, page);
+  uint32_t json = 0, count = 0;
+  std::memcpy(&json, page.frame.data(), sizeof json);
+  std::memcpy(&count, page.frame.data() + 4 + json, sizeof count);
+  ASSERT_EQ(count, 1U);
+  uint16_t at[2];
+  std::memcpy(at, page.frame.data() + 8 + json, sizeof at);
+  const double unit = 7680 / 65536.0;
+  EXPECT_NEAR(at[0] * unit, 7000, unit);
+  EXPECT_NEAR(at[1] * unit, 4300, unit);
 }
 
 // Frame `at` at x [m], hung on the newest keyframe.
