@@ -283,7 +283,7 @@ int RunSession::run() {
   attempt([&] { slam_->finish(); });
   for (const Event& event : take_events())
     if (viewer_) viewer_->say(fmt::format("{}: {}", name_of(event.kind), event.text));
-  const double seconds = wall.ms() / 1000;
+  const double seconds = wall.ms() / 1000 - (viewer_ ? viewer_->paused_s() : 0);
   progress_->finish();
   source_->stop();
   if (!failure_ || slam_->statistics().tracked > 0) attempt([&] { write(seconds); });
@@ -306,6 +306,9 @@ void RunSession::track() {
     if (next.state != SourceState::unplugged) facts_.offered = static_cast<int>(next.index) + 1;
     if (facts_.startup_s == 0) facts_.startup_s = seconds_since_process_start() - loading_s_;
     camera_.add(next);
+    // Of what a camera skips nobody asks: it has no end.
+    if (viewer_ && !live_ && next.state != SourceState::unplugged)
+      viewer_->skipped(next.index + 1 - facts_.stamps.size() - (next.state == SourceState::frame ? 1 : 0));
     if (next.state == SourceState::unplugged) {
       warnings_.warn("unplugged", "the camera is gone; waiting for it to come back");
     } else if (next.state != SourceState::frame) {

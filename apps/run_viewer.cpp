@@ -8,6 +8,7 @@
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/util/errors.h"
+#include "dkb/util/timing.h"
 #include "interrupt.h"
 #include "number_check.h"
 #include "terminal.h"
@@ -86,7 +87,9 @@ void RunViewer::wait_turn(const Slam& slam, const std::function<void(bool)>& hol
   save_if_asked(slam);
   if (!viewer_->paused()) return;
   hold(true);
+  const Stopwatch watch;
   while (!Interrupt::happened() && !viewer_->wait_turn(kPatience)) save_if_asked(slam);
+  paused_s_ += watch.ms() / 1000;
   hold(false);
 }
 

@@ -34,7 +34,9 @@ class RunViewer {
   // Before a frame is taken: waits while the page says so, calling `hold` with true first and with false at last; saves
   // the map when it is asked to. A run that is interrupted waits no longer.
   void wait_turn(const Slam& slam, const std::function<void(bool)>& hold);
+  double paused_s() const { return paused_s_; }  // that it has waited so
   void show(FrameResult result, const Frame& frame, const Slam& slam, std::vector<Event> events);
+  void skipped(size_t frames) { viewer_->skipped(frames); }
   void say(const std::string& line) { viewer_->say(line); }
   std::vector<std::string> take_warnings() { return viewer_->take_warnings(); }
   // The run has ended: goes on serving until the interrupt, unless --viewer-exit.
@@ -46,6 +48,7 @@ class RunViewer {
   const bool serves_, exit_;
   const std::filesystem::path out_;
   std::unique_ptr<Viewer> viewer_;
+  double paused_s_ = 0;
 };
 
 }  // namespace dkb

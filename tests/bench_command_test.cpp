@@ -201,6 +201,30 @@ TEST_F(Bench, ATruthWithHiddenMarkersIsScored) {
   EXPECT_TRUE(fs::exists(temp_.path() / "out" / "plots" / "short-paths.svg"));
 }
 
+TEST_F(Bench, TheCamerasFileIsBesideTheSuite) {
+  fs::copy_file(sequence() / "camera.yaml", temp_ / "mine.yaml");
+  const std::string text = "seeds: 1\nmax_frames: 3\nsequences:\n  short: {path: " + sequence().string() +
+                           ", camera: mine.yaml}\nvariants:\n  plain: {detector: none}\n";
+  const Finished run = bench({suite(text).string(), "--out", out()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(results()["cells"][0]["runs"][0]["failure"], "");
+  const Finished gone =
+      bench({suite("sequences:\n  short: {path: " + sequence().string() + ", camera: gone.yaml}\nvariants:\n  plain:\n")
+                 .string(),
+             "--out", out("new")});
+  EXPECT_EQ(gone.exit_code, 2);
+  EXPECT_NE(gone.err.find((temp_ / "gone.yaml").string() + " does not exist"), std::string::npos) << gone.err;
+}
+
+TEST_F(Bench, LabelsOfANetworkAreBesideTheSuite) {
+  write_text(temp_ / "net.onnx", "none");
+  const std::string text = "seeds: 1\nmax_frames: 3\nsequences:\n  short: {path: " + sequence().string() +
+                           "}\nvariants:\n  plain: {detector: yolo, model: net.onnx, labels: names.txt}\n";
+  const Finished run = bench({suite(text).string(), "--out", out()});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find((temp_ / "names.txt").string() + " does not exist"), std::string::npos) << run.err;
+}
+
 TEST_F(Bench, WhatNobodyChoseIsNotMissing) {
   const std::string text = "seeds: 1\nmax_frames: 4\nsequences:\n  short: {path: " + sequence().string() +
                            "}\nvariants:\n  a:\n  b: {get: set it}\n  c: {get: set it}\n";

@@ -302,10 +302,14 @@ TEST(BenchReport, RecordsSurviveWritingAndReading) {
   r.online_m = ErrorStatistics();
   r.rpe = Scores();
   r.rpe->rotation_deg.rmse = 0.25;
+  r.rpe->rotation_deg.count = 5;
   r.maps = 3;
   EXPECT_EQ(parse_record(record_json(r), "r").rpe->rotation_deg.rmse, 0.25);
   EXPECT_EQ(parse_record(record_json(r), "r").maps, 3);
+  r.ape->rotation_deg = {};  // no rotation was determined
   const std::string text = record_json(r);
+  EXPECT_NE(text.find("\"rotation_deg\": null"), std::string::npos) << text;
+  EXPECT_EQ(parse_record(text, "r").ape->rotation_deg.count, 0u);
   EXPECT_EQ(record_json(parse_record(text, "r")), text);
   Random random(7);
   for (int i = 0; i < 2000; ++i) try {

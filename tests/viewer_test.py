@@ -206,17 +206,23 @@ def main():
         without = Run(folder / "without", viewer=False)
         assert without.process.wait(120) == 0
 
+        begun = time.time()
         run = Run(folder / "with", "--realtime")
         visitors_steer(run)
+        paused = time.time()
         strangers_stay_out(run)
         attackers_do_no_harm(run)
         early, slow = run.stream("?images=1&depth=1"), run.stream("?images=1")
         early.take(lambda s: s.frames and len(s.images) >= 2 and s.points)
         assert {kind for _, kind in early.images} == {0, 1} and early.frames[-1]["state"]["paused"]
+        time.sleep(1)
+        resumed = time.time()
         run.order("resume")
         end = run.until(lambda s: s["ended"])
         assert end["frame"] == FRAMES - 1 and end["tracked"] == FRAMES, end
-        assert json.loads((run.out / "stats.json").read_text())["skipped"] == 0, "the clock stood while it was paused"
+        stats = json.loads((run.out / "stats.json").read_text())
+        assert stats["skipped"] == 0, "the clock stood while it was paused"
+        assert stats["wall_s"] < time.time() - begun - (resumed - paused), "a pause is no time of the run"
         late = run.stream()
         whole = lambda s: s.frames and s.frames[-1]["state"]["ended"] and len(s.points) == end["map_points"] and s.facts == FRAMES
         for s in (early, late, slow):

@@ -16,7 +16,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr int kFormat = 1;
 
+// Of nothing they are not known: null.
 Json to_json(const ErrorStatistics& s) {
+  if (s.count == 0) return nullptr;
   return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.std},
           {"min", s.min},   {"max", s.max},   {"count", s.count}};
 }
@@ -25,6 +27,7 @@ Json to_json(const std::optional<Scores>& s) {
   return {{"translation_m", to_json(s->translation_m)}, {"rotation_deg", to_json(s->rotation_deg)}};
 }
 ErrorStatistics statistics_from(const Json& j) {
+  if (j.is_null()) return {};
   return {j.at("rmse"), j.at("mean"), j.at("median"), j.at("std"), j.at("min"), j.at("max"), j.at("count")};
 }
 

@@ -21,6 +21,7 @@
 #include "bench/bench_process.h"
 #include "bench/fnv1a.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/geometry/camera.h"
 #include "dkb/simulator/sequence_writer.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -141,6 +142,15 @@ std::optional<fs::path> locate(const std::string& text, const fs::path& base, st
     return {};
   }
   return (base / *expanded).lexically_normal();  // an absolute one replaces the base
+}
+
+// The same of a file that must be there.
+std::optional<fs::path> locate_file(const std::string& text, const fs::path& base, std::string* why) {
+  auto path = locate(text, base, why);
+  std::error_code ignored;
+  if (!path || fs::exists(*path, ignored)) return path;
+  *why = path->string() + " does not exist";
+  return {};
 }
 
 // Draws the sequence unless it is there. Benches that start together draw it once: the others wait.
@@ -290,23 +300,28 @@ class Runner {
       std::error_code ignored;
       if (path && (fs::exists(*path / "rgb.txt", ignored) || fs::exists(*path / "associations.txt", ignored))) {
         sequence_folder_[i] = *path;
-        continue;
+        if (s.camera.empty() || builtin_camera(s.camera)) continue;
+        if (const auto camera = locate_file(s.camera, root, &why)) {
+          camera_[i] = *camera;
+          continue;
+        }
+      } else if (path) {
+        why = path->string() + " holds no sequence in TUM layout";
       }
-      if (path) why = path->string() + " holds no sequence in TUM layout";
       if (s.get.empty()) throw InputError("sequence " + s.name + ": " + why);
       report_.left_out.push_back({"sequence " + s.name, why, s.get});
       no_sequence.insert(i);
     }
     for (const size_t i : variants) {
       const SuiteVariant& v = suite_.variants[i];
-      if (v.model.empty()) continue;
-      const auto path = locate(v.model, root, &why);
-      std::error_code ignored;
-      if (path && fs::exists(*path, ignored)) {
-        model_[i] = *path;
-        continue;
+      bool there = true;
+      for (const auto& [file, found] : {std::pair{&v.model, &model_}, std::pair{&v.labels, &labels_}}) {
+        if (!there || file->empty()) continue;
+        const auto path = locate_file(*file, root, &why);
+        there = path.has_value();
+        if (there) (*found)[i] = *path;
       }
-      if (path) why = path->string() + " does not exist";
+      if (there) continue;
       if (v.get.empty()) throw InputError("variant " + v.name + ": " + why);
       report_.left_out.push_back({"variant " + v.name, why, v.get});
       no_variant.insert(i);
@@ -347,12 +362,14 @@ class Runner {
     };
     const int64_t most = s.max_frames > 0 ? s.max_frames : suite_.max_frames;
     add("--max-frames", most > 0 ? std::to_string(most) : "");
-    add("--camera", s.camera);
+    const auto camera = camera_.find(job.sequence);
+    add("--camera", camera != camera_.end() ? camera->second.string() : s.camera);
     add("--disable", v.disabled());
     add("--detector", v.detector);
     add("--filter", v.filter);
     if (const auto model = model_.find(job.variant); model != model_.end()) add("--model", model->second.string());
-    add("--labels", v.labels);
+    if (const auto labels = labels_.find(job.variant); labels != labels_.end())
+      add("--labels", labels->second.string());
     add("--classes", v.classes);
     add("--inference", v.inference);
     if (!v.boxes.empty()) add("--boxes", (data / v.boxes).string());
@@ -446,7 +463,7 @@ class Runner {
   const std::atomic<bool>& stop_;
   fs::path program_;
   std::string program_id_;
-  std::map<size_t, fs::path> sequence_folder_, model_;
+  std::map<size_t, fs::path> sequence_folder_, camera_, model_, labels_;
   int started_ = 0;
   RunnerReport report_;
 };

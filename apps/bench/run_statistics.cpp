@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "dkb/util/errors.h"
@@ -51,13 +50,6 @@ double spread_of_rank_sums(const std::vector<std::vector<double>>& ranks) {
 }
 
 }  // namespace
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::sort(values.begin(), values.end());
-  const size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-}
 
 MedianInterval median_interval(const std::vector<double>& values) {
   MedianInterval result{median_of(values), {}, values.size() >= kLeastRuns};

@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "dkb/evaluation/trajectory_error.h"
+
 namespace dkb {
 
 // Statistics over repeated runs. Each is a function of its arguments alone: resampling has a seed of its own.
-
-// Middle value, mean of the two middle ones when their number is even; NaN for none. Values must not be NaN.
-double median_of(std::vector<double> values);
 
 struct Interval {
   double low = 0, high = 0;

@@ -65,7 +65,6 @@ svg .line.grid{stroke-width:1}
 .overlay text.box{fill:#fff;font-size:10px;paint-order:stroke;stroke:#000;stroke-width:2px}
 .key{display:flex;flex-wrap:wrap;gap:4px 20px;font-size:14px;margin:4px 0 12px}
 .key svg{display:inline-block;width:22px;height:16px;vertical-align:-3px;margin-right:5px;background:#3b434c;border-radius:3px}
-.key svg.plain{background:none}
 .stretch{display:grid;grid-template-columns:minmax(0,240px) 1fr;gap:14px;margin:12px 0;align-items:start;break-inside:avoid}
 .stretch.bare{grid-template-columns:1fr}
 .stretch p{margin:0 0 4px}

@@ -26,8 +26,8 @@ struct Context {
   size_t row_of(double timestamp) const;      // the row of that stamp, to 10 us
 };
 
-// The text that stands first: what a reader in a hurry needs.
-std::string verdict(const Context& c);
+// The text that stands first: what a reader in a hurry needs, and links to those of the sections that there are.
+std::string verdict(const Context& c, const std::string& sections);
 std::string path_section(const Context& c);
 std::string time_section(const Context& c);
 std::string lost_section(const Context& c);

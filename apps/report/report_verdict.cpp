@@ -77,8 +77,11 @@ std::string what_limited(const Context& c, double tracking_s, double waiting_s) 
   if (rest > tracking_s)
     return fmt::format("{} ({} of the time)", c.facts.realtime ? "the camera's pace" : "reading the images",
                        share(rest));
-  const std::string stage = largest({"features", "motion", "filter", "keyframe_decision"});
-  const double known = total("features") + total("motion") + total("filter") + total("keyframe_decision");
+  // Stages that tracking itself consists of; what is left of it is the pose. The page (web/src/charts.ts) has the same.
+  const auto parts = {"features", "motion", "flow", "filter", "keyframe_decision"};
+  const std::string stage = largest(parts);
+  double known = 0;
+  for (const char* part : parts) known += total(part);
   const bool pose = tracking_s - known > total(stage);
   return fmt::format("tracking ({} of the time; {} alone {})", share(tracking_s),
                      pose                           ? "the pose"
@@ -100,7 +103,7 @@ std::string speed_tile(const Context& c) {
 
 }  // namespace
 
-std::string verdict(const Context& c) {
+std::string verdict(const Context& c, const std::string& sections) {
   const Statistics& s = c.facts.statistics;
   const int unstarted = s.frames - s.tracked - s.lost;
   std::string out = "<header>\n<div class=\"dim\">Report of a run · dkb-slam " + svg::escaped(c.facts.version) +
@@ -110,9 +113,8 @@ std::string verdict(const Context& c) {
        {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"time", "Over time"},
         std::pair{"tracking", "Tracking"}, std::pair{"pictures", "Pictures"}, std::pair{"stages", "Times"},
         std::pair{"events", "Events"}, std::pair{"settings", "Settings"}}) {
-    const bool there = std::string(id) == "settings" ||
-                       (std::string(id) == "events" ? !c.log.happenings().empty() : !c.log.rows().empty());
-    if (there) out += fmt::format("<a href=\"#{}\">{}</a> ", id, name);
+    if (sections.find(fmt::format("<h2 id=\"{}\">", id)) != std::string::npos)
+      out += fmt::format("<a href=\"#{}\">{}</a> ", id, name);
   }
   out += "</nav>\n</header>\n<main>\n<div class=\"tiles\">\n";
   std::string more = fmt::format("{:.1f} %", c.facts.offered > 0 ? 100.0 * s.tracked / c.facts.offered : 0.0);

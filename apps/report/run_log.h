@@ -48,7 +48,6 @@ class RunLog {
   const std::vector<FrameRow>& rows() const { return rows_; }
   const std::vector<std::string>& rules() const { return rules_; }
   const std::vector<Happening>& happenings() const { return happenings_; }  // the first 200
-  const std::vector<OverlayPicture>& even() const { return even_; }         // spread evenly over the run
   const std::vector<OverlayPicture>& lost() const { return lost_; }         // first of a stretch without poses
   std::vector<const OverlayPicture*> pictures() const;                      // all of them, by row, none twice
 

@@ -106,12 +106,13 @@ std::string report_html(const RunLog& log, const ReportFacts& facts, const Truth
       "content=\"width=device-width, initial-scale=1\"/>\n<meta http-equiv=\"Content-Security-Policy\" "
       "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"/>\n<title>Run: " +
       svg::escaped(facts.name) + "</title>\n<style>" + kPageStyle + "</style>\n</head>\n<body>\n";
-  out += verdict(c);
+  std::string sections;
   if (any) {
-    out += lost_section(c) + path_section(c) + time_section(c) + tracking_section(c) + pictures_section(c) +
-           stages_section(c) + events_section(c);
+    sections = lost_section(c) + path_section(c) + time_section(c) + tracking_section(c) + pictures_section(c) +
+               stages_section(c) + events_section(c);
   }
-  return out + settings_section(c) + "</body>\n</html>\n";
+  sections += settings_section(c);
+  return out + verdict(c, sections) + sections + "</body>\n</html>\n";
 }
 
 }  // namespace dkb::report

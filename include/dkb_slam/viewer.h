@@ -42,8 +42,11 @@ struct ViewerOptions {
 ///
 ///     const auto viewer = dkb::open_viewer(options);
 ///     ...
-///     while (!viewer->wait_turn(std::chrono::seconds(1))) continue;  // a visitor has paused
-///     if (viewer->take_save_order()) slam.save_map("map.dkb");
+///     const auto save_if_asked = [&] {
+///       if (viewer->take_save_order()) slam.save_map("map.dkb");
+///     };
+///     while (!viewer->wait_turn(std::chrono::seconds(1))) save_if_asked();  // a visitor has paused
+///     save_if_asked();
 ///     dkb::FrameResult result = slam.process(frame);
 ///     viewer->show(result, frame, slam.map(), slam.take_events());
 ///
@@ -56,6 +59,8 @@ class DKB_SLAM_API Viewer {
   /// A frame of the source, and what came of it. Hands over and returns: of frames that come faster than clients take
   /// them, the newest is shown. Only a recording that is not in real time takes every frame, and may keep this waiting.
   virtual void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events) = 0;
+  /// Of the source's frames so far, those that there is no result of: unreadable or dropped ones.
+  virtual void skipped(size_t frames) = 0;
   virtual void say(const std::string& line) = 0;  ///< one line for the list of events
   virtual void ended(MapSnapshot map) = 0;        ///< there will be no further frame; the map as it is at the end
 
@@ -65,7 +70,8 @@ class DKB_SLAM_API Viewer {
   virtual void show_dense_map(std::function<DenseMap()> task) = 0;  ///< runs the task on a thread of its own
 
   /// What visitors ask for. The feeding thread calls this before each frame: true when it may go on; false when the
-  /// session is still paused after `patience`.
+  /// session is still paused after `patience`, or somebody wants the map saved: at once, until take_save_order() is
+  /// called.
   virtual bool wait_turn(std::chrono::milliseconds patience) = 0;
   virtual bool paused() const = 0;                                  ///< a visitor has paused it
   virtual bool take_save_order() = 0;                               ///< somebody wants the map saved; once each time

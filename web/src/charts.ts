@@ -8,6 +8,7 @@ import type { SessionEvent } from "./events";
 const kept = 18000; // frames, as the server keeps
 const shown = 60; // [s]
 // Stages that tracking itself consists of, bottom to top; what is left of it is the rest. Others have threads of their own.
+// A report (apps/report/report_verdict.cpp) has the same list.
 const parts = ["features", "motion", "flow", "filter", "keyframe_decision", "rest"];
 const beside = ["mapping", "loop", "global_ba", "detection", "segmentation", "carrying", "wait_mapper", "wait_detector"];
 const shapes = ["●", "■", "▲", "◆"];

@@ -161,7 +161,7 @@ export class Panel {
       case Kind.hello: {
         const hello = json(data) as Hello;
         this.view.begin(hello);
-        this.picture.begin(hello.camera.width, hello.camera.height);
+        this.picture.begin(hello.camera.width, hello.camera.height, hello.feature_unit);
         this.charts.begin(hello.budget_ms);
         this.at("source").textContent = hello.source;
         this.events.begin();

@@ -21,11 +21,14 @@ export class Picture {
   private movers: Mover[] = [];
   private boxes: { class: string; box: number[] }[] = [];
   private waiting = false;
+  private unit = 1 / 16;
 
   constructor(private canvas: HTMLCanvasElement) {}
 
-  begin(width: number, height: number): void {
+  // `unit` [px]: that features are told in; older recordings do not say it.
+  begin(width: number, height: number, unit = 1 / 16): void {
     this.width = width;
+    this.unit = unit;
     this.canvas.width = 640;
     this.canvas.height = Math.round((640 * height) / width);
     this.image?.close();
@@ -67,7 +70,7 @@ export class Picture {
     const report = this.report, s = this.canvas.width / this.width;
     let best = 10, words = "";
     for (let i = 0, n = report ? report.getUint32(0, true) : 0; i < n; i++) {
-      const fate = this.fate(i), u = report!.getUint16(4 + 8 * i, true) / 16, v = report!.getUint16(6 + 8 * i, true) / 16;
+      const fate = this.fate(i), u = report!.getUint16(4 + 8 * i, true) * this.unit, v = report!.getUint16(6 + 8 * i, true) * this.unit;
       const distance = Math.hypot(u * s - x, v * s - y);
       if (!this.shown.has(fate) || distance >= best) continue;
       best = distance;
@@ -110,7 +113,7 @@ export class Picture {
       for (let i = 0; i < n; i++) {
         const at = 4 + 8 * i;
         if (this.fate(i) !== kind) continue;
-        shapes[kind]((report.getUint16(at, true) / 16) * s, (report.getUint16(at + 2, true) / 16) * s);
+        shapes[kind](report.getUint16(at, true) * this.unit * s, report.getUint16(at + 2, true) * this.unit * s);
       }
       g.strokeStyle = colour("--" + kind);
       g.stroke();

@@ -118,6 +118,7 @@ export class Player {
         return answer.arrayBuffer();
       })
       .then((bytes) => {
+        if (bytes.byteLength === 0) throw new Error("the file has become shorter");
         this.failures = 0;
         if (generation !== this.generation) return;
         const joined = new Uint8Array(this.buffer.length - this.used + bytes.byteLength);

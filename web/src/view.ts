@@ -6,7 +6,7 @@ import { Cloud, HostedLines, Poses } from "./hosted";
 
 export type Mover = { id: number; class: string; position: number[]; velocity: number[]; size: number[]; box: number[] };
 export type Hello = {
-  version: string; source: string; realtime: boolean; budget_ms: number; unit: number;
+  version: string; source: string; realtime: boolean; budget_ms: number; unit: number; feature_unit?: number;
   camera: { width: number; height: number; fx: number; fy: number; cx: number; cy: number };
 };
 export type Mode = "follow" | "free" | "top";
@@ -131,7 +131,9 @@ export class View {
       dense.geometry = new THREE.BufferGeometry();
     }
     this.aligned = false;
-    this.truth.visible = this.surface.visible = this.grid.visible = false;
+    this.truth.visible = this.surface.visible = this.grid.visible = this.frustum.visible = false;
+    this.cameraPose = this.whole = null;
+    this.endMeasure();
     const c = hello.camera, z = 0.16;
     const corner = (x: number, y: number) => [((x - c.cx) / c.fx) * z, ((y - c.cy) / c.fy) * z, z];
     const corners = [corner(0, 0), corner(c.width, 0), corner(c.width, c.height), corner(0, c.height)];
@@ -258,6 +260,9 @@ export class View {
       this.truth.matrix.copy(this.matrix(worldFromTruth));
       this.aligned = true;
       this.truth.visible = !this.hidden.has("truth");
+    } else {
+      // Not yet laid on the map that the camera is in now.
+      this.aligned = this.truth.visible = false;
     }
     this.moverList = movers;
     movers.forEach((m, i) => {

@@ -74,7 +74,8 @@ for (const before of [40, 104, 105, 106, 150])
   }
 
 // Fetches that fail are not tried again with every turn, and the film goes on when they succeed.
-for (const failing of [async () => ({ ok: false, status: 500 }), async () => { throw new TypeError("no network"); }]) {
+for (const failing of [async () => ({ ok: false, status: 500 }), async () => { throw new TypeError("no network"); },
+  async () => ({ ok: true, arrayBuffer: async () => new ArrayBuffer(0) })]) { // of a file that has become shorter
   const file = recording(0);
   let fetches = 0;
   globalThis.fetch = (url) => (fetches++, failing(url));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "dkb/geometry/decompositions.h"
@@ -186,6 +187,13 @@ void EvaluationOptions::check() const {
   rpe_delta.check();
 }
 
+double median_of(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
 ErrorStatistics error_statistics(const std::vector<double>& errors) {
   ErrorStatistics s;
   s.count = errors.size();
@@ -198,11 +206,9 @@ ErrorStatistics error_statistics(const std::vector<double>& errors) {
   double deviations = 0;
   for (const double e : errors) deviations += (e - s.mean) * (e - s.mean);
   s.std = std::sqrt(deviations / n);
-  std::vector<double> sorted = errors;
-  std::sort(sorted.begin(), sorted.end());
-  s.min = sorted.front(), s.max = sorted.back();
-  const size_t middle = sorted.size() / 2;
-  s.median = sorted.size() % 2 == 1 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
+  const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+  s.min = *least, s.max = *most;
+  s.median = median_of(errors);
   return s;
 }
 

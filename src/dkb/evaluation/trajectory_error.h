@@ -43,6 +43,9 @@ struct EvaluationOptions {
   void check() const;  // throws InvalidOption
 };
 
+// Middle value, mean of the two middle ones when their number is even; NaN for none. Values must not be NaN.
+double median_of(std::vector<double> values);
+
 struct ErrorStatistics {
   double rmse = 0, mean = 0, median = 0, std = 0, min = 0, max = 0;
   size_t count = 0;

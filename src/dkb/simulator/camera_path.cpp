@@ -50,7 +50,7 @@ Rigid3 shaken(const Eigen::Vector3d& position, double yaw, double pitch, double 
   return camera_pose(position + h.shift, yaw + h.yaw, pitch + h.pitch, h.roll);
 }
 
-CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {
+CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma, double duration) {
   struct Samples {
     double start = 0;
     std::vector<Eigen::Vector3d> p;
@@ -58,7 +58,9 @@ CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {
   };
   constexpr double kStep = 0.005;  // [s]
   const double start = poses.front().time, end = poses.back().time;
-  const auto n = static_cast<size_t>(std::floor((end - start) / kStep)) + 1;
+  const int half_window = static_cast<int>(std::ceil(3 * sigma / kStep));
+  const double asked_for = std::min(end - start, duration + kStep * (half_window + 1));
+  const auto n = static_cast<size_t>(std::floor(asked_for / kStep)) + 1;
   Samples raw;
   size_t j = 0;
   for (size_t i = 0; i < n; ++i) {
@@ -75,7 +77,6 @@ CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma) {
   }
   auto smooth = std::make_shared<Samples>();
   smooth->start = start;
-  const int half_window = static_cast<int>(std::ceil(3 * sigma / kStep));
   for (int i = 0; i < static_cast<int>(n); ++i) {
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     Eigen::Vector4d q = Eigen::Vector4d::Zero();

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "dkb/geometry/rigid3.h"
@@ -30,11 +31,13 @@ Tremor hand_tremor(double t, double metres, double radians, uint64_t seed);
 Rigid3 shaken(const Eigen::Vector3d& position, double yaw, double pitch, double t, double strength, uint64_t seed);
 
 // A path through stamped poses (stamps rising): interpolated, then smoothed by a Gaussian of `sigma` [s], so that
-// velocities are steady and the noise of a motion-capture system does not shake the pictures.
+// velocities are steady and the noise of a motion-capture system does not shake the pictures. What comes more than
+// `duration` [s] after the first pose is not asked for.
 struct TimedPose {
   double time = 0;
   Rigid3 world_from_cam;
 };
-CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma);
+CameraPath smooth_path(const std::vector<TimedPose>& poses, double sigma,
+                       double duration = std::numeric_limits<double>::infinity());
 
 }  // namespace dkb::sim

@@ -94,11 +94,11 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
   const double start = poses.front().time, duration = poses.back().time - start;
   std::vector<TimedPose> shifted = poses;
   for (TimedPose& p : shifted) p.time -= start;
-  const CameraPath world_path = smooth_path(shifted, 0.03);
   scene.start_stamp = start;
   const int available = static_cast<int>(std::floor(duration * request.fps + 1e-6)) + 1;
   scene.frames = std::min(request.frames > 0 ? request.frames : 300, available);
   const double used = (scene.frames - 1) / request.fps;
+  const CameraPath world_path = smooth_path(shifted, 0.03, used + 1);  // exposures and depth stamps reach beyond
 
   std::vector<TimedPose> samples;
   for (double t = 0; t <= used + 1e-9; t += 0.1) samples.push_back({t, world_path(t)});

@@ -38,6 +38,9 @@ std::vector<sim::TimedPose> poses_of_file(const std::string& file) {
   if (poses.size() < 2)
     throw InputError(file + ": holds " + std::to_string(poses.size()) +
                      " poses; a camera path needs at least 2 at different times");
+  if (poses.back().time - poses.front().time > kLongest)
+    throw InputError(fmt::format("{}: its stamps reach from {:.3f} to {:.3f} s; a camera path lasts 10 hours at most",
+                                 file, poses.front().time, poses.back().time));
   return poses;
 }
 

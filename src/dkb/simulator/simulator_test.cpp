@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/simulator/simulator.h"
+#include "dkb/simulator/camera_path.h"
 #include "dkb/simulator/simulator_test_tools.h"
 
 #include <gtest/gtest.h>
@@ -64,7 +65,7 @@ TEST(Simulator, DepthOfOneFrameProjectsOntoDepthOfAnother) {
 }
 
 TEST(Simulator, MeasuredDepthIsOffByTheNoiseOfItsRange) {
-  // 0.0012 + 0.0019 (z - 0.4)^2 m, and a disparity step of 1/8 px: z^2 / (8 f b) wide, spread / sqrt(12).
+  // 0.92 (0.0012 + 0.0019 (z - 0.4)^2) m, and a disparity step of 1/8 px: z^2 / (8 f b) wide, spread / sqrt(12).
   SimulatorOptions o = small("rush", 6);
   o.people = 0;  // nothing moves, so that truth holds at the depth stamp too
   const Simulator s(o);
@@ -94,7 +95,7 @@ TEST(Simulator, MeasuredDepthIsOffByTheNoiseOfItsRange) {
     double sum2 = 0, expected2 = 0;
     const double z = 0.5 * range + 0.25, step = z * z / (8 * fb);
     for (const double v : e) sum2 += v * v;
-    expected2 = std::pow(0.0012 + 0.0019 * (z - 0.4) * (z - 0.4), 2) + step * step / 12;
+    expected2 = std::pow(0.92 * (0.0012 + 0.0019 * (z - 0.4) * (z - 0.4)), 2) + step * step / 12;
     EXPECT_NEAR(std::sqrt(sum2 / static_cast<double>(e.size())) / std::sqrt(expected2), 1.0, 0.35) << z << " m";
   }
   EXPECT_GE(ranges, 2);
@@ -307,12 +308,27 @@ TEST_F(SimulatorFiles, CameraFollowsAGivenPath) {
   ASSERT_EQ(longer.notes().size(), 1U);
 }
 
+TEST(SmoothPath, IsTheSameUpToWhatIsAskedFor) {
+  std::vector<sim::TimedPose> poses;
+  for (int i = 0; i < 100; ++i)
+    poses.push_back({0.1 * i, sim::camera_pose({std::sin(i), std::cos(2.0 * i), 0.1 * (i % 7)}, 0.3 * i, 0.1)});
+  const sim::CameraPath whole = sim::smooth_path(poses, 0.03), part = sim::smooth_path(poses, 0.03, 3.01);
+  for (double t = -0.1; t < 3.01; t += 0.003) {
+    EXPECT_EQ(part(t).translation, whole(t).translation) << t;
+    EXPECT_EQ(part(t).rotation.coeffs(), whole(t).rotation.coeffs()) << t;
+  }
+  EXPECT_NE(part(8).translation, whole(8).translation);
+}
+
 TEST_F(SimulatorFiles, BadPathNamesFileAndLine) {
   SimulatorOptions o = small("room");
   o.path = file("path.txt", "0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n");
   EXPECT_NE(error_of(o).find("path.txt:2"), std::string::npos) << error_of(o);
   o.path = file("short.txt", "0 0 0 0 0 0 0 1\n");
   EXPECT_NE(error_of(o).find("at least 2"), std::string::npos) << error_of(o);
+  o.path = file("long.txt", "5 0 0 0 0 0 0 1\n10000005 1 0 0 0 0 0 1\n");
+  EXPECT_NE(error_of(o).find("long.txt: its stamps reach from 5.000 to 10000005.000 s"), std::string::npos)
+      << error_of(o);
 }
 
 TEST(Simulator, UnknownSceneNamesTheNearest) {

@@ -18,6 +18,6 @@ struct ViewerRefusal {
 
 // Throws nothing: when it returns null, `refusal` says why. The symbol's number changes with what crosses this border.
 using OpenViewer = Viewer* (*)(const ViewerOptions& options, ViewerRefusal* refusal);
-inline constexpr const char* kOpenViewerSymbol = "dkb_open_viewer_4";
+inline constexpr const char* kOpenViewerSymbol = "dkb_open_viewer_5";
 
 }  // namespace dkb

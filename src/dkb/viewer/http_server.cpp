@@ -219,11 +219,13 @@ void HttpServer::accept_all() {
   }
 }
 
-// The oldest connection that still owes its request, or is only waited for, goes.
+// The oldest connection that still owes its request, is only waited for or does not take its answer goes.
 bool HttpServer::make_room() {
-  for (const Phase phase : {Phase::lingering, Phase::reading}) {
-    const auto oldest =
-        std::find_if(connections_.begin(), connections_.end(), [&](const Connection& c) { return c.phase == phase; });
+  const Clock::time_point now = Clock::now();
+  for (const Phase phase : {Phase::lingering, Phase::reading, Phase::answering}) {
+    const auto oldest = std::find_if(connections_.begin(), connections_.end(), [&](const Connection& c) {
+      return c.phase == phase && (phase != Phase::answering || now - c.taken >= limits_.stuck);
+    });
     if (oldest == connections_.end()) continue;
     if (!oldest->closed) close(oldest->fd);
     connections_.erase(oldest);
@@ -282,7 +284,8 @@ void HttpServer::send_answer(Connection& c, HttpAnswer answer) {
   if (answer.status == 405) c.head += "Allow: GET, POST\r\n";
   c.head += kCommonHeaders;
   c.phase = c.stream != nullptr ? Phase::streaming : Phase::answering;
-  c.deadline = Clock::now() + (c.stream != nullptr ? limits_.stalled : limits_.answer);
+  c.taken = Clock::now();
+  c.deadline = c.taken + (c.stream != nullptr ? limits_.stalled : limits_.answer);
   news_ = news_ || c.stream != nullptr;
   write(c);
 }
@@ -299,7 +302,8 @@ void HttpServer::write(Connection& c) {
       return;
     }
     c.sent += static_cast<size_t>(n);
-    if (c.phase == Phase::streaming) c.deadline = Clock::now() + limits_.stalled;
+    c.taken = Clock::now();
+    if (c.phase == Phase::streaming) c.deadline = c.taken + limits_.stalled;
   }
   if (c.phase == Phase::answering) {
     // Closed at once, a connection whose client is still sending would be reset, and the answer lost.

@@ -47,8 +47,10 @@ class HttpServer {
     std::chrono::milliseconds request{5000};   // from the connection to the request's last byte
     std::chrono::milliseconds answer{30000};   // for a whole answer
     std::chrono::milliseconds stalled{15000};  // of a stream, without a byte taken
-    std::chrono::milliseconds linger{1000};    // after an answer, for what the client still sends
-    std::chrono::milliseconds tick{33};        // between parts of a stream
+    std::chrono::milliseconds stuck{
+        1000};  // of an answer, without a byte taken: it then makes room where that is short
+    std::chrono::milliseconds linger{1000};  // after an answer, for what the client still sends
+    std::chrono::milliseconds tick{33};      // between parts of a stream
   };
 
   // Binds; port 0 = any. Throws InputError.
@@ -72,6 +74,7 @@ class HttpServer {
     int fd = -1;
     Phase phase = Phase::reading;
     Clock::time_point deadline;
+    Clock::time_point taken;  // when the client last took a byte of the answer
     HttpRequestParser parser;
     std::string head, own_body;
     std::string_view body;

@@ -31,13 +31,18 @@ class Service final : public HttpService {
   HttpAnswer answer(const HttpRequest& request) override {
     HttpAnswer answer;
     if (request.path == "/throw") throw std::bad_alloc();
-    if (request.path == "/stream")
+    if (request.path == "/large")
+      answer.body = large_;
+    else if (request.path == "/stream")
       answer.stream = std::make_unique<Parts>();
     else
       answer.own_body = request.method + " " + request.path + " " + request.body;
     return answer;
   }
   void tick(size_t) override {}
+
+ private:
+  const std::string large_ = std::string(size_t{16} << 20, 'x');  // more than the kernel holds for a client
 };
 
 sockaddr_in loopback(uint16_t port) {
@@ -79,7 +84,8 @@ class HttpServerTest : public testing::Test {
  protected:
   static HttpServer::Limits limits() {
     using std::chrono::milliseconds;
-    return {milliseconds(300), milliseconds(1000), milliseconds(500), milliseconds(200), milliseconds(5)};
+    return {milliseconds(300), milliseconds(1000), milliseconds(500),
+            milliseconds(200), milliseconds(200),  milliseconds(5)};
   }
   ~HttpServerTest() override {
     server_.stop();
@@ -140,6 +146,18 @@ TEST_F(HttpServerTest, ServesBesideAThousandIdleConnections) {
   EXPECT_TRUE(get("/b").starts_with("HTTP/1.1 200 "));
   for (const int fd : idle) close(fd);
   EXPECT_TRUE(get("/c").starts_with("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, ServesBesideConnectionsThatDoNotTakeTheirAnswers) {
+  std::vector<int> deaf;
+  for (size_t i = 0; i < HttpServer::kMaxConnections; ++i) {
+    deaf.push_back(connect_to());
+    const std::string request = get_request("/large");
+    send(deaf.back(), request.data(), request.size(), MSG_NOSIGNAL);
+  }
+  std::this_thread::sleep_for(limits().stuck + std::chrono::milliseconds(200));
+  EXPECT_NE(ask(get_request("/x")).find("GET /x"), std::string::npos);
+  for (const int fd : deaf) close(fd);
 }
 
 TEST_F(HttpServerTest, RestsWhileNoDescriptorIsLeftForWhoKnocks) {

@@ -9,6 +9,7 @@ namespace {
 
 constexpr size_t kEdges = 6;             // of a keyframe to earlier ones: more are a tangle
 constexpr int kSharedPoints = 20;        // of an edge that is shown
+constexpr int kMovedLocally = 12;        // keyframes that a local adjustment moves; the page counts alike
 constexpr double kPoseTolerance = 1e-5;  // [m], [rad]
 
 bool same_pose(const Rigid3& a, const Rigid3& b) {
@@ -51,12 +52,14 @@ bool MapDeltas::begins_otherwise(const Map& map) const {
 
 void MapDeltas::update_keyframes(const Map& map) {
   keyframes_.resize(static_cast<size_t>(map.keyframe_count()));
+  int moved = 0;
   for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
     const dkb::Keyframe* given = map.keyframe(id);
     if (given == nullptr) continue;
     Keyframe& known = keyframes_[static_cast<size_t>(id)];
     const Rigid3 pose = map.cam_from_world(id).inverse();
     if (known.version == 0 || known.culled != given->culled || !same_pose(known.world_from_cam, pose)) {
+      moved += known.version > 0 ? 1 : 0;
       known.version = version_;
       known.frame = given->frame;
       known.timestamp = given->timestamp;
@@ -74,6 +77,7 @@ void MapDeltas::update_keyframes(const Map& map) {
     known.covisible = std::move(edges);
     known.covisibility_version = version_;
   }
+  corrections_ += moved > kMovedLocally ? 1 : 0;
 }
 
 void MapDeltas::update_points(const Map& map) {

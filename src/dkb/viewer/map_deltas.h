@@ -26,8 +26,8 @@ enum class StreamMessage : uint8_t {
   path = 6,          // {uint32 frame; int32 keyframe; float32 x y z}: camera positions in a keyframe's axes
   facts = 7,         // {uint32 frame; float32 tracking_ms, waiting_ms, time; uint16 inliers; uint8 state, keyframe}
   events = 8,        // JSON array
-  frame = 9,         // uint32 length of JSON, JSON padded to 4; uint32 n, n x {uint16 x, y (1/16 px); uint8 state,
-                     // reason; uint16 0}; uint32 cell, width, height of the mask, its bits by rows
+  frame = 9,         // uint32 length of JSON, JSON padded to 4; uint32 n, n x {uint16 x, y in units of the hello's;
+                     // uint8 state, reason; uint16 0}; uint32 cell, width, height of the mask, its bits by rows
   image = 10,        // uint32 frame, uint32 0 colour or 1 depth, JPEG
   truth = 11,        // {float32 time, x, y, z}: the whole of it
   path_reset = 12,   // empty: the path comes anew
@@ -101,6 +101,9 @@ class MapDeltas {
   // Returns whether nothing is left.
   bool write(Client& client, StreamWriter& out, size_t budget) const;
 
+  // Updates that moved more keyframes at once than a local adjustment does.
+  uint64_t corrections() const { return corrections_; }
+
   double unit() const { return unit_; }  // [m]
   int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
   uint64_t world() const { return world_; }  // its number: another one after clear()
@@ -131,7 +134,7 @@ class MapDeltas {
   void update_points(const Map& map);
 
   const double unit_;  // [m]
-  uint64_t world_ = 1, version_ = 0, loops_version_ = 0;
+  uint64_t world_ = 1, version_ = 0, loops_version_ = 0, corrections_ = 0;
   std::vector<Keyframe> keyframes_;
   std::vector<Block> blocks_;
   std::vector<LoopInfo> loops_;

@@ -74,6 +74,10 @@ void Session::show(FrameResult result, Frame frame, MapSnapshot map, std::vector
   wake();
 }
 
+void Session::skipped(size_t frames) {
+  model_.skipped(frames);
+}
+
 void Session::say(const std::string& line) {
   model_.say(line);
   wake();
@@ -213,7 +217,7 @@ void Session::tick(size_t streams) {
 
 }  // namespace dkb
 
-extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_4(const dkb::ViewerOptions& options,
+extern "C" __attribute__((visibility("default"))) dkb::Viewer* dkb_open_viewer_5(const dkb::ViewerOptions& options,
                                                                                  dkb::ViewerRefusal* refusal) {
   try {
     return new dkb::Session(options);

@@ -21,6 +21,7 @@ class Session final : public Viewer, private HttpService {
 
   std::string url() const override;
   void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events) override;
+  void skipped(size_t frames) override;
   void say(const std::string& line) override;
   void ended(MapSnapshot map) override;
   bool wants_dense_map() const override;

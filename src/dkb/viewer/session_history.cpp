@@ -132,12 +132,20 @@ void SessionHistory::write(Client& client, StreamWriter& out, int keyframes) con
   }
 }
 
+KeyframeId SessionHistory::current_root(const Map& map) const {
+  for (auto p = path_.rbegin(); p != path_.rend(); ++p)
+    if (p->host != kNoKeyframe && p->host < map.keyframe_count()) return map.root(p->host);
+  return kNoKeyframe;
+}
+
 std::optional<Rigid3> SessionHistory::world_from_truth(const Map& map,
                                                        const std::vector<ViewerOptions::TruePosition>& truth) const {
   constexpr int64_t kMaxDifference = 20'000'000;  // [ns]
+  const std::vector<KeyframeId> roots = map.root_of_each();
+  const KeyframeId root = current_root(map);
   std::vector<Eigen::Vector3d> from, to;
   for (const PathPoint& p : path_) {
-    if (p.host == kNoKeyframe || p.host >= map.keyframe_count()) continue;
+    if (p.host == kNoKeyframe || p.host >= map.keyframe_count() || roots[static_cast<size_t>(p.host)] != root) continue;
     auto after = std::lower_bound(truth.begin(), truth.end(), p.stamp_ns,
                                   [](const auto& t, int64_t stamp) { return t.stamp_ns < stamp; });
     if (after != truth.begin() &&

@@ -55,8 +55,11 @@ class SessionHistory {
 
   double seconds_of(int64_t stamp_ns) const;  // since the first frame
   size_t path_size() const { return path_.size(); }
+  // The root of the map that the newest point of the path is in; none while there is no point.
+  KeyframeId current_root(const Map& map) const;
   // The motion from the truth's world to the map's that brings the path and the truth together; nothing before there
-  // are enough positions of the same time.
+  // are enough positions of the same time. Of maps that are not joined only the newest point's counts: the others have
+  // worlds of their own.
   std::optional<Rigid3> world_from_truth(const Map& map, const std::vector<ViewerOptions::TruePosition>& truth) const;
 
  private:

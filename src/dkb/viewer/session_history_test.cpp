@@ -122,12 +122,20 @@ TEST(SessionHistory, StandingStillMakesNoPath) {
   EXPECT_EQ(history.path_size(), 2U);
 }
 
-TEST(SessionHistory, BringsTheTruthToTheMap) {
+// A map without points, whose keyframes hang on nothing: each is a map of its own.
+Map unjoined(int keyframes) {
   Map map;
-  Keyframe keyframe;
-  keyframe.id = 0;
-  keyframe.features = std::make_shared<RgbdFeatures>();
-  map.add_keyframe(keyframe);
+  for (KeyframeId id = 0; id < keyframes; ++id) {
+    Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.features = std::make_shared<RgbdFeatures>();
+    map.add_keyframe(keyframe);
+  }
+  return map;
+}
+
+TEST(SessionHistory, BringsTheTruthToTheMap) {
+  const Map map = unjoined(1);
   SessionHistory history;
   std::vector<ViewerOptions::TruePosition> truth;
   const Rigid3 truth_from_world({Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))}, {1, 2, 3});
@@ -143,6 +151,29 @@ TEST(SessionHistory, BringsTheTruthToTheMap) {
   const auto found = history.world_from_truth(map, truth);
   ASSERT_TRUE(found);
   EXPECT_LT((found->translation - truth_from_world.inverse().translation).norm(), 1e-9);
+}
+
+TEST(SessionHistory, BringsTheTruthToTheMapThatTheNewestPoseIsIn) {
+  const Map map = unjoined(2);
+  SessionHistory history;
+  std::vector<ViewerOptions::TruePosition> truth;
+  const Rigid3 of_first({Eigen::Quaterniond::Identity()}, {1, 2, 3});
+  const Rigid3 of_second({Eigen::Quaterniond(Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitZ()))}, {-4, 0, 1});
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d position(0.1 * i, 0.05 * (i % 7), 0.02 * (i % 5));
+    FrameFact f = fact(i, 0);
+    f.host = i < 40 ? 0 : 1;
+    f.position_in_host = (i < 40 ? of_first : of_second) * position;
+    history.add(f);
+    truth.push_back({f.stamp_ns, position});
+    if (i < 39) continue;
+    EXPECT_EQ(history.current_root(map), f.host);
+    const auto found = history.world_from_truth(map, truth);
+    ASSERT_EQ(found.has_value(), i < 40 || i >= 49) << i;
+    if (found) {
+      EXPECT_LT(found->rotation.angularDistance((i < 40 ? of_first : of_second).rotation), 1e-9) << i;
+    }
+  }
 }
 
 }  // namespace

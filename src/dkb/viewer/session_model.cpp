@@ -56,12 +56,17 @@ FrameFact fact_of(const FrameResult& result, const MapSnapshot& map) {
   return fact;
 }
 
-void put_features(StreamWriter& m, const FrameResult& result) {
+// [px] In which features are told: 16 bits reach over the image, however large.
+double feature_unit(const Camera& camera) {
+  return std::max({camera.width, camera.height, 1}) / 65536.0;
+}
+
+void put_features(StreamWriter& m, const FrameResult& result, double unit) {
   m.put(static_cast<uint32_t>(result.features.size()));
+  const auto in_units = [&](float v) { return static_cast<uint16_t>(std::clamp(v / unit, 0.0, 65535.0)); };
   for (const FeatureReport& f : result.features) {
-    const auto sixteenths = [](float v) { return static_cast<uint16_t>(std::clamp(v * 16, 0.0F, 65535.0F)); };
-    m.put(sixteenths(f.image_x));
-    m.put(sixteenths(f.image_y));
+    m.put(in_units(f.image_x));
+    m.put(in_units(f.image_y));
     m.put(static_cast<uint8_t>(f.state));
     m.put(static_cast<uint8_t>(f.reason));
     m.put<uint16_t>(0);
@@ -101,6 +106,11 @@ void SessionModel::show(FrameResult result, Frame frame, MapSnapshot map, std::v
                                       ? handover_.latest->result.keyframe_explanation
                                       : std::move(e.text),
                                   e.frame, e.stamp_ns});
+}
+
+void SessionModel::skipped(size_t frames) {
+  const std::lock_guard lock(handover_mutex_);
+  handover_.skipped = frames;
 }
 
 void SessionModel::say(const std::string& line) {
@@ -144,6 +154,7 @@ void SessionModel::take_in() {
     frame_message_.clear();
   }
   offered_ = taken.offered;
+  skipped_ = taken.skipped;
   tracked_ = taken.tracked;
   lost_ = taken.lost;
   ended_ = taken.ended;
@@ -213,8 +224,10 @@ Json SessionModel::state() const {
   const FrameResult none;
   const FrameResult& result = shown_ == nullptr ? none : shown_->result;
   const Map* map = shown_ == nullptr ? nullptr : shown_->map.map().get();
+  // Frames are counted as the system is given them: of the source's those that it was never given are taken off.
+  const int expected = static_cast<int>(options_.frames.value_or(0)) - static_cast<int>(skipped_);
   return {{"frame", shown_ == nullptr ? -1 : result.frame},
-          {"frames", options_.frames ? std::max(static_cast<int>(*options_.frames), offered_) : offered_},
+          {"frames", std::max(expected, offered_)},
           {"tracked", tracked_},
           {"lost", lost_},
           {"state", name_of(result.state)},
@@ -237,7 +250,22 @@ std::string SessionModel::hello() const {
        {"realtime", options_.realtime},
        {"budget_ms", rounded(options_.budget_ms)},
        {"unit", map_.unit()},
+       {"feature_unit", feature_unit(c)},
        {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}}});
+}
+
+void SessionModel::align_truth(const Map& map) {
+  const size_t points = history_.path_size();
+  const KeyframeId root = history_.current_root(map);
+  // It settles soon, and a long path takes a while. A path that was thinned has fewer points than before.
+  const bool holds = world_from_truth_ && !ended_ && aligned_root_ == root &&
+                     aligned_corrections_ == map_.corrections() && points >= aligned_at_ &&
+                     points <= aligned_at_ + aligned_at_ / 50 + 10;
+  if (holds) return;
+  world_from_truth_ = history_.world_from_truth(map, options_.truth);
+  aligned_at_ = points;
+  aligned_root_ = root;
+  aligned_corrections_ = map_.corrections();
 }
 
 const std::string& SessionModel::frame_message() {
@@ -257,11 +285,7 @@ const std::string& SessionModel::frame_message() {
   for (const Detection& d : result.detections)
     json["boxes"].push_back({{"class", d.class_name}, {"box", json_of(d.box)}});
   if (!options_.truth.empty() && shown_->map.map() != nullptr) {
-    // It settles soon, and a long path takes a while.
-    if (!world_from_truth_ || history_.path_size() > aligned_at_ + aligned_at_ / 50 + 10) {
-      world_from_truth_ = history_.world_from_truth(*shown_->map.map(), options_.truth);
-      aligned_at_ = history_.path_size();
-    }
+    align_truth(*shown_->map.map());
     if (world_from_truth_) json["world_from_truth"] = json_of(*world_from_truth_);
   }
   std::string text = text_of(json);
@@ -270,7 +294,7 @@ const std::string& SessionModel::frame_message() {
   out.message(StreamMessage::frame, [&](StreamWriter& m) {
     m.put(static_cast<uint32_t>(text.size()));
     m.put_bytes(text);
-    put_features(m, result);
+    put_features(m, result, feature_unit(options_.camera));
     put_mask(m, result.mask);
   });
   return frame_message_ = std::move(out.bytes());

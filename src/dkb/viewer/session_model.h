@@ -24,6 +24,7 @@ class SessionModel {
 
   // --- The feeding thread.
   void show(FrameResult result, Frame frame, MapSnapshot map, std::vector<Event> events);
+  void skipped(size_t frames);  // of the source, so far
   void say(const std::string& line);
   void end(MapSnapshot map);
 
@@ -68,6 +69,7 @@ class SessionModel {
     std::vector<FrameFact> facts;
     std::vector<SessionEvent> events;
     int offered = 0, tracked = 0, lost = 0;
+    size_t skipped = 0;
     int64_t stamp_ns = 0;
     bool ended = false, paused = false;
   };
@@ -75,6 +77,7 @@ class SessionModel {
   void forget_world();
   std::string hello() const;
   void write_truth(StreamWriter& out) const;
+  void align_truth(const Map& map);
   const std::string& frame_message();
   const std::string& image_message(bool depth);
 
@@ -87,6 +90,7 @@ class SessionModel {
   std::shared_ptr<const Shown> shown_;
   uint64_t shown_number_ = 0;
   int offered_ = 0, tracked_ = 0, lost_ = 0;
+  size_t skipped_ = 0;
   bool ended_ = false, paused_ = false;
   MapDeltas map_;
   std::atomic<uint64_t> world_;  // map_.world(), for those who do not hold the lock
@@ -94,7 +98,10 @@ class SessionModel {
   std::chrono::steady_clock::duration map_cost_{};
   SessionHistory history_;
   std::optional<Rigid3> world_from_truth_;
-  size_t aligned_at_ = 0;  // points of the path when it was computed
+  // Of what it was computed: points of the path, the root of their map, corrections of it.
+  size_t aligned_at_ = 0;
+  KeyframeId aligned_root_ = kNoKeyframe;
+  uint64_t aligned_corrections_ = 0;
   std::string dense_;
   uint64_t dense_number_ = 0;
   std::string frame_message_, image_messages_[2];

@@ -19,13 +19,29 @@ namespace {
 
 constexpr size_t kCheckpointEvery = 1 << 20;  // [bytes] at least
 
+// A new file in the place of an earlier recording, whose bytes stay for whoever is watching it.
+std::FILE* open_anew(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::path target = behind_links(path);
+  if (!std::filesystem::is_regular_file(target, error)) return std::fopen(path.c_str(), "wbe");
+  std::filesystem::path fresh = target;
+  fresh.replace_filename("." + target.filename().string() + ".tmp" + std::to_string(::getpid()));
+  std::FILE* file = std::fopen(fresh.c_str(), "wbe");
+  if (file == nullptr || std::rename(fresh.c_str(), target.c_str()) == 0) return file;
+  const int reason = errno;
+  std::fclose(file);
+  std::filesystem::remove(fresh, error);
+  errno = reason;
+  return nullptr;
+}
+
 }  // namespace
 
 SessionRecorder::SessionRecorder(SessionModel& model, const std::filesystem::path& file, bool realtime,
                                  uintmax_t left_free)
     : model_(model), path_(file), realtime_(realtime), left_free_(left_free), file_(nullptr, &std::fclose) {
-  require_room(0);  // before a file that may be there is emptied
-  file_.reset(std::fopen(file.c_str(), "wbe"));
+  require_room(0);  // before a file that may be there is replaced
+  file_.reset(open_anew(file));
   if (file_ == nullptr) fail_to_write(file, "open", errno);
   std::setvbuf(file_.get(), nullptr, _IONBF, 0);  // else what could not be written would be tried again at the end
   client_.images = client_.depth = true;

@@ -104,6 +104,22 @@ void expect_same(const StreamReader& a, const StreamReader& b) {
   EXPECT_EQ(a.images, b.images);
 }
 
+TEST(SessionRecorder, LeavesAnEarlierRecordingToWhoIsWatchingIt) {
+  const TempFile temp;
+  const auto record = [&](int frames) {
+    SessionModel model(options());
+    SessionRecorder recorder(model, temp.path, false);
+    for (int i = 0; i < frames; ++i) feed(model, recorder, i);
+  };
+  record(30);
+  SessionFile watched(temp.path);
+  const std::string before = watched.read(0, watched.size());
+  record(3);
+  watched.update();
+  EXPECT_EQ(watched.read(0, watched.size()), before);
+  EXPECT_EQ(SessionFile(temp.path).frame(), 2);
+}
+
 TEST(SessionRecorder, KeepsEveryFrameAndWhatALiveClientKnows) {
   const TempFile temp;
   SessionModel model(options());
