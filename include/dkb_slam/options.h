@@ -46,7 +46,7 @@ class DKB_SLAM_API Options {
   } features;
 
   struct Noise {
-    double pixel_sigma = 1.0;               ///< [px] standard deviation of a corner on the finest level, above 0
+    double pixel_sigma = 1.0;               ///< [px, at a focal length of 525 px] standard deviation of a corner, above 0
     double depth_sigma_base = 0.0012;       ///< [m] standard deviation of depth at 0.4 m, above 0
     double depth_sigma_quadratic = 0.0019;  ///< [1/m] its growth with (z - 0.4 m)^2, at least 0
     double depth_sigma_factor = 10.0;       ///< on both, for edges, registration and calibration, at least 1
@@ -90,7 +90,6 @@ class DKB_SLAM_API Options {
   struct Dynamics {
     FilterKind filter = FilterKind::standard;  ///< which features are kept from tracking
     struct Motion {
-      int cell = 4;            ///< [px] side of the cells whose motion is judged, 2 ... 32
       double memory = 6;       ///< [s] time constant in which what stands still is no longer a mover, above 0
       double threshold = 0.5;  ///< score from which a cell moves; a frame adds at most 1, above 0, at most 2
     } motion;

@@ -80,8 +80,8 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       noise_(noise),
       options_(options),
       simd_(simd),
-      rays_(camera, options.cell),
-      smoothing_(camera, noise, options.cell, simd),
+      rays_(camera, depth_cell(camera)),
+      smoothing_(camera, noise, depth_cell(camera), simd),
       alignment_(noise, camera.fx, rays_) {
   noise_.check();
   const int width = rays_.width(), height = rays_.height();
@@ -189,7 +189,7 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
 bool MotionSegmenter::is_placed(const Matrix6d& step_covariance) const {
   if (aligned_step_) return true;
   const Vector6d sd = step_covariance.diagonal().cwiseSqrt();
-  return camera_.fx * (sd.head<3>().maxCoeff() + sd.tail<3>().maxCoeff()) < options_.cell;
+  return camera_.fx * (sd.head<3>().maxCoeff() + sd.tail<3>().maxCoeff()) < rays_.cell();
 }
 
 // Not all views speak in each frame: they take turns.
@@ -330,7 +330,7 @@ void MotionSegmenter::find_vacated() {
   }
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto walked = static_cast<float>(kWalkInDepth * interval);
-  const double reach = kWalk * interval * camera_.fx / options_.cell;  // [cells] at 1 m
+  const double reach = kWalk * interval * camera_.fx / rays_.cell();  // [cells] at 1 m
   for_supported(vacated_, [&](int x, int y) {
     const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
     const int at = projection_.cell[i], u0 = at % width, v0 = at / width;
@@ -378,7 +378,7 @@ void MotionSegmenter::update_scores() {
 // Scores belong to the depth image; the mask to the colour image, which sees the same surfaces a little displaced.
 MoverMask MotionSegmenter::mask() {
   MoverMask result;
-  result.cell = options_.cell;
+  result.cell = rays_.cell();
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
   const auto threshold = static_cast<float>(options_.threshold);
   rays_.project(current_->depth, kTooNear, depth_from_colour_, rays_.all_cells(), projection_, simd_);
@@ -395,7 +395,7 @@ MoverMask MotionSegmenter::mask() {
 }
 
 StillCells MotionSegmenter::still() const {
-  StillCells still{options_.cell, {}};
+  StillCells still{rays_.cell(), {}};
   const Image<float>& scores = score();
   still.kinds = Image<uint8_t>(scores.width(), scores.height());
   run_vectorised(simd_, [n = scores.size(), score = scores.data(), there = still_.data(),
@@ -412,10 +412,10 @@ StillCells MotionSegmenter::still() const {
 void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   if (!current_) return;
   Image<float>& score = current_->score;
-  const std::vector<int> columns = rows_at_middle(bodies.cells.width(), bodies.cell, options_.cell);
+  const std::vector<int> columns = rows_at_middle(bodies.cells.width(), bodies.cell, rays_.cell());
   for (int y = 0; y < bodies.cells.height(); ++y) {
     const uint8_t* const body = bodies.cells.row(y);
-    const int v = row_at_middle(y, bodies.cell, options_.cell);
+    const int v = row_at_middle(y, bodies.cell, rays_.cell());
     for (size_t x = 0; x < columns.size(); ++x)
       if (body[x] != 0 && score.contains(columns[x], v))
         score(columns[x], v) = std::max(score(columns[x], v), kMayMove);

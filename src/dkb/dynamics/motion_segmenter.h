@@ -20,7 +20,6 @@
 namespace dkb {
 
 struct MotionOptions {
-  int cell = 4;            // [px] side of the cells that are judged, 2 ... 32
   double memory = 6;       // [s] time constant in which a mover that stands still is forgotten, > 0
   double threshold = 0.5;  // score from which a cell moves; one frame adds at most 1, (0, 2]
 };

@@ -153,8 +153,8 @@ TEST(MotionSegmenter, MarksNothingInTheFirstFrame) {
   run(
       World(), 1, [](int) { return std::vector{box_at(0)}; },
       [](int, const MoverMask& mask, const Figures& figures) {
-        EXPECT_EQ(mask.cells.width(), 80);
-        EXPECT_EQ(mask.cells.height(), 60);
+        EXPECT_EQ(mask.cells.width(), 160);  // cells of 2 px
+        EXPECT_EQ(mask.cells.height(), 120);
         EXPECT_EQ(figures.covered, 0);
       });
 }

@@ -9,12 +9,12 @@
 
 #include "dkb/dynamics/depth_parts.h"
 #include "dkb/features/vectorised.h"
+#include "dkb/geometry/camera.h"
 #include "dkb/util/radix_sort.h"
 
 namespace dkb {
 namespace {
 
-constexpr int kMaskCell = 4;       // [px] grid on which depth is looked at
 constexpr double kCore = 0.5;      // share of the box's width and height around its centre where the object is sought
 constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
 constexpr double kRelativeLayer = 0.15;  // [1] half-width of that layer relative to its depth
@@ -39,9 +39,9 @@ bool is_in(const CellBounds& r, int x, int y) {
   return x >= r.x0 && y >= r.y0 && x < r.x1 && y < r.y1;
 }
 
-// Nearest valid depth in the cell; 0 where there is none.
-float cell_depth(const DepthImage& depth, int cx, int cy) {
-  const int x = cx * kMaskCell + kMaskCell / 2, y = cy * kMaskCell + kMaskCell / 2;
+// Nearest valid depth in the middle of the cell; 0 where there is none.
+float cell_depth(const DepthImage& depth, int cell, int cx, int cy) {
+  const int x = cx * cell + cell / 2, y = cy * cell + cell / 2;
   for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {1, 0}, {0, 1}, {-1, -1}, {1, 1}}) {
     if (!depth.contains(x + dx, y + dy)) continue;
     if (const float d = depth(x + dx, y + dy); d > 0) return d;
@@ -65,6 +65,7 @@ struct Window {
 Window window_around(const CellBounds& range, int image_columns, int image_rows, const DepthImage& depth,
                      const Camera& camera, const SensorNoise& noise) {
   Window w{image_columns, image_rows, range, range.x1 - range.x0 + 2, range.y1 - range.y0 + 2, {}, {}, {}, {}};
+  const int cell = depth_cell(camera);
   const size_t count = static_cast<size_t>(w.columns) * static_cast<size_t>(w.rows);
   w.depth.resize(count);
   w.jump.resize(count);
@@ -72,12 +73,12 @@ Window window_around(const CellBounds& range, int image_columns, int image_rows,
   w.down.resize(count);
   for (int y = std::max(range.y0 - 1, 0); y < std::min(range.y1 + 1, image_rows); ++y)
     for (int x = std::max(range.x0 - 1, 0); x < std::min(range.x1 + 1, image_columns); ++x)
-      w.depth[w.at(x, y)] = cell_depth(depth, x, y);
+      w.depth[w.at(x, y)] = cell_depth(depth, cell, x, y);
   run_vectorised(best_simd(),
-                 [noise, count, f = camera.fx, from = w.depth.data(), to = w.jump.data()]() DKB_KERNEL_BODY {
+                 [noise, count, cell, f = camera.fx, from = w.depth.data(), to = w.jump.data()]() DKB_KERNEL_BODY {
                    DKB_INDEPENDENT_STEPS
                    for (size_t i = 0; i < count; ++i)
-                     to[i] = static_cast<float>(noise.max_depth_jump(static_cast<double>(from[i]), kMaskCell, f));
+                     to[i] = static_cast<float>(noise.max_depth_jump(static_cast<double>(from[i]), cell, f));
                  });
   link_cells(w.depth, w.jump, 1, w.right.data());
   link_cells(w.depth, w.jump, static_cast<size_t>(w.columns), w.down.data());
@@ -252,14 +253,12 @@ Silhouettes silhouettes(const DepthImage& depth, std::span<const Detection> boxe
                         const SensorNoise& noise) {
   Silhouettes made;
   MoverMask& mask = made.mask;
-  mask.cell = made.body.cell = kMaskCell;
+  const int cell = mask.cell = made.body.cell = depth_cell(camera);
   if (boxes.empty()) return made;
-  const int columns = (depth.width() + kMaskCell - 1) / kMaskCell, rows = (depth.height() + kMaskCell - 1) / kMaskCell;
+  const int columns = (depth.width() + cell - 1) / cell, rows = (depth.height() + cell - 1) / cell;
   mask.cells = made.body.cells = Image<uint8_t>(columns, rows);
   for (const Detection& detection : boxes) {
-    const auto part_of_box = [&](double share) {
-      return cells_of(scaled(detection.box, share), kMaskCell, columns, rows);
-    };
+    const auto part_of_box = [&](double share) { return cells_of(scaled(detection.box, share), cell, columns, rows); };
     const CellBounds range = part_of_box(1 + 2 * kWidening), core = part_of_box(kCore);
     const Window window = window_around(range, columns, rows, depth, camera, noise);
     const float layer = object_depth(window, core);

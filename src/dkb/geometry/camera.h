@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -14,6 +16,15 @@ using CameraModel = Camera;
 // Cameras known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names. The readout of
 // TUM's Kinects is ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);
+
+// Lengths in an image were chosen by measurement with Kinects of this focal length [px]. What they stand for is an
+// angle.
+inline constexpr double kUsualFocal = 525;
+
+// [px] The side of the square cells in which depth is looked at for what moves: 7.6 mrad, whatever the resolution.
+inline int depth_cell(const CameraModel& camera) {
+  return std::clamp(static_cast<int>(std::lround(4 * camera.fx / kUsualFocal)), 2, 32);
+}
 
 // [px] Where the image as read shows `point` [m, in the camera]. Nothing where it shows it nowhere: behind the camera,
 // and so far aside that the distortion polynomial has turned back and would show it a second time.

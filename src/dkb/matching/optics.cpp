@@ -14,7 +14,7 @@ constexpr float kMargin = 2;  // [px] more than an undistorted edge bends betwee
 Optics::Optics(const CameraModel& camera_model, const SensorNoise& sensor_noise, double scale, int pyramid_levels)
     : camera(camera_model), noise(sensor_noise), scale_factor(scale), levels(pyramid_levels) {
   for (size_t octave = 0; octave < variances_.size(); ++octave) {
-    const double sigma = noise.corner_sigma(static_cast<int>(octave), scale_factor);
+    const double sigma = pixels(noise.corner_sigma(static_cast<int>(octave), scale_factor));
     variances_[octave] = sigma * sigma;
     scales_[octave] = static_cast<float>(std::pow(scale_factor, octave));
   }

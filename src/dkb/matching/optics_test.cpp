@@ -25,5 +25,18 @@ TEST(Optics, WhatIsWellInViewIsInView) {
   }
 }
 
+TEST(Optics, LengthsInTheImageAreAngles) {
+  CameraModel camera;
+  camera.fx = camera.fy = 2 * kUsualFocal;
+  const Optics optics(camera);
+  EXPECT_DOUBLE_EQ(optics.pixels(10), 20);
+  EXPECT_DOUBLE_EQ(optics.corner_variance(Keypoint{}), 4);  // of 1 px where the focal length is usual
+  EXPECT_EQ(depth_cell(camera), 8);
+  camera.fx = 535.4;
+  EXPECT_EQ(depth_cell(camera), 4);
+  camera.fx = 100;
+  EXPECT_EQ(depth_cell(camera), 2);
+}
+
 }  // namespace
 }  // namespace dkb

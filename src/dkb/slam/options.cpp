@@ -40,7 +40,7 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
         "[grey levels] contrast of a corner where an image has none above fast_threshold", Range{1, 254});
 
   visit("noise.pixel_sigma", p.noise.pixel_sigma, o.noise.pixel_sigma,
-        "[px] standard deviation of a corner on the finest level", above(0));
+        "[px] standard deviation of a corner on the finest level, where the focal length is 525 px", above(0));
   visit("noise.depth_sigma_base", p.noise.depth_sigma_base, o.noise.depth_sigma_base,
         "[m] standard deviation of depth at 0.4 m", above(0));
   visit("noise.depth_sigma_quadratic", p.noise.depth_sigma_quadratic, o.noise.depth_sigma_quadratic,
@@ -87,8 +87,6 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
                           {"multiview", FilterKind::multiview},
                           {"paper", FilterKind::paper},
                           {"default", FilterKind::standard}});
-  visit("dynamics.motion.cell", p.dynamics.motion.cell, o.dynamics.motion.cell,
-        "[px] side of the cells whose motion is judged", Range{2, 32});
   visit("dynamics.motion.memory", p.dynamics.motion.memory, o.dynamics.motion.memory,
         "[s] time constant in which what stands still is no longer a mover", above(0));
   visit("dynamics.motion.threshold", p.dynamics.motion.threshold, o.dynamics.motion.threshold,

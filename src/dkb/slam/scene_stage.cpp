@@ -8,12 +8,6 @@
 #include "dkb/dynamics/mover_mask.h"
 
 namespace dkb {
-namespace {
-
-constexpr int kSupportCell = 4;  // [px] cells of the motion segmentation when it only supports another detector
-
-}  // namespace
-
 SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options,
                        const Detectors& detectors, bool threaded, bool realtime)
     : camera_(camera),
@@ -30,7 +24,6 @@ SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const Dyn
   segments_motion_ = segments_motion_asked_ = detectors.motion;
   // The default filter asks the segmentation also beside other detectors: it knows what of a box is old background.
   const bool supports = !rival_ && (slow_ != nullptr || !prompt_.empty());
-  if (!segments_motion_) options_.motion.cell = kSupportCell;
   if (segments_motion_ || supports) {
     motion_.emplace(camera, noise, options_.motion);
     segmenting_.emplace(

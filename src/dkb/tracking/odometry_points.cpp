@@ -8,8 +8,8 @@
 namespace dkb {
 namespace {
 
-constexpr float kSurroundings = 40;  // [px] within which features lend their depth
-constexpr double kNearest = 0.3;     // [m] that anything is taken to be from the camera
+constexpr double kSurroundings = 40;  // [px, usual focal length] within which features lend their depth
+constexpr double kNearest = 0.3;      // [m] that anything is taken to be from the camera
 
 SightRay transformed(const Rigid3& pose, const SightRay& ray) {
   return {pose * ray.origin, pose.rotation * ray.direction, ray.variance};
@@ -67,9 +67,10 @@ bool OdometryPoints::has_moved(const OdometryMatch& match, const Keypoint& keypo
 // Harmonic mean of the depths of the features nearby, since parallax goes with the inverse depth. Where none has any,
 // what is seen there lies beyond the reach of depth, or about as far.
 float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& keypoint) const {
+  const auto within = static_cast<float>(optics_.pixels(kSurroundings));
   float sum = 0;
   int count = 0;
-  frame.features->grid.for_each_near({keypoint.pixel.x(), keypoint.pixel.y(), kSurroundings}, [&](int f) {
+  frame.features->grid.for_each_near({keypoint.pixel.x(), keypoint.pixel.y(), within}, [&](int f) {
     const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
     if (!(k.depth > 0)) return;
     sum += 1.0f / k.depth;

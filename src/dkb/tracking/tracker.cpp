@@ -394,8 +394,8 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
   }
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;
-  const bool there =
-      track_local_map(found->fit.cam_from_world, kRadiusLocalMap, kMinRelocalisationInliers, found->fit.points, frame);
+  const bool there = track_local_map(found->fit.cam_from_world, radius_local_map(), kMinRelocalisationInliers,
+                                     found->fit.points, frame);
   if (!there) candidates_made_.reset();  // those around the place that was no place
   return there;
 }

@@ -84,8 +84,7 @@ class Tracker {
   void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
  private:
-  static constexpr int kMatchDistance = 90;       // [bits] largest Hamming distance of a match with a map point
-  static constexpr double kRadiusLocalMap = 4.0;  // [px] search for local map points under the first pose
+  static constexpr int kMatchDistance = 90;  // [bits] largest Hamming distance of a match with a map point
 
   struct Pair {
     int feature = -1;
@@ -101,8 +100,10 @@ class Tracker {
                        const RgbdFeatures& features, std::vector<std::optional<OdometryMatch>>& followed) const;
   PoseEstimate refine(const Rigid3& initial, const std::vector<Pair>& pairs, const RgbdFeatures& features,
                       const std::optional<PosePrediction>& expected) const;
+  // [px] search for local map points under the first pose; no less than what corners of whole pixels need.
+  double radius_local_map() const { return std::max(4.0, optics_.pixels(4)); }
   // [px] search around the motion model's prediction: 19 mrad, whatever the camera's resolution.
-  double radius_last_frame() const { return std::max(kRadiusLocalMap, std::round(10 * optics_.camera.fx / 525)); }
+  double radius_last_frame() const { return std::max(radius_local_map(), std::round(optics_.pixels(10))); }
   std::vector<Candidate> points_shown_last() const;
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool track_among_suspects(TrackedFrame& frame, const TrackingInput& input);

@@ -120,9 +120,9 @@ double Tracker::reach_px(double radius, const Matrix6d& covariance) const {
 
 // [px] Of places that look alike the nearest to the expected one is meant: the search starts there and widens.
 std::vector<double> Tracker::widening_radii(const Matrix6d& covariance) const {
-  const double reach = reach_px(kRadiusLocalMap, covariance);
+  const double reach = reach_px(radius_local_map(), covariance);
   std::vector<double> radii;
-  for (double radius = kRadiusLocalMap; radius < 2 * reach; radius *= 2) radii.push_back(std::min(radius, reach));
+  for (double radius = radius_local_map(); radius < 2 * reach; radius *= 2) radii.push_back(std::min(radius, reach));
   return radii;
 }
 

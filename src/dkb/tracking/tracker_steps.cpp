@@ -86,7 +86,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
                                           [this](PointId id) { return is_retracted(id); });
     if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) fit = std::move(near->fit);
   }
-  return fit && track_local_map(fit->cam_from_world, kRadiusLocalMap, options_.min_inliers, fit->points, frame);
+  return fit && track_local_map(fit->cam_from_world, radius_local_map(), options_.min_inliers, fit->points, frame);
 }
 
 // Depth that was aligned wrongly takes the room for moved and leaves nothing to track by, most of all between the first
