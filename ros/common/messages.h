@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 
@@ -33,10 +34,14 @@ Rigid3 pose_from(const Message& m) {
           Eigen::Vector3d(m.position.x, m.position.y, m.position.z)};
 }
 
+// tf2 takes and multiplies quaternions that are off by up to a hundredth, and the library wants them of length 1.
+// Nothing: the quaternion has no direction.
 template <class Message>
-Rigid3 rigid_from_transform(const Message& m) {
-  return {Eigen::Quaterniond(m.rotation.w, m.rotation.x, m.rotation.y, m.rotation.z),
-          Eigen::Vector3d(m.translation.x, m.translation.y, m.translation.z)};
+std::optional<Rigid3> rigid_from_transform(const Message& m) {
+  const Eigen::Quaterniond rotation(m.rotation.w, m.rotation.x, m.rotation.y, m.rotation.z);
+  const double norm = rotation.norm();
+  if (!std::isfinite(norm) || !(norm > 0)) return std::nullopt;
+  return Rigid3(rotation.normalized(), Eigen::Vector3d(m.translation.x, m.translation.y, m.translation.z));
 }
 
 template <class Array>
@@ -56,7 +61,7 @@ template <class Message>
 ImageMessage image_from(const Message& m, int64_t stamp_ns, std::shared_ptr<const void> owner) {
   ImageMessage image;
   image.stamp_ns = stamp_ns;
-  image.frame_id = m.header.frame_id;
+  image.frame_id = without_slash(m.header.frame_id);
   image.encoding = m.encoding;
   image.width = static_cast<int>(std::min<uint32_t>(m.width, 1U << 20));
   image.height = static_cast<int>(std::min<uint32_t>(m.height, 1U << 20));
@@ -72,7 +77,7 @@ template <class Message>
 OdometryMessage odometry_from(const Message& m, int64_t stamp_ns) {
   OdometryMessage odometry;
   odometry.stamp_ns = stamp_ns;
-  odometry.child_frame_id = m.child_frame_id;
+  odometry.child_frame_id = without_slash(m.child_frame_id);
   odometry.pose = pose_from(m.pose.pose);
   odometry.twist << m.twist.twist.linear.x, m.twist.twist.linear.y, m.twist.twist.linear.z, m.twist.twist.angular.x,
       m.twist.twist.angular.y, m.twist.twist.angular.z;
@@ -85,7 +90,7 @@ template <class Message>
 ImuMessage imu_from(const Message& m, int64_t stamp_ns) {
   ImuMessage imu;
   imu.stamp_ns = stamp_ns;
-  imu.frame_id = m.header.frame_id;
+  imu.frame_id = without_slash(m.header.frame_id);
   imu.angular_velocity = {m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z};
   for (int i = 0; i < 9; ++i) imu.covariance(i / 3, i % 3) = m.angular_velocity_covariance[static_cast<size_t>(i)];
   return imu;
@@ -93,7 +98,7 @@ ImuMessage imu_from(const Message& m, int64_t stamp_ns) {
 
 template <class Message>
 PoseMessage pose_with_covariance_from(const Message& m, int64_t stamp_ns) {
-  return {stamp_ns, m.header.frame_id, pose_from(m.pose.pose), covariance_from(m.pose.covariance)};
+  return {stamp_ns, without_slash(m.header.frame_id), pose_from(m.pose.pose), covariance_from(m.pose.covariance)};
 }
 
 // Everything but the header's stamp.

@@ -101,8 +101,7 @@ Matrix6d camera_covariance(const Matrix6d& ros, const Rigid3& base_from_cam,
 
 bool OdometryHistory::add(const OdometryMessage& message) {
   const bool finite = message.pose.translation.allFinite() && message.pose.rotation.coeffs().allFinite() &&
-                      std::abs(message.pose.rotation.norm() - 1) < 0.01 && message.twist.allFinite() &&
-                      message.twist_covariance.allFinite() && message.pose_covariance.allFinite();
+                      std::abs(message.pose.rotation.norm() - 1) < 0.01 && message.twist.allFinite();
   if (!finite || !take_stamp(&messages_, &refused_, message.stamp_ns)) return false;
   keep(&messages_, message);
   messages_.back().pose.rotation.normalize();
@@ -156,8 +155,8 @@ std::optional<dkb::MotionPrior> OdometryHistory::between(int64_t from_ns, int64_
 }
 
 bool GyroHistory::add(const ImuMessage& message) {
-  const bool usable = message.angular_velocity.allFinite() && message.covariance.allFinite() &&
-                      message.covariance(0, 0) >= 0;  // -1: ROS' mark of an imu without a gyroscope
+  // -1: ROS' mark of an imu without a gyroscope.
+  const bool usable = message.angular_velocity.allFinite() && !(message.covariance(0, 0) < 0);
   if (!usable || !take_stamp(&messages_, &refused_, message.stamp_ns)) return false;
   keep(&messages_, message);
   return true;

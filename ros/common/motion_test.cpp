@@ -110,6 +110,34 @@ TEST(OdometryHistory, LeavesOutWhatIsLateOrNoNumber) {
   EXPECT_FALSE(history.between(20 * kMillisecond, 20 * kMillisecond + 1'000'000'000));
 }
 
+TEST(OdometryHistory, CovariancesThatAreNoNumbersAreUnknown) {
+  OdometryMessage first = odometry_at(0), second = odometry_at(100 * kMillisecond);
+  for (OdometryMessage* m : {&first, &second})
+    m->pose_covariance.setConstant(NAN), m->twist_covariance.setConstant(INFINITY);
+  OdometryHistory history(0.01), plain(0.01);
+  ASSERT_TRUE(history.add(first) && history.add(second));
+  plain.add(odometry_at(0)), plain.add(odometry_at(100 * kMillisecond));
+  EXPECT_EQ(history.between(0, second.stamp_ns)->covariance, plain.between(0, second.stamp_ns)->covariance);
+  const int64_t ahead_ns = second.stamp_ns + 50 * kMillisecond;
+  EXPECT_EQ(history.between(0, ahead_ns)->covariance, plain.between(0, ahead_ns)->covariance);
+}
+
+TEST(GyroHistory, CovariancesThatAreNoNumbersAreUnknown) {
+  GyroHistory history, plain;
+  for (int64_t t = 0; t <= 50; t += 5) {
+    ImuMessage m;
+    m.stamp_ns = t * kMillisecond;
+    plain.add(m);
+    m.covariance.setConstant(NAN);
+    EXPECT_TRUE(history.add(m));
+  }
+  EXPECT_EQ(history.between(0, 33 * kMillisecond)->covariance, plain.between(0, 33 * kMillisecond)->covariance);
+  ImuMessage without;
+  without.stamp_ns = 100 * kMillisecond;
+  without.covariance(0, 0) = -1;
+  EXPECT_FALSE(history.add(without));
+}
+
 TEST(OdometryHistory, GoesOnAfterAStampThatWasFarAhead) {
   OdometryHistory history(0.02);
   for (int64_t t = 0; t <= 100; t += 20) EXPECT_TRUE(history.add(odometry_at(t * kMillisecond)));

@@ -23,7 +23,8 @@ std::vector<ParameterDescription> own_parameters() {
       {"camera", "", "camera file, or fr1, fr2, fr3, bonn, in the place of rgb/camera_info"},
       {"rectified", false, "colour images are rectified: take P of the CameraInfo, no distortion"},
       {"depth_factor", 1000.0, "[units per metre] of 16UC1 depth images", 1e-3, 1e6},
-      {"sync_tolerance", 0.02, "[s] between the stamps of a colour image and its depth image", 0, 1},
+      // Further apart the library refuses them.
+      {"sync_tolerance", 0.02, "[s] between the stamps of a colour image and its depth image", 0, 0.2},
       {"queue_size", int64_t{10}, "[frames] that may wait for tracking; then the oldest is dropped", 1, 1000},
       {"prior", "auto", "who helps where the images do not tell", -kInf, kInf, {"none", "odom", "imu", "auto"}},
       {"prior_drift", 0.01, "share that odom_prior is off by over 10 m or 10 rad where it gives no covariance", 1e-4,
@@ -225,10 +226,10 @@ std::string parameter_table() {
 Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& given) {
   const Values values(given);
   Parameters p;
-  p.map_frame = values.text("map_frame");
-  p.odom_frame = values.text("odom_frame");
-  p.base_frame = values.text("base_frame");
-  p.camera_frame = values.text("camera_frame");
+  p.map_frame = without_slash(values.text("map_frame"));
+  p.odom_frame = without_slash(values.text("odom_frame"));
+  p.base_frame = without_slash(values.text("base_frame"));
+  p.camera_frame = without_slash(values.text("camera_frame"));
   const auto numbers = values.get<std::vector<double>>("base_from_cam");
   if (!numbers.empty()) p.base_from_cam = mount(numbers);
   p.publish_map_tf = values.get<bool>("publish_map_tf");
@@ -256,8 +257,8 @@ Parameters Parameters::from_values(const std::map<std::string, ParameterValue>& 
   p.viewer_host = values.text("viewer_host");
 
   p.options = dkb::Options(values.text("preset"));
+  const std::vector<ParameterDescription> own = own_parameters();
   for (const auto& [name, value] : given) {
-    const auto own = own_parameters();
     if (std::any_of(own.begin(), own.end(), [&, &key = name](const auto& d) { return d.name == key; })) continue;
     p.options.set(name, values.any(name), "parameter");
   }

@@ -50,6 +50,14 @@ TEST(Parameters, SettingsReachTheLibraryOnTopOfThePreset) {
   EXPECT_EQ(p.options.dynamics.filter, dkb::FilterKind::paper);
 }
 
+TEST(Parameters, FramesHaveNoLeadingSlash) {
+  const Parameters p = Parameters::from_values({{"map_frame", std::string("/map")},
+                                                {"odom_frame", std::string("/odom")},
+                                                {"base_frame", std::string("/robot/base")},
+                                                {"camera_frame", std::string("/camera")}});
+  EXPECT_EQ(p.map_frame + " " + p.odom_frame + " " + p.base_frame + " " + p.camera_frame, "map odom robot/base camera");
+}
+
 TEST(Parameters, WrongOnesAreRefusedByName) {
   const auto complaint = [](const std::string& name, ParameterValue value) -> std::string {
     try {
@@ -62,6 +70,8 @@ TEST(Parameters, WrongOnesAreRefusedByName) {
   EXPECT_NE(complaint("features.count", int64_t{0}).find("features.count"), std::string::npos);
   EXPECT_NE(complaint("features.count", std::string("many")).find("features.count"), std::string::npos);
   EXPECT_NE(complaint("sync_tolerance", -1.0).find("sync_tolerance"), std::string::npos);
+  EXPECT_NE(complaint("sync_tolerance", 0.3).find("sync_tolerance"), std::string::npos)
+      << "the library pairs up to 0.2 s";
   EXPECT_NE(complaint("queue_size", int64_t{0}).find("queue_size"), std::string::npos);
   EXPECT_NE(complaint("prior", std::string("gps")).find("prior"), std::string::npos);
   EXPECT_NE(complaint("base_from_cam", std::vector<double>{1, 2, 3}).find("base_from_cam"), std::string::npos);

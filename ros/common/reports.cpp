@@ -12,6 +12,8 @@
 namespace dkb_ros {
 namespace {
 
+constexpr int64_t kSilence = 2'000'000'000;  // [ns] without images, or without a pair, that are an error
+
 std::chrono::steady_clock::time_point in_seconds(double s) {
   return std::chrono::steady_clock::now() +
          std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
@@ -21,6 +23,22 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", value);
   return text;
+}
+
+std::string seconds(int64_t from_ns, int64_t to_ns) {
+  return number(1e-9 * static_cast<double>(to_ns - from_ns)) + " s";
+}
+
+// Images come, but no pairs: why, for people. Empty: there are pairs, or no images.
+std::string why_no_pairs(const Arrivals& a, int64_t now_ns, int64_t unpaired, int64_t late) {
+  if (now_ns - std::max(a.colour, a.depth) > kSilence) return "";
+  if (now_ns - (a.pair == 0 ? a.first : a.pair) <= kSilence) return "";
+  for (const auto& [name, last_ns] : {std::pair("colour", a.colour), std::pair("depth", a.depth)}) {
+    if (last_ns == 0) return std::string("no ") + name + " image has come";
+    if (now_ns - last_ns > kSilence) return std::string("no ") + name + " image for " + seconds(last_ns, now_ns);
+  }
+  return "images come, but none within sync_tolerance (" + std::to_string(unpaired) + " unpaired, " +
+         std::to_string(late) + " late)";
 }
 
 }  // namespace
@@ -88,18 +106,18 @@ void SlamCore::run_grids() {
           [&](dkb::Slam& slam) {
             // The dense map is of the world of the last pose.
             beside_loaded = loaded_maps_ > 0 && last_map_.value_or(0) >= loaded_maps_;
-            if (beside_loaded) return Answer{false, ""};
+            if (beside_loaded) return Answer{true, ""};
             make_dense_map = slam.dense_map_task();
             stamp_ns = last_stamp_ns_.value_or(0);
             return Answer{true, ""};
           },
           [&](const Answer& answer) { answered.set_value(answer); });
-      const bool has_task = answered.get_future().get().success;
+      answered.get_future().wait();
       const auto tell = [&](const std::string& why) {
         if (std::exchange(said, why) != why) middleware_.log(LogLevel::warning, "no grid: " + why);
       };
       if (beside_loaded) tell("the map that was begun beside the loaded one has no place in it yet");
-      if (has_task) try {
+      if (make_dense_map) try {
           const dkb::DenseMap dense = make_dense_map();
           if (dense.grid) {
             GridOutput grid = grid_in_map(*dense.grid);
@@ -121,7 +139,8 @@ void SlamCore::run_grids() {
 }
 
 void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
-  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, outdated = 0, last_image_ns = 0;
+  int64_t unpaired = 0, late = 0, late_motion = 0, dropped = 0, outdated = 0;
+  Arrivals arrivals;
   {
     const std::lock_guard lock(input_mutex_);
     unpaired = pairing_.unpaired();
@@ -129,14 +148,14 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
     late_motion = late_motion_;
     dropped = dropped_;
     outdated = outdated_;
-    last_image_ns = last_image_ns_;
+    arrivals = arrivals_;
   }
   const int maps = slam == nullptr ? 0 : slam->statistics().maps;
   const int loaded = maps > 1 ? loaded_maps(slam->keyframes()) : 0;
   std::unique_lock lock(report_mutex_);
   const int64_t newly_dropped = dropped - reported_dropped_;
   reported_dropped_ = dropped;
-  const double silent = 1e-9 * static_cast<double>(steady_ns() - last_image_ns);
+  const int64_t now_ns = steady_ns();
   using Level = DiagnosticsOutput::Level;
   DiagnosticsOutput d;
   d.stamp_ns = middleware_.now_ns();
@@ -145,10 +164,13 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
     d.level = level;
     d.message = message;
   };
+  const int64_t last_image_ns = std::max(arrivals.colour, arrivals.depth);
   if (last_image_ns == 0)
     say(Level::error, "no images have come");
-  else if (silent > 2)
-    say(Level::error, "no images for " + number(silent) + " s");
+  else if (now_ns - last_image_ns > kSilence)
+    say(Level::error, "no images for " + seconds(last_image_ns, now_ns));
+  const std::string unpairable = why_no_pairs(arrivals, now_ns, unpaired, late);
+  if (!unpairable.empty()) say(Level::error, unpairable);
   if (!trouble_.empty()) say(slam == nullptr ? Level::warning : Level::error, trouble_);
   if (slam != nullptr && !hindrance_.empty()) say(Level::warning, hindrance_);
   if (newly_dropped > 0) say(Level::warning, std::to_string(newly_dropped) + " frames dropped: too slow");
@@ -185,6 +207,7 @@ void SlamCore::publish_diagnostics(const dkb::Slam* slam) {
   series("overhead", recent_.overhead_ms);
   recent_ = {};
   lock.unlock();
+  if (!unpairable.empty()) complain(LogLevel::error, unpairable);
   middleware_.publish(d);
 }
 

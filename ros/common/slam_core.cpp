@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "inputs.h"
 #include "outputs.h"
@@ -55,18 +56,24 @@ SlamCore::~SlamCore() {
 void SlamCore::colour(ImageMessage image) {
   image.arrived_ns = steady_ns();
   const std::lock_guard lock(input_mutex_);
-  last_image_ns_ = image.arrived_ns;
+  arrived(&arrivals_.colour, image.arrived_ns);
   enqueue(pairing_.add_colour(std::move(image)));
 }
 
 void SlamCore::depth(ImageMessage image) {
   image.arrived_ns = steady_ns();
   const std::lock_guard lock(input_mutex_);
-  last_image_ns_ = image.arrived_ns;
+  arrived(&arrivals_.depth, image.arrived_ns);
   enqueue(pairing_.add_depth(std::move(image)));
 }
 
+void SlamCore::arrived(int64_t* last, int64_t now_ns) {
+  if (arrivals_.first == 0) arrivals_.first = now_ns;
+  *last = now_ns;
+}
+
 void SlamCore::enqueue(std::vector<ImagePair> pairs) {
+  if (!pairs.empty()) arrivals_.pair = std::max(arrivals_.colour, arrivals_.depth);
   for (ImagePair& pair : pairs) {
     if (pairs_.size() == static_cast<size_t>(parameters_.queue_size)) {
       const bool jumped = pairs_.front().clock_jumped;
@@ -85,13 +92,29 @@ void SlamCore::camera_info(const CameraInfoMessage& info) {
 }
 
 void SlamCore::odometry(const OdometryMessage& odometry) {
-  const std::lock_guard lock(input_mutex_);
-  if (!odometry_.add(odometry)) ++late_motion_;
+  {
+    const std::lock_guard lock(input_mutex_);
+    if (odometry_.add(odometry)) return;
+    ++late_motion_;
+    if (std::exchange(told_of_odometry_, true)) return;
+  }
+  complain(LogLevel::warning,
+           "odom_prior: a message was left out, since its stamp is not after the one before, or its pose or twist is "
+           "none; /diagnostics "
+           "counts such as `late odometry`");
 }
 
 void SlamCore::imu(const ImuMessage& imu) {
-  const std::lock_guard lock(input_mutex_);
-  if (!gyro_.add(imu)) ++late_motion_;
+  {
+    const std::lock_guard lock(input_mutex_);
+    if (gyro_.add(imu)) return;
+    ++late_motion_;
+    if (std::exchange(told_of_imu_, true)) return;
+  }
+  complain(LogLevel::warning,
+           "imu: a message was left out, since its stamp is not after the one before, or it has no angular velocity; "
+           "/diagnostics "
+           "counts such as `late odometry`");
 }
 
 void SlamCore::initial_pose(const PoseMessage& pose) {
@@ -157,7 +180,8 @@ void SlamCore::reset(Done done) {
 
 void SlamCore::pause(bool on, Done done) {
   request(
-      [on](dkb::Slam& slam) {
+      [this, on](dkb::Slam& slam) {
+        paused_ = on;
         slam.pause(on);
         return Answer{true, std::string("pause is ") + text_of(on)};
       },
@@ -223,21 +247,17 @@ void SlamCore::process(const ImagePair& pair) {
     begin_after_jump();
   }
   if (!slam_ && !start(pair)) return;
-  if (viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0))) {
-    // What comes while a visitor of the page has paused is dropped; those who rely on the robot are told.
-    dkb::FrameResult paused;
-    paused.stamp_ns = pair.colour.stamp_ns;
-    paused.state = dkb::TrackingState::paused;
-    publish(pair, paused, "paused on the page");
-    return;
-  }
+  // While a visitor of the page has paused, the library passes frames over as for the service: it joins their motions,
+  // and takes the time until the next frame for no leap of the clock.
+  const bool held = viewer_ && !viewer_->wait_turn(std::chrono::milliseconds(0));
+  slam_->pause(paused_ || held);
   const dkb::FrameInput input = input_of(pair);
   const dkb::Frame frame(slam_->camera(), input);
   dkb::FrameResult result = slam_->process(frame);
   last_stamp_ns_ = pair.colour.stamp_ns;  // paused too: the motions of frames that were skipped are joined
-  publish(pair, result, hindrance_of(result));
+  publish(pair, result, held ? "paused on the page" : hindrance_of(result));
   std::vector<dkb::Event> events = tell_events();
-  if (!viewer_) return;
+  if (!viewer_ || held) return;
   viewer_->show(std::move(result), frame, slam_->map(), std::move(events));
   if (slam_->options().dense_map && viewer_->wants_dense_map()) viewer_->show_dense_map(slam_->dense_map_task());
   if (viewer_->take_save_order()) viewer_->say("here the service save_map saves the map");
@@ -437,10 +457,11 @@ std::vector<dkb::Event> SlamCore::tell_events() {
 // The same complaint is made again only after a while.
 void SlamCore::complain(LogLevel level, const std::string& text) {
   const int64_t now = steady_ns();
-  const std::string gist = without_digits(text);
-  if (gist == last_complaint_ && now - last_complaint_ns_ < kRepeatAfter) return;
-  last_complaint_ = gist;
-  last_complaint_ns_ = now;
+  {
+    const std::lock_guard lock(complaint_mutex_);
+    std::erase_if(complaints_, [&](const auto& made) { return now - made.second >= kRepeatAfter; });
+    if (!complaints_.emplace(without_digits(text), now).second) return;
+  }
   middleware_.log(level, text);
 }
 

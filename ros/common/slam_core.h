@@ -22,6 +22,12 @@ inline int64_t steady_ns() {
       .count();
 }
 
+// When images came last, by the steady clock [ns]; 0 = never.
+struct Arrivals {
+  int64_t first = 0;  // of either stream
+  int64_t colour = 0, depth = 0, pair = 0;
+};
+
 // The core at work. Tracking has a thread of its own, and so has what is slow and not urgent: map, path, diagnostics,
 // grid.
 class SlamCore final : public RosCore {
@@ -70,6 +76,7 @@ class SlamCore final : public RosCore {
   };
   using Task = std::function<Answer(dkb::Slam&)>;
 
+  void arrived(int64_t* last, int64_t now_ns);
   void enqueue(std::vector<ImagePair> pairs);
   void request(Task task, Done done);
   void run_tracking();
@@ -96,6 +103,8 @@ class SlamCore final : public RosCore {
   void forget_motion();
   std::vector<dkb::Event> tell_events();
   void open_page();
+
+  // On any thread.
   void complain(LogLevel level, const std::string& text);
 
   // On the thread of reports.
@@ -113,10 +122,11 @@ class SlamCore final : public RosCore {
   std::optional<CameraInfoMessage> camera_info_;
   OdometryHistory odometry_;
   GyroHistory gyro_;
-  int64_t dropped_ = 0;        // pairs that found the queue full
-  int64_t outdated_ = 0;       // pairs that waited when a service began another world
-  int64_t late_motion_ = 0;    // messages of odometry and imu
-  int64_t last_image_ns_ = 0;  // by the steady clock
+  int64_t dropped_ = 0;      // pairs that found the queue full
+  int64_t outdated_ = 0;     // pairs that waited when a service began another world
+  int64_t late_motion_ = 0;  // messages of odometry and imu
+  Arrivals arrivals_;
+  bool told_of_odometry_ = false, told_of_imu_ = false;  // that messages are left out
 
   // The tracking thread's own.
   Rigid3 base_from_cam_;
@@ -131,8 +141,10 @@ class SlamCore final : public RosCore {
   std::optional<int> last_map_;                      // FrameResult::map of the last pose
   int loaded_maps_ = 0;                              // when that was the map first: see loaded_maps()
   std::string failed_start_;                         // why there is no system and will be none
-  std::string last_complaint_;
-  int64_t last_complaint_ns_ = 0;
+  bool paused_ = false;                              // by the service
+
+  std::mutex complaint_mutex_;
+  std::map<std::string, int64_t> complaints_;  // of the last seconds, without their numbers; when, by the steady clock
 
   std::mutex report_mutex_;  // of what several threads know
   std::condition_variable report_due_;

@@ -170,12 +170,7 @@ TEST_F(SlamCoreTest, WhilePausedOnThePageItSaysSoAndTheMapStaysWhereItIs) {
   const auto core = start({{"viewer_port", int64_t{0}}});
   core->camera_info(info_of(source_camera()));
   feed_all(*core, 0, 3);
-  int port = 0;
-  {
-    const std::lock_guard lock(out.mutex);
-    for (const std::string& line : out.logged)
-      if (line.starts_with("viewer: http://127.0.0.1:")) port = std::stoi(line.substr(25));
-  }
+  const int port = port_of_the_page();
   ASSERT_GT(port, 0);
   ASSERT_EQ(order_of_a_visitor(port, "pause"), "HTTP/1.1 200 OK");
   feed(*core, 3);
@@ -191,9 +186,81 @@ TEST_F(SlamCoreTest, WhilePausedOnThePageItSaysSoAndTheMapStaysWhereItIs) {
     EXPECT_EQ(out.transforms[3][0].stamp_ns, frames()[3].stamp_ns());
     EXPECT_EQ(out.odometry.size(), 3U);
   }
+  // A pause of many frames' time: the clock has not leapt.
+  int64_t later_ns = 0;
+  for (int i = 2; i <= 6; ++i) feed_at(*core, 3, later_ns += 900'000'000);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("paused") == "6"; }));
   ASSERT_EQ(order_of_a_visitor(port, "resume"), "HTTP/1.1 200 OK");
-  feed_all(*core, 4, 1);
+  feed_at(*core, 4, later_ns);
+  ASSERT_TRUE(out.wait([&] { return out.odometry.size() == 4; }));
   ASSERT_TRUE(out.wait([&] { return out.last_value("state") == "tracking"; }));
+  const std::lock_guard lock(out.mutex);
+  for (const std::string& line : out.logged) EXPECT_EQ(line.find("leapt"), std::string::npos) << line;
+}
+
+// A pause of the service outlasts that of a visitor.
+TEST_F(SlamCoreTest, AVisitorsPauseLeavesThatOfTheService) {
+  const auto core = start({{"viewer_port", int64_t{0}}});
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 2);
+  const int port = port_of_the_page();
+  ASSERT_GT(port, 0);
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(true, done); }).success);
+  ASSERT_EQ(order_of_a_visitor(port, "pause"), "HTTP/1.1 200 OK");
+  feed(*core, 2);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("paused") == "1"; }));
+  ASSERT_EQ(order_of_a_visitor(port, "resume"), "HTTP/1.1 200 OK");
+  feed(*core, 3);
+  ASSERT_TRUE(out.wait([&] { return out.last_value("paused") == "2"; }));
+  EXPECT_TRUE(answer_of([&](auto done) { core->pause(false, done); }).success);
+  feed_all(*core, 4, 1);
+}
+
+TEST_F(SlamCoreTest, ImagesWithoutAPartnerAreNoLife) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  feed_all(*core, 0, 2);
+  int64_t stamp_ns = frames()[1].stamp_ns();
+  const auto told_while_fed = [&](bool depth_too, const std::string& text) {
+    const auto told = [&] {
+      const std::lock_guard lock(out.mutex);
+      return !out.diagnostics.empty() && out.diagnostics.back().level == DiagnosticsOutput::Level::error &&
+             out.diagnostics.back().message.starts_with(text);
+    };
+    for (int i = 0; i < 1000 && !told(); ++i) {
+      ImageMessage colour = message_of(frames()[2], false), depth = message_of(frames()[2], true);
+      colour.stamp_ns = stamp_ns += 100'000'000;
+      depth.stamp_ns = stamp_ns + 50'000'000;
+      core->colour(std::move(colour));
+      if (depth_too) core->depth(std::move(depth));
+      std::this_thread::sleep_for(100ms);
+    }
+    EXPECT_TRUE(told());
+    const std::lock_guard lock(out.mutex);
+    EXPECT_EQ(std::count_if(out.logged.begin(), out.logged.end(),
+                            [&](const std::string& line) { return line.starts_with(text); }),
+              1);
+  };
+  told_while_fed(false, "no depth image for ");
+  told_while_fed(true, "images come, but none within sync_tolerance (");
+  feed_at(*core, 2, stamp_ns + 500'000'000 - frames()[2].stamp_ns());
+  ASSERT_TRUE(out.wait([&] { return out.diagnostics.back().level != DiagnosticsOutput::Level::error; }));
+}
+
+TEST_F(SlamCoreTest, AStreamThatNeverComesIsTold) {
+  const auto core = start();
+  core->camera_info(info_of(source_camera()));
+  const auto told = [&] {
+    const std::lock_guard lock(out.mutex);
+    return !out.diagnostics.empty() && out.diagnostics.back().message == "no depth image has come";
+  };
+  for (size_t i = 0; i < 1000 && !told(); ++i) {
+    ImageMessage colour = message_of(frames()[0], false);
+    colour.stamp_ns += static_cast<int64_t>(i) * 100'000'000;
+    core->colour(std::move(colour));
+    std::this_thread::sleep_for(100ms);
+  }
+  EXPECT_TRUE(told());
 }
 
 TEST_F(SlamCoreTest, AcrossAPoseThatWasSetTheTwistIsNotKnown) {
@@ -247,6 +314,7 @@ TEST_F(SlamCoreTest, AMapBegunBesideALoadedOneTellsNoPoseInIt) {
   const std::string no_grid = "no grid: the map that was begun beside the loaded one has no place in it yet";
   EXPECT_TRUE(out.wait([&] { return std::count(out.logged.begin(), out.logged.end(), no_grid) == 1; }));
   const std::lock_guard lock(out.mutex);
+  EXPECT_EQ(std::count(out.logged.begin(), out.logged.end(), ""), 0);
   EXPECT_GT(out.odometry.size(), 4U) << "where it moves is known";
   EXPECT_TRUE(out.poses.empty()) << "where it is, is not";
   for (const auto& sent : out.transforms)
@@ -354,6 +422,18 @@ TEST_F(SlamCoreTest, WheelOdometryBecomesThePriorOfTheFrames) {
     feed_all(*core, i, 1);
   }
   ASSERT_TRUE(out.wait([&] { return out.last_value("with prior") == "5"; }));
+}
+
+TEST_F(SlamCoreTest, MotionThatIsLeftOutIsToldOnce) {
+  const auto core = start();
+  ImuMessage without;
+  without.covariance(0, 0) = -1;
+  OdometryMessage same;
+  for (int i = 0; i < 3; ++i) core->imu(without), core->odometry(same);
+  const std::lock_guard lock(out.mutex);
+  ASSERT_EQ(out.logged.size(), 2U);
+  EXPECT_TRUE(out.logged[0].starts_with("imu: a message was left out"));
+  EXPECT_TRUE(out.logged[1].starts_with("odom_prior: a message was left out"));
 }
 
 // The library joins what is told of the frames that are skipped.

@@ -20,6 +20,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -189,6 +190,13 @@ class SlamCoreTest : public testing::Test {
       feed(core, i);
       ASSERT_TRUE(out.wait([&] { return out.odometry.size() > before; })) << "frame " << i;
     }
+  }
+  // As it is logged; 0 where it is not.
+  int port_of_the_page() {
+    const std::lock_guard lock(out.mutex);
+    for (const std::string& line : out.logged)
+      if (line.starts_with("viewer: http://127.0.0.1:")) return std::stoi(line.substr(25));
+    return 0;
   }
   static Answer answer_of(const std::function<void(RosCore::Done)>& request) {
     std::promise<Answer> promise;

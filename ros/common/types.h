@@ -7,6 +7,7 @@
 #include <dkb_slam/errors.h>
 #include <dkb_slam/geometry.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -21,6 +22,11 @@ namespace dkb_ros {
 using dkb::Matrix6d;
 using dkb::Rigid3;
 using dkb::Vector6d;
+
+// ROS 1 has frames with a leading slash in old descriptions of robots; TF refuses to look one up.
+inline std::string without_slash(const std::string& frame_id) {
+  return frame_id.substr(std::min(frame_id.find_first_not_of('/'), frame_id.size()));
+}
 
 // An image as it came; `owner` keeps the pixels alive, so that nothing is copied on the thread that received it.
 struct ImageMessage {

@@ -42,6 +42,8 @@ stop() {
 }
 trap stop EXIT
 
+python3 "$here/check_launch.py"
+
 # shellcheck disable=SC2086
 python3 "$here/make_bag.py" "$sequence" "$work/test.bag" "$frames" $camera
 roscore -p "$port" >"$work/roscore.log" 2>&1 &

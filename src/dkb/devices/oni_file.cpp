@@ -31,15 +31,7 @@ enum RecordType : uint32_t {
   kAdded5 = 12,
   kAdded = 13
 };
-enum OniPixels : int64_t {
-  kDepth1mm = 100,
-  kDepth100um = 101,
-  kRgb888 = 200,
-  kYuv422 = 201,
-  kGray8 = 202,
-  kJpeg = 204,
-  kYuyv = 205
-};
+enum OniPixels : int64_t { kDepth100um = 101, kRgb888 = 200, kGray8 = 202, kJpeg = 204 };
 
 struct Record {
   uint32_t type = 0, stream = 0;

@@ -21,8 +21,7 @@ OutputFile::OutputFile(const std::filesystem::path& path) : path_(path), target_
   // Its index goes back to what was written; and what is no file must not be replaced by one.
   if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there))
     throw InputError(path.string() + ": is a device or a pipe; a recording needs the name of a file");
-  const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
-  temporary_ = folder / ("." + target_.filename().string() + ".tmp" + std::to_string(::getpid()));
+  temporary_ = temporary_beside(target_);
   fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd_ < 0) fail_to_write(path_, "open", errno);
 }

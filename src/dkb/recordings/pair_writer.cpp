@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/recordings/pair_writer.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -55,8 +53,7 @@ class FolderPairWriter final : public PairWriter {
   FolderPairWriter(const fs::path& path, const Camera& camera, const std::string& camera_text, int png_level)
       : path_(path.has_filename() ? path : path.parent_path()),
         target_(behind_links(path_)),
-        temporary_((target_.has_parent_path() ? target_.parent_path() : ".") /
-                   ("." + target_.filename().string() + ".tmp" + std::to_string(::getpid()))),
+        temporary_(temporary_beside(target_)),
         camera_(camera),
         png_level_(png_level) {
     std::error_code error;

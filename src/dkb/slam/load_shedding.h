@@ -33,7 +33,6 @@ class LoadShedding {
   void end(int64_t now_ns) { done_ns_ = now_ns; }
 
   Level level() const { return level_; }
-  double late_s() const { return 1e-9 * static_cast<double>(late_ns_); }
   // [s] of the sequence so far without "detection", "loop_search" and "features", as Statistics has them.
   std::map<std::string, double> seconds_by_name() const;
   // What people should know, the first time that something is left out; else empty.

@@ -5,7 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -58,6 +60,13 @@ fs::path behind_links(const fs::path& path) {
   return error ? path : target;
 }
 
+fs::path temporary_beside(const fs::path& target) {
+  static std::atomic<uint64_t> made{0};
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  return folder /
+         ("." + target.filename().string() + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(++made));
+}
+
 namespace {
 
 // A device or a pipe is no file to be replaced.
@@ -74,10 +83,7 @@ GrowingFile::GrowingFile(fs::path path, const std::string& ending)
   if (straight_) {
     fd_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
-    const std::string name = target_.filename().string();
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-    temporary_ =
-        (folder / (ending.empty() ? "." + name + ".tmp" + std::to_string(::getpid()) : name + ending)).string();
+    temporary_ = ending.empty() ? temporary_beside(target_).string() : target_.string() + ending;
     fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   }
   if (fd_ < 0) fail("open");

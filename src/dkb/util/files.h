@@ -13,6 +13,10 @@ std::string read_file(const std::filesystem::path& path);
 // What is replaced where `path` is written: what a link leads to, also where that is not there yet.
 std::filesystem::path behind_links(const std::filesystem::path& path);
 
+// What grows beside `target` until it takes its place: .NAME.tmpPID-N, another one at each call, since threads of one
+// process may write the same file.
+std::filesystem::path temporary_beside(const std::filesystem::path& target);
+
 // Replaces `path` by `content` atomically: temporary file in the same folder, fsync, rename, fsync of the folder.
 // A reader sees the old file or the new one, never a part. Links are followed; a device or a pipe is written straight.
 // Throws as fail_to_write() does.
@@ -21,8 +25,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 // A file that grows on the disk and takes the place of `path` when it is whole, as write_file_atomically() has it.
 class GrowingFile {
  public:
-  // Grows as .NAME.tmpPID beside what it takes the place of; or as NAME with `ending`, for files that are worth looking
-  // at before they are whole. Throws as fail_to_write() does, here and below.
+  // Grows as temporary_beside() of what it takes the place of; or as NAME with `ending`, for files that are worth
+  // looking at before they are whole. Throws as fail_to_write() does, here and below.
   explicit GrowingFile(std::filesystem::path path, const std::string& ending = "");
   ~GrowingFile();  // without commit() nothing is left behind
   GrowingFile(const GrowingFile&) = delete;

@@ -125,6 +125,22 @@ TEST(Files, AtomicWriteReplacesTheWholeFile) {
   fs::remove_all(folder);
 }
 
+TEST(Files, ThreadsThatWriteOneFileLeaveOneOfTheirContents) {
+  const test::TempFolder temp;
+  const fs::path path = temp / "a.txt";
+  std::vector<std::string> contents;
+  for (char c = 'a'; c < 'e'; ++c) contents.emplace_back(100'000, c);
+  std::vector<std::thread> writers;
+  for (const std::string& content : contents)
+    writers.emplace_back([&] {
+      for (int i = 0; i < 20; ++i) EXPECT_NO_THROW(write_file_atomically(path, content));
+    });
+  for (std::thread& w : writers) w.join();
+  const std::string written = read_file(path);
+  EXPECT_EQ(std::count(contents.begin(), contents.end(), written), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(temp.path()), fs::directory_iterator()), 1) << "nothing else is left";
+}
+
 TEST(Files, AGrowingFileIsWholeOrNotThere) {
   const test::TempFolder temp;
   const fs::path path = temp / "rows.csv", part = temp / "rows.csv.part";
