@@ -100,8 +100,7 @@ void SlamCore::odometry(const OdometryMessage& odometry) {
   }
   complain(LogLevel::warning,
            "odom_prior: a message was left out, since its stamp is not after the one before, or its pose or twist is "
-           "none; /diagnostics "
-           "counts such as `late odometry`");
+           "none; /diagnostics counts such as `late odometry`");
 }
 
 void SlamCore::imu(const ImuMessage& imu) {
@@ -113,8 +112,7 @@ void SlamCore::imu(const ImuMessage& imu) {
   }
   complain(LogLevel::warning,
            "imu: a message was left out, since its stamp is not after the one before, or it has no angular velocity; "
-           "/diagnostics "
-           "counts such as `late odometry`");
+           "/diagnostics counts such as `late odometry`");
 }
 
 void SlamCore::initial_pose(const PoseMessage& pose) {

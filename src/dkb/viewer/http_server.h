@@ -47,10 +47,9 @@ class HttpServer {
     std::chrono::milliseconds request{5000};   // from the connection to the request's last byte
     std::chrono::milliseconds answer{30000};   // for a whole answer
     std::chrono::milliseconds stalled{15000};  // of a stream, without a byte taken
-    std::chrono::milliseconds stuck{
-        1000};  // of an answer, without a byte taken: it then makes room where that is short
-    std::chrono::milliseconds linger{1000};  // after an answer, for what the client still sends
-    std::chrono::milliseconds tick{33};      // between parts of a stream
+    std::chrono::milliseconds stuck{1000};     // an answer of which no byte is taken makes room where that is short
+    std::chrono::milliseconds linger{1000};    // after an answer, for what the client still sends
+    std::chrono::milliseconds tick{33};        // between parts of a stream
   };
 
   // Binds; port 0 = any. Throws InputError.
