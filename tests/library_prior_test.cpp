@@ -243,7 +243,7 @@ TEST_F(LibraryPriors, ARotationBridgesAsLongAsTheVelocityCanBeTakenToLast) {
     predicted += r.state == TrackingState::predicted;
     lost += r.state == TrackingState::lost;
     if (r.tracked()) {
-      EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 0.02) << i;
+      EXPECT_NEAR(r.world_from_cam->translation.x(), world.camera_x(i), 0.05) << i;
     }
   }
   // 2 m/s^2 until 0.14 s, by then 0.02 m, and 0.28 m/s from then on: 0.25 m after 0.95 s, 28 frames.

@@ -16,6 +16,7 @@
 namespace dkb {
 namespace {
 
+constexpr int kCell = 4;           // [px] one depth is looked at per square of this size
 constexpr size_t kMinCells = 12;   // cells with depth that a boxed object needs
 constexpr size_t kMinRegion = 40;  // the same for a region without a box
 constexpr double kMargin = 0.1;    // share of a box's size by which its rim reaches; mask there is no object of its own
@@ -45,12 +46,12 @@ double position_sd(double depth) {
 }  // namespace
 
 MoverObserver::MoverObserver(const CameraModel& camera)
-    : camera_(camera), rays_(camera, depth_cell(camera)), parts_(rays_.width(), rays_.height()) {}
+    : camera_(camera), rays_(camera, kCell), parts_(rays_.width(), rays_.height()) {}
 
 // Cells whose middle lies in the box, widened by a share of its size.
 CellBounds MoverObserver::cells_in(const Box& b, double margin) const {
   const auto first = [&](double edge, int n) {
-    return static_cast<int>(std::clamp(std::ceil(edge / rays_.cell() - 0.5), 0.0, static_cast<double>(n)));
+    return static_cast<int>(std::clamp(std::ceil(edge / kCell - 0.5), 0.0, static_cast<double>(n)));
   };
   const double x = static_cast<double>(b.x), y = static_cast<double>(b.y), w = static_cast<double>(b.w),
                h = static_cast<double>(b.h);
@@ -67,7 +68,7 @@ void MoverObserver::for_each_cell(const CellBounds& r, const Function& function)
 
 // Depth in the middle of a cell, or beside it; 0 = none.
 float MoverObserver::depth_near(const DepthImage& depth, int x, int y) const {
-  const int px = x * rays_.cell() + rays_.cell() / 2, py = y * rays_.cell() + rays_.cell() / 2;
+  const int px = x * kCell + kCell / 2, py = y * kCell + kCell / 2;
   for (const auto& [dx, dy] : {std::array{0, 0}, {-1, 0}, {0, -1}, {-1, -1}})
     if (depth.contains(px + dx, py + dy) && depth(px + dx, py + dy) > 0) return depth(px + dx, py + dy);
   return 0;
@@ -109,7 +110,7 @@ MoverObservation MoverObserver::measure(std::span<const uint32_t> cells) const {
 
 MoverSurface MoverObserver::surface_of(std::span<const uint32_t> cells) const {
   MoverSurface surface;
-  const double side = rays_.cell() / camera_.fx;  // [m] of a cell, 1 m deep
+  const double side = kCell / camera_.fx;  // [m] of a cell, 1 m deep
   for (const uint32_t i : cells) surface.area += side * side * static_cast<double>(depth_[i] * depth_[i]);
   const size_t stride = (cells.size() + MoverSurface::kMaxPoints - 1) / MoverSurface::kMaxPoints;
   for (size_t k = 0; k < cells.size(); k += stride) {
@@ -345,10 +346,10 @@ std::vector<MoverObserver::Region> MoverObserver::divide(Region part) const {
 
 // Whether the middle of a cell is in the mask.
 bool MoverObserver::is_masked(const MoverMask& mask, int x, int y) const {
-  if (mask.cell == rays_.cell() && mask.cells.width() == rays_.width() && mask.cells.height() == rays_.height())
+  if (mask.cell == kCell && mask.cells.width() == rays_.width() && mask.cells.height() == rays_.height())
     return mask.cells(x, y) != 0;
-  const float middle = 0.5f * static_cast<float>(rays_.cell());
-  return mask.at(static_cast<float>(x * rays_.cell()) + middle, static_cast<float>(y * rays_.cell()) + middle);
+  const float middle = 0.5f * static_cast<float>(kCell);
+  return mask.at(static_cast<float>(x * kCell) + middle, static_cast<float>(y * kCell) + middle);
 }
 
 void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& mask) {
@@ -392,7 +393,7 @@ std::vector<MoverObservation> MoverObserver::observe(const DepthImage& depth, co
   const std::vector<Detection> boxes = named_once(all_boxes, mask);
   std::vector<MoverObservation> observations = observe_boxes(boxes);
   for (const Region& r : find_regions(boxes)) {
-    const auto pixels = [&](int cells) { return static_cast<float>(cells * rays_.cell()); };
+    const auto pixels = [&](int cells) { return static_cast<float>(cells * kCell); };
     const Box bounds{pixels(r.bounds.x0), pixels(r.bounds.y0), pixels(r.bounds.x1 - r.bounds.x0),
                      pixels(r.bounds.y1 - r.bounds.y0)};
     MoverObservation& o = observations.emplace_back(measure(r.cells));

@@ -21,9 +21,10 @@ TEST(MoverObserver, ThePositionIsTheMedianOfTheVisibleSurface) {
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].class_name, "person");
   EXPECT_EQ(found[0].box, (Box{100, 40, 60, 160}));
-  // The middle of columns 100 ... 159 and rows 40 ... 199: (129.5 - 159.5) / 250 * 2 m and 0, to a cell of 2 px.
-  EXPECT_NEAR(found[0].position_in_world.x(), -0.24, 0.0161);
-  EXPECT_NEAR(found[0].position_in_world.y(), 0, 0.0161);
+  // Middle cell of 15 columns: pixels 128 ... 131, middle 129.5: (129.5 - 159.5) / 250 * 2 m; of 40 rows the 21st:
+  // 121.5.
+  EXPECT_NEAR(found[0].position_in_world.x(), -0.24, 1e-6);
+  EXPECT_NEAR(found[0].position_in_world.y(), 0.016, 1e-6);
   EXPECT_NEAR(found[0].position_in_world.z(), 2, 1e-6);
   EXPECT_GT(found[0].position_sd, 0);
 }
@@ -47,7 +48,7 @@ TEST(MoverObserver, PositionsAreInTheWorld) {
                               {1, 2, 3});
   const auto found = observe(scene, world_from_cam);
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_NEAR((found[0].position_in_world - Eigen::Vector3d(1 + 2, 2, 3 + 0.24)).norm(), 0, 0.02);
+  EXPECT_NEAR((found[0].position_in_world - Eigen::Vector3d(1 + 2, 2 + 0.016, 3 + 0.24)).norm(), 0, 1e-5);
 }
 
 TEST(MoverObserver, WhatTheMaskLeavesOutIsNotMeasured) {
@@ -56,7 +57,7 @@ TEST(MoverObserver, WhatTheMaskLeavesOutIsNotMeasured) {
   scene.boxes[0].box = {80, 40, 160, 160};  // mostly wall
   const auto found = observe(scene);
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_NEAR(found[0].position_in_world.x(), -0.24, 0.0161);
+  EXPECT_NEAR(found[0].position_in_world.x(), -0.24, 1e-6);
   EXPECT_NEAR(found[0].position_in_world.z(), 2, 1e-6);
 }
 
@@ -133,7 +134,7 @@ TEST(MoverObserver, WithoutBoxesRegionsOfOneDepthAreTheObjects) {
 TEST(MoverObserver, HolesInTheDepthDoNotCutAnObject) {
   MoverTestScene scene;
   scene.add(100, 40, 160, 200, 2, false);
-  for (int y = 110; y < 116; ++y)
+  for (int y = 110; y < 122; ++y)
     for (int x = 90; x < 170; ++x) scene.depth(x, y) = 0;
   const auto found = observe(scene);
   ASSERT_EQ(found.size(), 1u);
@@ -149,7 +150,7 @@ TEST(MoverObserver, TheMaskRoundABoxIsNoObjectOfItsOwn) {
 
 TEST(MoverObserver, SpecksAndRegionsWithoutDepthAreLeftOut) {
   MoverTestScene scene;
-  scene.add(200, 40, 208, 48, 2, false);  // 16 cells without a box
+  scene.add(200, 40, 216, 56, 2, false);  // 16 cells without a box
   EXPECT_TRUE(observe(scene).empty());
   MoverTestScene dark;
   dark.add(100, 40, 160, 200, 2, false);
@@ -186,12 +187,12 @@ TEST(MoverObserver, NeighboursWhoTouchAreToldApartByWhereTheyAreExpected) {
 TEST(MoverObserver, PartsOfOneExpectedBodyAreJoined) {
   MoverTestScene scene;
   scene.add(130, 40, 190, 90, 2, false);
-  scene.add(130, 130, 190, 200, 2.2f, false);  // a gap of twenty cells
+  scene.add(130, 130, 190, 200, 2.2f, false);  // a gap of ten cells
   EXPECT_EQ(observe(scene).size(), 2u);
   const auto found = observe_expecting(scene, {{0, 0, 2.1}});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].expected, 0);
-  EXPECT_EQ(found[0].box, (Box{130, 40, 60, 160}));
+  EXPECT_EQ(found[0].box, (Box{128, 40, 60, 160}));
 }
 
 TEST(MoverObserver, WhoIsNotExpectedIsNotTakenForWhoIs) {
