@@ -262,8 +262,10 @@ TEST(PeopleControl, BoxesBesideThePeopleAreNoticed) {
   }
   write_text(temp / "boxes.txt", beside);
   const PeopleRun run(temp / "out", {"--detector", "file", "--boxes", temp / "boxes.txt"});
-  // Pose and map may be right all the same: matches that show a second motion are left out.
+  // The pose may be right all the same: matches that show a second motion are left out.
   EXPECT_GT(run.features.leak, 0.15);
+  const PeopleRun right(temp / "right", people_detector("boxes"));
+  EXPECT_GT(run.map_points_on_people, right.map_points_on_people + 10);
   // What takes boxes at their word, and looks at nothing else, lets them in as if there were no filter.
   const PeopleRun blind(temp / "blind", {"--detector", "file", "--boxes", temp / "boxes.txt"}, {"--filter", "box"});
   EXPECT_GT(blind.online_ape, 0.02) << "[m]; twice what a filter may leave";

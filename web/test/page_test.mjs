@@ -93,7 +93,10 @@ const frame = async (page) => Number(/frame (\d+)/.exec(await page.textContent("
 
 // The run waits for the page.
 const order = (what) => fetch(url + "api/command", { method: "POST", body: JSON.stringify({ do: what }) });
-while ((await (await fetch(url + "api/state")).json()).frame < 5) await new Promise((r) => setTimeout(r, 10));
+const reached = async (frame) => {
+  while ((await (await fetch(url + "api/state")).json()).frame < frame) await new Promise((r) => setTimeout(r, 10));
+};
+await reached(5);
 await order("pause");
 const { page } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" });
 if (await page.evaluate(() => document.body.textContent.includes("no 3-D page"))) skip("the page is plain: it was built without node");
@@ -201,6 +204,17 @@ await shoot(page, "event");
 assert.deepEqual(errors, []);
 assert.equal(await interrupted(run), 0);
 await page.close();
+
+// A new run at the same address: the view leaves the whole map of the one before and follows the camera again.
+const again = await serve("run", slow, "--viewer", new URL(url).port, "--realtime", "--detector", "motion", "--quiet", "--out", join(work, "again"));
+await reached(1); // a run that is paused before its first frame has nothing to show
+await order("pause");
+await until(late.page, () => document.getElementById("badge").textContent === "paused" && document.getElementById("count").textContent.startsWith("frame "));
+await late.page.waitForTimeout(500);
+assert.ok((await frame(late.page)) < 15, "paused while the camera is near its start");
+const look = (await late.page.getAttribute("#view", "data-look")).split(" ").map(Number);
+assert.ok(Math.hypot(look[0], look[1] + 0.8, look[2] + 1.6) < 0.5, "behind the camera: " + look);
+await interrupted(again);
 await late.page.close();
 errors.length = 0; // the pages have lost their server
 
