@@ -46,8 +46,8 @@ class DKB_SLAM_API Options {
   } features;
 
   struct Noise {
-    double pixel_sigma = 1.0;               ///< [px, at a focal length of 525 px] standard deviation of a corner, above 0
-    double depth_sigma_base = 0.0012;       ///< [m] standard deviation of depth at 0.4 m, above 0
+    double pixel_sigma = 1.0;          ///< [px, at a focal length of 525 px] standard deviation of a corner, above 0
+    double depth_sigma_base = 0.0012;  ///< [m] standard deviation of depth at 0.4 m, above 0
     double depth_sigma_quadratic = 0.0019;  ///< [1/m] its growth with (z - 0.4 m)^2, at least 0
     double depth_sigma_factor = 10.0;       ///< on both, for edges, registration and calibration, at least 1
   } noise;

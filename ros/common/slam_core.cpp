@@ -91,28 +91,27 @@ void SlamCore::camera_info(const CameraInfoMessage& info) {
   if (!camera_info_) camera_info_ = info;
 }
 
-void SlamCore::odometry(const OdometryMessage& odometry) {
+// `history` may refuse a message: that is counted, and told the first time.
+template <class History, class Message>
+void SlamCore::add_motion(History& history, const Message& message, bool* told, const std::string& what) {
   {
     const std::lock_guard lock(input_mutex_);
-    if (odometry_.add(odometry)) return;
+    if (history.add(message)) return;
     ++late_motion_;
-    if (std::exchange(told_of_odometry_, true)) return;
+    if (std::exchange(*told, true)) return;
   }
-  complain(LogLevel::warning,
-           "odom_prior: a message was left out, since its stamp is not after the one before, or its pose or twist is "
-           "none; /diagnostics counts such as `late odometry`");
+  complain(LogLevel::warning, what + "; /diagnostics counts such as `late odometry`");
+}
+
+void SlamCore::odometry(const OdometryMessage& odometry) {
+  add_motion(odometry_, odometry, &told_of_odometry_,
+             "odom_prior: a message was left out, since its stamp is not after the one before, or its pose or twist is "
+             "none");
 }
 
 void SlamCore::imu(const ImuMessage& imu) {
-  {
-    const std::lock_guard lock(input_mutex_);
-    if (gyro_.add(imu)) return;
-    ++late_motion_;
-    if (std::exchange(told_of_imu_, true)) return;
-  }
-  complain(LogLevel::warning,
-           "imu: a message was left out, since its stamp is not after the one before, or it has no angular velocity; "
-           "/diagnostics counts such as `late odometry`");
+  add_motion(gyro_, imu, &told_of_imu_,
+             "imu: a message was left out, since its stamp is not after the one before, or it has no angular velocity");
 }
 
 void SlamCore::initial_pose(const PoseMessage& pose) {

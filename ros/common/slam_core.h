@@ -77,6 +77,8 @@ class SlamCore final : public RosCore {
   using Task = std::function<Answer(dkb::Slam&)>;
 
   void arrived(int64_t* last, int64_t now_ns);
+  template <class History, class Message>
+  void add_motion(History& history, const Message& message, bool* told, const std::string& what);
   void enqueue(std::vector<ImagePair> pairs);
   void request(Task task, Done done);
   void run_tracking();

@@ -21,9 +21,14 @@ std::optional<CameraModel> builtin_camera(const std::string& name);
 // angle.
 inline constexpr double kUsualFocal = 525;
 
+// [px] What is `usual` pixels for a camera of that focal length.
+inline double pixels_of(const CameraModel& camera, double usual) {
+  return usual * camera.fx / kUsualFocal;
+}
+
 // [px] The side of the square cells in which depth is looked at for what moves: 7.6 mrad, whatever the resolution.
 inline int depth_cell(const CameraModel& camera) {
-  return std::clamp(static_cast<int>(std::lround(4 * camera.fx / kUsualFocal)), 2, 32);
+  return std::clamp(static_cast<int>(std::lround(pixels_of(camera, 4))), 2, 32);
 }
 
 // [px] Where the image as read shows `point` [m, in the camera]. Nothing where it shows it nowhere: behind the camera,

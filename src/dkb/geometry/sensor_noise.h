@@ -12,8 +12,8 @@ namespace dkb {
 struct SensorNoise {
   static constexpr int kMaxLevels = 32;  // of an image pyramid
 
-  // [px] of a corner on the finest pyramid level, > 0, for a camera of the usual focal length: what corners are off by is
-  // the lens, blur and the shutter's, which are angles.
+  // [px] of a corner on the finest pyramid level, > 0, for a camera of the usual focal length: what corners are off by
+  // is the lens, blur and the shutter's, which are angles.
   double pixel_sigma = 1.0;
   double depth_sigma_base = 0.0012;  // [m] at 0.4 m, > 0        (Nguyen, Izadi, Lovell 2012, axial noise of the Kinect)
   double depth_sigma_quadratic = 0.0019;  // [1/m] growth with (z - 0.4 m)^2, >= 0   (the same source)
@@ -26,8 +26,8 @@ struct SensorNoise {
     require_option(depth_sigma_quadratic >= 0, "depth_sigma_quadratic", depth_sigma_quadratic, "at least 0");
     require_option(depth_sigma_factor >= 1, "depth_sigma_factor", depth_sigma_factor, "at least 1");
   }
-  // Standard deviation [px, full resolution, usual focal length] of a corner found on a pyramid level: as the root of the
-  // level's scale.
+  // Standard deviation [px, full resolution, usual focal length] of a corner found on a pyramid level: as the root of
+  // the level's scale.
   double corner_sigma(int octave, double scale_factor) const {
     return pixel_sigma * std::pow(scale_factor, 0.5 * octave);
   }

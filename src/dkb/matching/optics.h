@@ -30,7 +30,7 @@ struct Optics {
   // Size of a level over that of the finest.
   float scale(int level) const { return scales_[static_cast<size_t>(level)]; }
   // [px] what is so many pixels for a camera of the usual focal length.
-  double pixels(double usual) const { return usual * camera.fx / kUsualFocal; }
+  double pixels(double usual) const { return pixels_of(camera, usual); }
   double corner_sigma(const Keypoint& corner) const { return std::sqrt(corner_variance(corner)); }
   // Whether an ideal pixel lies so far from the edges of the image as read that the lens need not be asked whether it
   // is in view.
