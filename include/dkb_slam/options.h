@@ -28,7 +28,7 @@ enum class FilterKind {
 /// Who decides that a frame becomes a keyframe.
 enum class KeyframePolicyKind {
   adaptive,  ///< parallax, match quality and visibility (DKB section 3.2)
-  baseline,  ///< few tracked points, or a long wait
+  baseline,  ///< fewer than 85% of the reference keyframe's points, or few near ones (ORB-SLAM2)
 };
 
 /// The settings of config.yaml, by the names they have there, and what programs alone set. Fields may be set directly;
@@ -163,7 +163,7 @@ struct KeyframeQuery {
   int64_t stamp_ns = 0;               ///< of its colour image
   int frames_since_keyframe = 0;      ///< since the last keyframe
   double seconds_since_keyframe = 0;  ///< [s] likewise; of a loaded map's since the camera was found there
-  bool mapper_idle = true;            ///< the last keyframe is in the map
+  bool mapper_idle = true;            ///< the last keyframe and what loops move are in the map
   int tracked_close_points = 0;       ///< points of the pose that are near enough for good depth
   int creatable_close_points = 0;     ///< features near enough that show no map point yet
   int reference_points = 0;           ///< points of the reference keyframe that other keyframes see as well

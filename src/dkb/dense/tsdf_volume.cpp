@@ -55,23 +55,16 @@ std::vector<VoxelIndex> blocks_at_surface(const PlacedView& placed, const ViewCa
 // Blocks that at least `min_views` views see, by increasing index.
 std::vector<VoxelIndex> blocks_to_fuse(std::span<const PlacedView> views, const ViewCamera& camera,
                                        const DenseOptions& options) {
-  std::vector<std::pair<VoxelIndex, int>> counts, merged;
+  std::vector<VoxelIndex> seen, result;
   for (const PlacedView& view : views) {
-    merged.clear();
-    auto old = counts.begin();
-    for (const VoxelIndex& index : blocks_at_surface(view, camera, options)) {
-      for (; old != counts.end() && old->first < index; ++old) merged.push_back(*old);
-      if (old != counts.end() && old->first == index)
-        merged.emplace_back(index, (old++)->second + 1);
-      else
-        merged.emplace_back(index, 1);
-    }
-    merged.insert(merged.end(), old, counts.end());
-    counts.swap(merged);
+    const std::vector<VoxelIndex> blocks = blocks_at_surface(view, camera, options);
+    seen.insert(seen.end(), blocks.begin(), blocks.end());
   }
-  std::vector<VoxelIndex> result;
-  for (const auto& [index, count] : counts)
-    if (count >= kMinViews) result.push_back(index);
+  std::sort(seen.begin(), seen.end());
+  for (size_t i = 0, end = 0; i < seen.size(); i = end) {
+    while (end < seen.size() && seen[end] == seen[i]) ++end;
+    if (end - i >= kMinViews) result.push_back(seen[i]);
+  }
   return result;
 }
 

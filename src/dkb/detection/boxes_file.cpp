@@ -67,12 +67,8 @@ BoxesByTime parse_boxes(std::string_view text, const std::string& name, int widt
   return boxes;
 }
 
-BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height) {
-  return parse_boxes(read_file(path), path.string(), width, height);
-}
-
 FileDetector::FileDetector(const std::filesystem::path& path, int width, int height)
-    : boxes_(read_boxes(path, width, height)) {}
+    : boxes_(parse_boxes(read_file(path), path.string(), width, height)) {}
 
 const TimedBoxes* FileDetector::at(int64_t stamp_ns) const {
   return find_same_stamp(boxes_, seconds_from_ns(stamp_ns), [](const TimedBoxes& t) { return t.timestamp; });

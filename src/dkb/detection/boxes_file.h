@@ -22,7 +22,6 @@ using BoxesByTime = std::vector<TimedBoxes>;
 // clipped to the image. Throws InputError `name:line: ...` for too few columns, numbers that are not finite, sizes that
 // are not positive, and boxes wholly outside an image of width x height [px].
 BoxesByTime parse_boxes(std::string_view text, const std::string& name, int width, int height);
-BoxesByTime read_boxes(const std::filesystem::path& path, int width, int height);
 
 // The detector `file`: boxes recorded or simulated earlier. All boxes are taken, whatever the last column says. An
 // image gets the boxes of the nearest stamp within 2 ms, or none.

@@ -46,7 +46,7 @@ TEST(BoxesFile, SharesOfTheImageAreRefused) {
 }
 
 TEST(BoxesFile, MissingFilesAreNamed) {
-  EXPECT_THROW(read_boxes("/nowhere/b.txt", 640, 480), InputError);
+  EXPECT_THROW(FileDetector("/nowhere/b.txt", 640, 480), InputError);
 }
 
 TEST(BoxesFile, AnyMutationIsReadOrRefused) {

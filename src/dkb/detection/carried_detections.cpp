@@ -102,9 +102,7 @@ Detections carry(const Detections& from, std::span<const PointMotion> motions, i
   to.mask = from.mask;
   if (!to.mask.empty())
     for (const Detection& d : from.boxes)
-      for (int y = 0; y < to.mask.height(); ++y)
-        for (int x = 0; x < to.mask.width(); ++x)
-          if (d.box.contains(static_cast<float>(x), static_cast<float>(y))) to.mask(x, y) = 0;
+      for_each_pixel(d.box, to.mask.width(), to.mask.height(), [&](int x, int y) { to.mask(x, y) = 0; });
   for (size_t i = 0; i < from.boxes.size(); ++i) {
     const Detection& d = from.boxes[i];
     const float cx = d.box.x + d.box.w / 2, cy = d.box.y + d.box.h / 2;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "dkb/util/errors.h"
@@ -23,6 +25,16 @@ class NeverStarted : public DetectorEnded {
 
 // The part of `box` within an image of this size [px]; of zero width or height when there is none.
 Box clip(const Box& box, int width, int height);
+
+// Calls use(x, y) for each pixel of an image of this size whose place the box holds, row by row.
+template <class Use>
+void for_each_pixel(const Box& box, int width, int height, const Use& use) {
+  const auto first = [](float begin, int size) {
+    return static_cast<int>(std::clamp(std::ceil(begin), 0.0f, static_cast<float>(size)));
+  };
+  for (int y = first(box.y, height); y < height && static_cast<float>(y) < box.y + box.h; ++y)
+    for (int x = first(box.x, width); x < width && static_cast<float>(x) < box.x + box.w; ++x) use(x, y);
+}
 
 // The number of the smallest box that holds a point [px], of equal ones the first; -1 where none does.
 int smallest_box_at(std::span<const Detection> boxes, float x, float y);

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+#include <vector>
+
 namespace dkb {
 namespace {
 
@@ -18,6 +21,24 @@ TEST(Box, IntersectionOverUnionIsTheSharedPart) {
   EXPECT_EQ(intersection_over_union({0, 0, 10, 10}, {0, 0, 10, 10}), 1);
   EXPECT_EQ(intersection_over_union({0, 0, 10, 10}, {10, 0, 10, 10}), 0);
   EXPECT_EQ(intersection_over_union({0, 0, 0, 0}, {0, 0, 0, 0}), 0);
+}
+
+TEST(Box, PixelsAreThoseThatItHolds) {
+  for (const Box& box : {Box{2, 1, 3, 2},
+                         {1.5f, 0.25f, 2.5f, 3},
+                         {-4, -4, 6.5f, 5},
+                         {7, 4, 30, 30},
+                         {20, 20, 3, 3},
+                         {-3e30f, 0, 6e30f, 1},
+                         {3e30f, 0, 1, 1},
+                         {3, 3, 0, 2}}) {
+    std::vector<std::pair<int, int>> held, visited;
+    for (int y = 0; y < 6; ++y)
+      for (int x = 0; x < 9; ++x)
+        if (box.contains(static_cast<float>(x), static_cast<float>(y))) held.emplace_back(x, y);
+    for_each_pixel(box, 9, 6, [&](int x, int y) { visited.emplace_back(x, y); });
+    EXPECT_EQ(visited, held) << box.x << " " << box.y;
+  }
 }
 
 }  // namespace

@@ -17,9 +17,9 @@ constexpr int kMissedResults = 2;     // detector results that may miss an objec
 void keep_within(const Box& box, const GreyImage& from, GreyImage& to) {
   if (from.empty()) return;
   if (to.empty()) to = GreyImage(from.width(), from.height());
-  for (int y = 0; y < to.height(); ++y)
-    for (int x = 0; x < to.width(); ++x)
-      if (from(x, y) != 0 && box.contains(static_cast<float>(x), static_cast<float>(y))) to(x, y) = from(x, y);
+  for_each_pixel(box, to.width(), to.height(), [&](int x, int y) {
+    if (from(x, y) != 0) to(x, y) = from(x, y);
+  });
 }
 
 }  // namespace

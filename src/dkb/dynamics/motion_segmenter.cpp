@@ -83,11 +83,10 @@ MotionSegmenter::MotionSegmenter(const CameraModel& camera, const SensorNoise& n
       rays_(camera, depth_cell(camera)),
       smoothing_(camera, noise, depth_cell(camera), simd),
       alignment_(noise, camera.fx, rays_) {
-  noise_.check();
   const int width = rays_.width(), height = rays_.height();
-  for (Image<float>* i : {&tolerance_, &still_, &weighted_, &weights_}) *i = Image<float>(width, height);
+  for (Image<float>* i : {&still_, &weighted_, &weights_}) *i = Image<float>(width, height);
   known_ = intruding_ = vacated_ = Image<uint8_t>(width, height);
-  verdict_.resize(kBlockCells);
+  tolerance_.resize(kBlockCells), verdict_.resize(kBlockCells);
   for (auto* v : {&there_.nearest, &there_.farthest, &there_.depth, &there_.score}) v->resize(kBlockCells);
 }
 
@@ -210,7 +209,7 @@ void MotionSegmenter::choose_views() {
 
 void MotionSegmenter::find_tolerances(CellRange block) {
   run_vectorised(simd_, [count = block.count, depth = current_->depth.data() + block.first,
-                         tolerance = tolerance_.data() + block.first, noise = noise_]() DKB_KERNEL_BODY {
+                         tolerance = tolerance_.data(), noise = noise_]() DKB_KERNEL_BODY {
     for (size_t i = 0; i < count; ++i) tolerance[i] = static_cast<float>(noise.surface_tolerance(depth[i]));
   });
 }
@@ -228,7 +227,7 @@ void MotionSegmenter::carry_scores(CellRange block) {
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
   const auto keep_hole = static_cast<float>(std::exp(-interval / kHoleMemory));
   const Image<float>& before = previous_->depth;
-  const float* const tolerances = tolerance_.data() + block.first;
+  const float* const tolerances = tolerance_.data();
   float* const scores = current_->score.data() + block.first;
   uint8_t* const knowns = known_.data() + block.first;
   run_vectorised(
@@ -282,7 +281,7 @@ void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
   }
   run_vectorised(
       simd_, [count = block.count, cell = cells.data(), depth_there = projection_.depth.data(),
-              depth = current_->depth.data() + block.first, tolerance = tolerance_.data() + block.first,
+              depth = current_->depth.data() + block.first, tolerance = tolerance_.data(),
               nearest = there_.nearest.data(), farthest = there_.farthest.data(), depth_then = there_.depth.data(),
               score_then = there_.score.data(), intruding = intruding_.data() + block.first,
               still = still_.data() + block.first, weight = chosen.trust * kThere, noise = noise_]() DKB_KERNEL_BODY {

@@ -108,14 +108,15 @@ class MotionSegmenter {
   size_t turn_ = 0;
   MotionProjection projection_;
   const Image<float> nothing_;
-  Image<float> tolerance_;  // [m] by cell
-  Image<float> still_;      // votes of the views that had the surface where it is
+  Image<float> still_;  // votes of the views that had the surface where it is
   Image<float> weighted_, weights_;
   Image<uint8_t> known_;
   Image<uint8_t> intruding_;  // 1 where a measured surface stands in space seen empty, or went on from where it was
   Image<uint8_t> vacated_;    // of the frame before: 1 where its surface is no more
   std::vector<ChosenView> chosen_;
-  // Of the block at work: which cells have moved on, and what a view has where they are.
+  // Of the block at work: within what surfaces are the same [m], which cells have moved on, and what a view has where
+  // they are.
+  std::vector<float> tolerance_;
   std::vector<uint8_t> verdict_;
   struct {
     std::vector<float> nearest, farthest, depth, score;

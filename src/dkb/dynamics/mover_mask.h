@@ -8,7 +8,7 @@
 
 namespace dkb {
 
-// Marks in `into` what `other` marks; an empty `into` takes its shape. Cells of `other` may be of another size.
+// Marks in `into` what `other` marks, whose cells may be of another size. An empty `into` keeps the size of its cells.
 void unite(MoverMask& into, const MoverMask& other, int width, int height);
 
 // Of two grids over one image, with cells of `from` and `to` px: the row or column of the second at the middle of row

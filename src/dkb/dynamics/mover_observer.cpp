@@ -174,6 +174,7 @@ std::vector<float> MoverObserver::box_depths(std::span<const Detection> boxes,
 }
 
 std::vector<MoverObservation> MoverObserver::observe_boxes(std::span<const Detection> boxes) const {
+  if (boxes.empty()) return {};
   std::vector<CellBounds> ranges;
   for (const Detection& d : boxes) ranges.push_back(cells_in(d.box, 0));
   const std::vector<float> depths = box_depths(boxes, ranges);
@@ -362,6 +363,7 @@ void MoverObserver::take_masked_depth(const DepthImage& depth, const MoverMask& 
 // The boxes without those of a mask's regions that are in boxes with a name: a mask beside boxes tells of the same
 // people twice. What of such a region is in no box is found as a region.
 std::vector<Detection> MoverObserver::named_once(std::span<const Detection> boxes, const MoverMask& mask) const {
+  if (boxes.empty()) return {};
   std::vector<char> named(depth_.size(), 0);
   for (const Detection& d : boxes)
     if (d.class_name != kUnnamedRegion) for_each_cell(cells_in(d.box, 0), [&](size_t i, int, int) { named[i] = 1; });

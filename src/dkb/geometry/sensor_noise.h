@@ -20,12 +20,6 @@ struct SensorNoise {
   double depth_sigma_factor =
       10.0;  // what edges, registration and calibration add to the source's flat-wall figure, >= 1
 
-  void check() const {
-    require_option(pixel_sigma > 0, "pixel_sigma", pixel_sigma, "greater than 0 px");
-    require_option(depth_sigma_base > 0, "depth_sigma_base", depth_sigma_base, "greater than 0 m");
-    require_option(depth_sigma_quadratic >= 0, "depth_sigma_quadratic", depth_sigma_quadratic, "at least 0");
-    require_option(depth_sigma_factor >= 1, "depth_sigma_factor", depth_sigma_factor, "at least 1");
-  }
   // Standard deviation [px, full resolution, usual focal length] of a corner found on a pyramid level: as the root of
   // the level's scale.
   double corner_sigma(int octave, double scale_factor) const {

@@ -27,7 +27,6 @@ class Wall {
       MapPoint p;
       p.id = make_point_id(0, i);
       p.position = position(i);
-      p.born_at = 0;
       map_.add_point(std::move(p));
       map_.observe(make_point_id(0, i), 0, i);
     }

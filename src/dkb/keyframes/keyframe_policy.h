@@ -19,7 +19,7 @@ struct KeyframeContext {
   FrameIndex last_keyframe_frame = 0;  // frame of the newest keyframe
   FrameIndex last_relocalisation_frame = -1000000;
   KeyframeId last_keyframe = kNoKeyframe;
-  bool mapper_idle = true;         // no keyframe outstanding in logical time
+  bool mapper_idle = true;         // no keyframe or correction outstanding in logical time
   int tracked_points = 0;          // inliers of the final pose
   int tracked_close_points = 0;    // of these, with a depth below the close limit
   int creatable_close_points = 0;  // features with such a depth that show no map point

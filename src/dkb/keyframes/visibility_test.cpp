@@ -141,7 +141,6 @@ Map wall(int side, const Eigen::Vector3d& centre) {
     MapPoint p;
     p.id = make_point_id(0, i);
     p.position = {0.1 * (i % side), 0.1 * (i / side), 2};
-    p.born_at = 0;
     map.add_point(std::move(p));
     map.observe(make_point_id(0, i), 0, i);
   }

@@ -102,10 +102,8 @@ MapCorrection adjust_globally(const Map& map, const Optics& optics, const LocalB
       correction.poses.push_back({k, map.keyframe(k)->cam_from_world, map.keyframe(k)->cam_from_world});
   for (size_t p = 0; p < window.points.size(); ++p)
     correction.positions.push_back({window.points[p], map.point(window.points[p])->position, window.problem.points[p]});
-  for (size_t o = 0; o < window.sources.size(); ++o)
-    if (result.outlier[o])
-      correction.outliers.push_back(
-          {window.points[static_cast<size_t>(window.sources[o].point)], window.sources[o].keyframe});
+  for (size_t o = 0; o < window.problem.observations.size(); ++o)
+    if (result.outlier[o]) correction.outliers.push_back({window.point_of(o), window.keyframe_of(o)});
   return correction;
 }
 

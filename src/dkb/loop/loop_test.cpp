@@ -236,7 +236,6 @@ TEST(LoopCorrection, ASeamHoldsWhenTheNextLoopIsClosed) {
     for (int i = 0; i < kShared; ++i) {
       MapPoint p;
       p.id = make_point_id(first, feature + i);
-      p.born_at = first;
       map.add_point(p);
       map.observe(p.id, first, feature + i);
       map.observe(p.id, then, there + i);

@@ -37,7 +37,6 @@ class OdometryWorld {
         MapPoint p;
         p.id = id_of_[i] = make_point_id(k, static_cast<int>(f));
         p.position = estimate.inverse() * (truth * scene.points[i]);
-        p.born_at = k;
         map.add_point(std::move(p));
       }
       last_seen_[i] = k;

@@ -15,9 +15,7 @@ namespace dkb {
 
 // A point made from depth at a keyframe which mapping has not published yet.
 struct ProvisionalPoint {
-  PointId id = kNoPoint;
-  KeyframeId keyframe = kNoKeyframe;
-  int feature = 0;
+  PointId id = kNoPoint;              // tells the keyframe and its feature
   Eigen::Vector3d point_in_keyframe;  // [m] in that keyframe's camera
   float scale = 1;                    // pyramid scale of the feature
   Descriptor descriptor{};

@@ -103,11 +103,17 @@ std::vector<KeyframeId> Map::root_of_each() const {
   return roots;
 }
 
+std::vector<int> Map::map_of_each() const {
+  std::vector<int> maps;
+  maps.reserve(keyframes_.size());
+  for (KeyframeId root : root_of_each()) maps.push_back(map_number(roots_, root));
+  return maps;
+}
+
 std::vector<std::vector<KeyframeId>> Map::keyframes_by_map() const {
-  const std::vector<KeyframeId> root_of = root_of_each();
+  const std::vector<int> map_of = map_of_each();
   std::vector<std::vector<KeyframeId>> by_map(std::max<size_t>(1, roots_.size()));
-  for (KeyframeId id : live_keyframes())
-    by_map[static_cast<size_t>(map_number(roots_, root_of[static_cast<size_t>(id)]))].push_back(id);
+  for (KeyframeId id : live_keyframes()) by_map[static_cast<size_t>(map_of[static_cast<size_t>(id)])].push_back(id);
   return by_map;
 }
 
@@ -121,10 +127,9 @@ std::vector<KeyframeId> Map::best_covisible(KeyframeId id, size_t most) const {
 std::vector<KeyframeId> Map::newest_beside(KeyframeId id, int most) const {
   std::vector<KeyframeId> newest;
   if (keyframe(id) == nullptr) return newest;
-  const std::vector<KeyframeId> root = root_of_each();
+  const KeyframeId top = root(id);
   for (KeyframeId k = keyframe_count(); k-- > 0 && static_cast<int>(newest.size()) < most;)
-    if (live_keyframe(k) != nullptr && root[static_cast<size_t>(k)] == root[static_cast<size_t>(id)])
-      newest.push_back(k);
+    if (live_keyframe(k) != nullptr && root(k) == top) newest.push_back(k);
   std::reverse(newest.begin(), newest.end());
   return newest;
 }

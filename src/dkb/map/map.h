@@ -34,7 +34,6 @@ struct MapPoint {
   Descriptor descriptor{};
   Rgb colour;
   int found = 1, visible = 1;             // frames that matched it, frames that should have
-  KeyframeId born_at = kNoKeyframe;       // newest keyframe when the point was made
   std::vector<Observation> observations;  // by increasing keyframe id
 };
 
@@ -118,6 +117,7 @@ class Map {
   KeyframeId root(KeyframeId id) const;  // must exist
   // Of all keyframes ever made: whoever asks for many walks no path twice.
   std::vector<KeyframeId> root_of_each() const;
+  std::vector<int> map_of_each() const;                            // likewise: the number of the map that it is in
   const std::vector<KeyframeId>& roots() const { return roots_; }  // of the maps that are not joined, increasing
   // The live keyframes of each map that is not joined, by its number and then increasing; one empty list of no map.
   std::vector<std::vector<KeyframeId>> keyframes_by_map() const;

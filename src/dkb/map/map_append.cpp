@@ -39,7 +39,6 @@ void Map::append(const Map& other) {
   for (PointId id : other.live_points()) {
     points.push_back(*other.point(id));
     points.back().id = renamed(id);
-    if (points.back().born_at != kNoKeyframe) points.back().born_at += shift;
   }
   for (const RemovedPoint& r : other.removed_points()) removed.push_back({renamed(r.id), renamed(r.replaced_by)});
   std::vector<PlaneId> joined_to = joined_to_;

@@ -23,8 +23,8 @@
 //         birth features u16 of those that see one (minus the own index where the age is 0), low and high bytes packed
 //   POIN  live: count varint; per point id varint minus the one before, position 3 x f64;
 //         packed: normal x, y, z, reference distance and scale floats; colour as above;
-//         length u64 and packed: per point found zigzag, visible zigzag, born_at - birth zigzag, number of the first
-//         observation with the same descriptor counted from 1, 0 = none: then the descriptor follows: 4 x u64
+//         length u64 and packed: per point found zigzag, visible zigzag, 0 (older programs: another number), number of
+//         the first observation with the same descriptor counted from 1, 0 = none: then the descriptor follows: 4 x u64
 //         fused: count varint; per point id varint minus the one before, survivor - id zigzag
 //   MOTN  count varint, then per keyframe with a motion: id varint minus the one before (-1 before the first), id minus
 //         that of the keyframe that it is since varint, rotation only u8, previous_from_current 7 x f64, covariance

@@ -86,8 +86,6 @@ Map Map::restore(std::vector<Keyframe> keyframes, std::vector<MapPoint> points, 
   for (size_t i = 0; i < points.size(); ++i) {
     MapPoint& p = points[i];
     check_id(p.id, i > 0 ? points[i - 1].id : 0, i == 0);
-    if (p.born_at < kNoKeyframe || p.born_at >= count)
-      contradiction(point_name(p.id) + " was made at a keyframe that is not there");
     p.observations.clear();
     const PointId id = p.id;
     map.add_live(std::move(p));

@@ -93,7 +93,6 @@ TEST(MapRestore, RefusesPartsThatContradictOneAnother) {
   EXPECT_EQ(message([](Parts& p) { std::swap(p.points[0], p.points[1]); }), "point 0 is out of order");
   EXPECT_EQ(message([](Parts& p) { p.points[0].id = make_point_id(7, 0); }),
             "point 57344 was born at a keyframe that is not there");  // 7 * 8192
-  EXPECT_EQ(message([](Parts& p) { p.points[0].born_at = 3; }), "point 0 was made at a keyframe that is not there");
   EXPECT_EQ(message([](Parts& p) { p.removed[0].id = 0; }), "point 0 is both there and removed");
   EXPECT_EQ(message([](Parts& p) { p.removed[0].replaced_by = 5; }),
             "point 3 was replaced by point 5, which never was");

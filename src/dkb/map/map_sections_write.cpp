@@ -176,7 +176,7 @@ std::string point_section(const Map& map) {
     colour.add(p.colour);
     numbers.zigzag(p.found);
     numbers.zigzag(p.visible);
-    numbers.zigzag(static_cast<int64_t>(p.born_at) - birth_keyframe(id));
+    numbers.zigzag(0);
     const uint64_t source = descriptor_source(map, p);
     numbers.varint(source);
     if (source == 0) write_descriptor(numbers, p.descriptor);

@@ -443,6 +443,7 @@ TEST(Map, TheNewestBesideAKeyframeAreOfItsOwnMap) {
   m.map.add_keyframe(apart);
   EXPECT_EQ(m.map.newest_beside(0, 2), (std::vector<KeyframeId>{1, 2}));
   EXPECT_EQ(m.map.newest_beside(3, 2), std::vector<KeyframeId>{3});
+  EXPECT_EQ(m.map.map_of_each(), (std::vector<int>{0, 0, 0, 1}));
   EXPECT_TRUE(m.map.newest_beside(kNoKeyframe, 2).empty());
   EXPECT_TRUE(m.map.newest_beside(4, 2).empty());
 }

@@ -265,7 +265,6 @@ KeyframeId add_random_keyframe(Map& map, Random& random, int features, int seen,
     p.colour = map.keyframe(id)->features->keypoints[f].colour;
     p.found = static_cast<int>(random.below(300));
     p.visible = p.found + static_cast<int>(random.below(20));
-    p.born_at = id;
     map.add_point(std::move(p));
     map.observe(point, id, feature);
   }
@@ -393,7 +392,6 @@ std::string fingerprint(const Map& map) {
     write(out, p.colour);
     out.i32(p.found);
     out.i32(p.visible);
-    out.i32(p.born_at);
     for (const Observation& o : p.observations) {
       out.i32(o.keyframe);
       out.i32(o.feature);

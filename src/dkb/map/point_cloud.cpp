@@ -18,11 +18,11 @@ void write_position(ByteWriter& out, const Eigen::Vector3d& position) {
 }  // namespace
 
 std::vector<std::vector<PointId>> points_by_map(const Map& map) {
-  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
-  std::vector<std::vector<PointId>> points(std::max<size_t>(1, roots.size()));
+  const std::vector<int> map_of = map.map_of_each();
+  std::vector<std::vector<PointId>> points(std::max<size_t>(1, map.roots().size()));
   for (PointId id : map.live_points()) {
     const auto seen_by = static_cast<size_t>(map.point(id)->observations.front().keyframe);
-    points[static_cast<size_t>(map_number(roots, root_of[seen_by]))].push_back(id);
+    points[static_cast<size_t>(map_of[seen_by])].push_back(id);
   }
   return points;
 }
@@ -76,8 +76,8 @@ std::string point_cloud_pcd(const Map& map, const std::vector<PointId>& points) 
 }
 
 std::string point_cloud_json(const Map& map) {
-  const std::vector<KeyframeId> roots = map.roots(), root_of = map.root_of_each();
-  const auto number = [&](KeyframeId id) { return map_number(roots, root_of[static_cast<size_t>(id)]); };
+  const std::vector<int> map_of = map.map_of_each();
+  const auto number = [&](KeyframeId id) { return map_of[static_cast<size_t>(id)]; };
   std::string json = "{\"points\": [";
   const char* separator = "\n";
   for (PointId id : map.live_points()) {

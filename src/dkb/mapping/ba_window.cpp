@@ -36,7 +36,6 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
     for (const Observation& o : map.point(p)->observations) observed += camera_of[static_cast<size_t>(o.keyframe)] >= 0;
   problem.points.reserve(window.points.size());
   problem.observations.reserve(observed);
-  window.sources.reserve(observed);
   for (size_t p = 0; p < window.points.size(); ++p) {
     const MapPoint& point = *map.point(window.points[p]);
     problem.points.push_back(point.position);
@@ -53,7 +52,6 @@ BaWindow make_ba_window(const Map& map, std::vector<KeyframeId> keyframes, std::
       observation.depth = k.depth;
       if (k.depth > 0) observation.inv_depth_sigma = 1.0 / optics.noise.depth_sigma(k.depth);
       problem.observations.push_back(observation);
-      window.sources.push_back({o.keyframe, static_cast<int>(p)});
     }
   }
   return window;

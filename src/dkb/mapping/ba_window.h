@@ -13,15 +13,13 @@ namespace dkb {
 
 // A part of a map as bundle adjustment wants it, and the names of what stands where in it.
 struct BaWindow {
-  struct Source {
-    KeyframeId keyframe = kNoKeyframe;
-    int point = 0;  // index into `points`
-  };
   BaProblem problem;
   std::vector<KeyframeId> keyframes;  // per camera of the problem, before the poses of planes
   std::vector<PointId> points;        // per point
-  std::vector<Source> sources;        // per observation
 
+  // What observation `o` of the problem is of.
+  PointId point_of(size_t o) const { return points[static_cast<size_t>(problem.observations[o].point)]; }
+  KeyframeId keyframe_of(size_t o) const { return keyframes[static_cast<size_t>(problem.observations[o].camera)]; }
   int camera_of(KeyframeId keyframe) const {  // must be in it
     return static_cast<int>(std::find(keyframes.begin(), keyframes.end(), keyframe) - keyframes.begin());
   }

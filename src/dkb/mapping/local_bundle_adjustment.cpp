@@ -83,9 +83,8 @@ std::vector<PointId> local_bundle_adjustment(Map& map, KeyframeId newest, const 
     map.set_covariance(newest, *result.covariance + carried(problem.cam_from_world[static_cast<size_t>(problem.asked)],
                                                             common_error(map, window, result)));
   for (size_t p = 0; p < window.points.size(); ++p) map.edit_point(window.points[p]).position = problem.points[p];
-  for (size_t o = 0; o < window.sources.size(); ++o)
-    if (result.outlier[o])
-      map.forget(window.points[static_cast<size_t>(window.sources[o].point)], window.sources[o].keyframe);
+  for (size_t o = 0; o < problem.observations.size(); ++o)
+    if (result.outlier[o]) map.forget(window.point_of(o), window.keyframe_of(o));
   return std::move(window.points);
 }
 

@@ -144,7 +144,6 @@ TEST_F(LocalBa, AMotionHoldsAKeyframeThatSharesNoPointWithTheRest) {
       p.id = make_point_id(4, f);
       const Keypoint& seen = view.features->keypoints[static_cast<size_t>(f)];
       p.position = world_from_cam * scene.camera.unproject(seen.pixel.cast<double>(), seen.depth);
-      p.born_at = 4;
       map.add_point(std::move(p));
       map.observe(make_point_id(4, f), 4, f);
     }

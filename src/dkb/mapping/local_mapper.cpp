@@ -51,7 +51,7 @@ size_t central_descriptor(std::span<const Descriptor> descriptors) {
 LocalMapper::LocalMapper(const Optics& optics, const MappingOptions& options, Map map)
     : optics_(optics), options_(options), planes_(optics.camera, optics.noise), map_(std::move(map)) {
   for (PointId id : map_.live_points())
-    if (map_.keyframe_count() - 1 - map_.point(id)->born_at < kProbationKeyframes) young_.push_back(id);
+    if (map_.keyframe_count() - 1 - birth_keyframe(id) < kProbationKeyframes) young_.push_back(id);
 }
 
 MapView LocalMapper::process(const KeyframePacket& packet) {
@@ -150,10 +150,10 @@ void LocalMapper::insert(const KeyframePacket& packet) {
     MapPoint p;
     p.id = n.id;
     p.position = world_from_cam * n.point_in_keyframe;
-    p.born_at = packet.id;
-    p.colour = packet.features->keypoints[static_cast<size_t>(n.feature)].colour;
+    const int feature = birth_feature(n.id);
+    p.colour = packet.features->keypoints[static_cast<size_t>(feature)].colour;
     map_.add_point(std::move(p));
-    map_.observe(n.id, packet.id, n.feature);
+    map_.observe(n.id, packet.id, feature);
     born.push_back(n.id);
   }
   report_.points_created += static_cast<int>(born.size());
@@ -172,7 +172,7 @@ void LocalMapper::cull_points(KeyframeId newest) {
   for (PointId id : young_) {
     const MapPoint* p = map_.point(id);
     if (p == nullptr) continue;
-    const int age = newest - p->born_at;
+    const int age = newest - birth_keyframe(id);
     const bool rarely_found = p->found < kMinFoundRatio * p->visible;
     const bool rarely_seen = age >= kProbationKeyframes && static_cast<int>(p->observations.size()) < kMinObservers;
     if (rarely_found || rarely_seen) {

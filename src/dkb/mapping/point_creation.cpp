@@ -121,7 +121,6 @@ std::vector<PointId> triangulate_new_points(Map& map, KeyframeId newest, const O
       MapPoint p;
       p.id = make_point_id(newest, f.feature_a);
       p.position = f.point;
-      p.born_at = newest;
       p.colour = map.keyframe(newest)->features->keypoints[static_cast<size_t>(f.feature_a)].colour;
       const PointId id = p.id;
       map.add_point(std::move(p));

@@ -72,7 +72,6 @@ TEST_F(PointCreation, TriangulatesWhatBothKeyframesSee) {
     }
     const MapPoint& p = *map.point(made[i]);
     EXPECT_EQ(birth_keyframe(made[i]), 1);
-    EXPECT_EQ(p.born_at, 1);
     ASSERT_EQ(p.observations.size(), 2U);
     const int a = fresh_shows[0][static_cast<size_t>(p.observations[0].feature)];
     const int b = fresh_shows[1][static_cast<size_t>(p.observations[1].feature)];

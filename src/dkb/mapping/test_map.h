@@ -42,7 +42,6 @@ struct SceneMap {
           MapPoint p;
           p.id = point = make_point_id(id, static_cast<int>(f));
           p.position = where(shows);
-          p.born_at = id;
           map.add_point(std::move(p));
         }
         map.observe(point, id, static_cast<int>(f));
@@ -80,8 +79,6 @@ struct PacketSource {
       if (!(k.depth > 0)) continue;
       ProvisionalPoint n;
       n.id = make_point_id(p.id, static_cast<int>(f));
-      n.keyframe = p.id;
-      n.feature = static_cast<int>(f);
       n.point_in_keyframe = scene.camera.unproject(k.pixel.cast<double>(), k.depth);
       n.scale = static_cast<float>(std::pow(TestScene::kScaleFactor, k.octave));
       n.descriptor = view.features->descriptors[f];

@@ -38,8 +38,8 @@ struct PlaceFit {
 };
 
 // The pose of a camera that sees `features`, without any idea of where it is: known points, each id once, are matched
-// by descriptor alone, and RANSAC seeks the pose that most matches agree on. Features that may lie on movers take no
-// part. Nothing with fewer than `min_matches` matches or where RANSAC finds no pose. Deterministic for a seed.
+// by descriptor alone, and RANSAC seeks the pose that most matches agree on. Matches of features that may lie on movers
+// are left out. Nothing with fewer than `min_matches` matches or where RANSAC finds no pose. Deterministic for a seed.
 std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, const MatchableFeatures& matchable,
                                            const Optics& optics, int min_matches, const RansacOptions& ransac);
 

@@ -63,7 +63,7 @@ Detections asked(Detector& detector, const Frame& frame, int width, int height, 
   try {
     found = detector.detect(detector_input(frame));
   } catch (const DetectorEnded& e) {
-    warning = failures.ended(as_one_line(e.what()));
+    warning = failures.ended(what_was_thrown());
     if (dynamic_cast<const NeverStarted*>(&e) != nullptr) failures.never_started = std::current_exception();
     return {};
   } catch (...) {

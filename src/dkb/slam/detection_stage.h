@@ -52,7 +52,7 @@ class DetectorFailures {
 class DetectionStage {
  public:
   // The detector must outlive the stage. In a real-time run answers are not waited for, but for the first, and that one
-  // for a few seconds at most; images that the detector is too slow for are left out and counted.
+  // for a few seconds at most; images that the detector is too slow for are left out.
   DetectionStage(Detector& detector, const Camera& camera, const DetectionSchedule& schedule, bool threaded,
                  bool realtime);
 

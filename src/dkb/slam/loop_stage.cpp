@@ -7,7 +7,7 @@
 namespace dkb {
 namespace {
 
-constexpr size_t kMaxLate = 4;                 // searches outstanding in a real-time run
+constexpr size_t kMaxLate = 4;                 // searches that wait in a real-time run
 constexpr size_t kNeighboursOfAKeyframe = 45;  // covisible ones, of those that the latency of an adjustment is told for
 
 // The keyframes of so many neighbours whose adjustment takes as long as this map's, which takes part of a large one.
@@ -64,7 +64,7 @@ void LoopStage::offer(const MapView& view, FrameIndex now, const FrameRate& rate
   for (size_t i = 0; i < due.size(); ++i) {
     if (!options_.loop.enabled || view->live_keyframe(due[i]) == nullptr) continue;
     // The newest ones are searched: what they show is where the camera is.
-    if (may_skip && search_.outstanding() + due.size() - i > kMaxLate) continue;
+    if (may_skip && search_.unfinished() + due.size() - i > kMaxLate) continue;
     search_.push({view, {due[i]}, generation_}, now + rate.frames(options_.loop_latency(keyframes)));
   }
   const bool may_be_overtaken = adjustment_overtaken_ && search_.outstanding() > 0;

@@ -115,6 +115,17 @@ TEST(LoopStage, OfKeyframesThatWaitedTheNewestAreSearched) {
   EXPECT_EQ(stage.take_due(100, true).size(), 1U);
 }
 
+// A search that is done and waits for its due frame keeps nobody busy.
+TEST(LoopStage, SearchesThatAreDoneLeaveTimeForOthers) {
+  test::RoundTrip world;
+  LoopStage stage(world.optics(), prompt(), {}, 1, false);
+  for (const int more : {test::RoundTrip::kRound - 2, 4}) {
+    world.go(more);
+    stage.offer(world.map.snapshot(), 0, FrameRate(30), true);
+  }
+  EXPECT_EQ(stage.take_due(100, true).size(), 1U);
+}
+
 // A loop that is closed while the map is being adjusted makes the adjustment of no use. The next one must not be
 // overtaken as well, however many loops there are.
 TEST(LoopStage, AnAdjustmentIsOvertakenOnce) {

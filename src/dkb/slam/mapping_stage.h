@@ -21,6 +21,8 @@ class MappingStage {
   void push(std::shared_ptr<const MapCorrection> correction, FrameIndex due);
   // The newest view due at `now`, if any. Waits for what is due when `wait`; else takes only what is ready.
   std::optional<MapView> take_due(FrameIndex now, bool wait);
+  // Keyframes and corrections pushed that the mapper has not come to the end of.
+  size_t unfinished() const { return stage_.unfinished(); }
   // Keyframes and corrections pushed whose result was not taken.
   size_t outstanding() const { return stage_.outstanding(); }
   // Corrections among them: those that the view taken last does not hold.

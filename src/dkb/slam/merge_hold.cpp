@@ -74,7 +74,7 @@ std::shared_ptr<const MapCorrection> MergeHold::look(const Map& map, KeyframeId 
   }
   near_ = map.live_ancestor(near_).id;
   auto proposal = relocaliser_.propose_at(map, near_, frame.cam_from_world * here_from_there_, kSearchRadii[0],
-                                          frame.matchable(), [](PointId) { return false; });
+                                          frame.matchable(), {});
   if (!proposal || !proposal->verified) return nullptr;
   near_ = map.observers_of(proposal->fit.points).front().keyframe;
   relocaliser_.look_around(map, appearance, *proposal);

@@ -24,7 +24,7 @@ struct PipelineOptions {
   bool threaded = true;         // mapping on its own thread; false: the same bytes from one thread
   bool realtime = false;        // never wait for mapping; take its results when they are there
   double mapper_latency = 0.1;  // [s] after which mapping becomes visible to tracking, in whole frames, > 0
-  int mapper_queue = 4;         // [keyframes] outstanding at most in a real-time run, >= 1
+  int mapper_queue = 4;         // [keyframes] waiting for mapping at most in a real-time run, >= 1
 };
 
 // What the stages are made from.

@@ -83,7 +83,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
     odometry_.lost();
   }
   result.world_from_odom = odometry_.world_from_odom();
-  record_.add(tracked, result, tracker_.map());
+  record_.add(tracked, result);
   const auto dynamic = std::count_if(scene.rejected.begin(), scene.rejected.end(),
                                      [](FeatureReason reason) { return reason != FeatureReason::none; });
   crowded_share_ =

@@ -350,7 +350,7 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     if (context_.policy) c.positions = tracker_.positions(tracked.points);
     decision = decider_->decide(c, tracker_.map().view());
     record_.add(decision.tests);
-    if (options_.pipeline.realtime && static_cast<int>(mapping_.outstanding()) >= options_.pipeline.mapper_queue) {
+    if (options_.pipeline.realtime && static_cast<int>(mapping_.unfinished()) >= options_.pipeline.mapper_queue) {
       decision.insert = false;
       decision.rule = KeyframeRule::none;
       decision.explanation = "mapping has enough to do; " + decision.explanation;
@@ -398,7 +398,7 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
   if (options_.mapping.ba.planes && !tracked.starts_map) packet.planes = find_planes(scene);
   since_keyframe_ = KeyframeMotion{id, {{}, false, Matrix6d::Zero()}};
   tracked.makes_point.assign(tracked.points.size(), 0);
-  for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(p.feature)] = 1;
+  for (const ProvisionalPoint& p : packet.new_points) tracked.makes_point[static_cast<size_t>(birth_feature(p.id))] = 1;
   recent_keyframes_.push_back({tracked.index, id, tracked.features});
   while (recent_keyframes_.front().frame < tracked.index - 2 * scenes_.memory()) recent_keyframes_.pop_front();
   if (tracked.starts_map)
@@ -417,6 +417,7 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
     dense_->add_keyframe(tracked.index, image, movers);
     record_.add_time("dense_keyframe", watch.ms());
   }
+  record_.set_map(tracker_.map());  // this frame hangs on the new keyframe
 }
 
 }  // namespace dkb

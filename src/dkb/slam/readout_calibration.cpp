@@ -10,17 +10,21 @@ namespace {
 constexpr int kMinMatches = 30;
 // Errors of one point in one frame and in the next go together; MotionNoise has the same figure for poses.
 constexpr double kTogether = 4;
-// [s] largest readout believed in: a frame's time at 30 Hz. Before anything is seen of it each below is as likely.
-constexpr double kMaxReadout = 0.033;
-constexpr double kExpectedReadout = kMaxReadout / 2;
-constexpr double kExpectedVariance = kMaxReadout * kMaxReadout / 12;
+constexpr double kSlowest = 0.033;  // [s] readout: most sensors are read within a frame's time at 30 Hz, at any rate
+
+// [s] largest readout believed in: no sensor takes longer than a frame. Before anything is seen of it each below is as
+// likely.
+double max_readout(const Camera& camera) {
+  return camera.fps > 0 ? std::min(kSlowest, 1 / camera.fps) : kSlowest;
+}
 }  // namespace
 
 ReadoutCalibration::ReadoutCalibration(const Optics& optics, bool estimate)
     : optics_(optics),
       known_(optics.camera.readout > 0 || !estimate),
-      readout_(known_ ? optics.camera.readout : kExpectedReadout),
-      information_(1 / kExpectedVariance) {}
+      max_readout_(max_readout(optics.camera)),
+      readout_(known_ ? optics.camera.readout : max_readout_ / 2),
+      information_(12 / (max_readout_ * max_readout_)) {}
 
 void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity,
                              const std::vector<std::optional<Eigen::Vector3d>>& positions) {
@@ -54,7 +58,7 @@ void ReadoutCalibration::add(const TrackedFrame& frame, const Vector6d& velocity
   const Vector6d explained = solve_symmetric(pose_pose, pose_readout);
   const double gradient = (readout_gradient - explained.dot(pose_gradient)) / kTogether;
   information_ += std::max(0.0, readout_readout - explained.dot(pose_readout)) / kTogether;
-  readout_ = std::clamp(readout_ + gradient / information_, 0.0, kMaxReadout);
+  readout_ = std::clamp(readout_ + gradient / information_, 0.0, max_readout_);
 }
 
 }  // namespace dkb

@@ -31,7 +31,8 @@ class ReadoutCalibration {
  private:
   Optics optics_;
   bool known_;
-  double readout_;
+  double max_readout_;  // [s]
+  double readout_;      // [s]
   double information_;  // [1/s^2] of the readout
 };
 

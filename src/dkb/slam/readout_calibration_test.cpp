@@ -14,10 +14,12 @@ namespace {
 // Frames of a scene under motion that changes, with rows exposed late by `readout`, of which what is known was taken
 // out. `outlines`: every second corner lies beside a depth step and slides with the camera, the lower in the image the
 // more.
-double calibrated(double readout, bool estimate = true, double file = 0, int frames = 60, bool outlines = false) {
+double calibrated(double readout, bool estimate = true, double file = 0, int frames = 60, bool outlines = false,
+                  double fps = 30) {
   const TestScene scene(500);
   Optics optics = scene.optics();
   optics.camera.readout = file;
+  optics.camera.fps = fps;
   ReadoutCalibration calibration(optics, estimate);
   for (int n = 0; n < frames; ++n) {
     Vector6d velocity;
@@ -75,6 +77,12 @@ TEST(ReadoutCalibration, StaysOutWhenItIsNotWanted) {
 TEST(ReadoutCalibration, NeverLeavesWhatIsBelievable) {
   EXPECT_EQ(calibrated(0.06), 0.033);
   EXPECT_EQ(calibrated(-0.01), 0.0);
+}
+
+TEST(ReadoutCalibration, NoSensorIsReadLongerThanAFrame) {
+  EXPECT_DOUBLE_EQ(calibrated(0.02, true, 0, 60, false, 60), 1.0 / 60);
+  EXPECT_DOUBLE_EQ(calibrated(0, true, 0, 0, false, 90), 0.5 / 90);
+  EXPECT_DOUBLE_EQ(calibrated(0, true, 0, 0, false, 10), 0.0165);
 }
 
 }  // namespace

@@ -23,9 +23,8 @@ size_t RunRecord::Records::size() const {
   return size;
 }
 
-void RunRecord::add(const TrackedFrame& frame, const FrameResult& result, const TrackingMap& map) {
+void RunRecord::add(const TrackedFrame& frame, const FrameResult& result) {
   const std::lock_guard lock(mutex_);
-  map_ = map;
   ++counts_.frames;
   for (const FeatureReport& f : result.features) counts_.features_removed += f.state == FeatureState::dynamic;
   counts_.lost += result.state == TrackingState::lost;
@@ -62,19 +61,23 @@ void RunRecord::set_map(const TrackingMap& map) {
 void RunRecord::add_time(const std::string& stage, double ms) {
   const std::lock_guard lock(mutex_);
   times_.add(stage, ms);
-  news_.add(stage, ms);
+  news_[stage] += ms;
 }
 
 void RunRecord::add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times) {
   const std::lock_guard lock(mutex_);
   fill(counts_);
   times_.merge(times);
-  news_.merge(times);
+  for (const StageTime& sum : times.sums()) news_[sum.stage] += sum.ms;
 }
 
 std::vector<StageTime> RunRecord::take_news() {
   const std::lock_guard lock(mutex_);
-  return news_.take().sums();
+  std::vector<StageTime> news;
+  news.reserve(news_.size());
+  for (const auto& [stage, ms] : news_) news.push_back({stage, static_cast<float>(ms)});
+  news_.clear();
+  return news;
 }
 
 MapSnapshot RunRecord::map() const {
@@ -121,7 +124,13 @@ std::vector<TrajectoryFrame> RunRecord::trajectory(TrajectoryKind kind) const {
 
 std::vector<TrajectoryFrame> RunRecord::keyframes() const {
   std::vector<TrajectoryFrame> frames;
-  for (const KeyframeInfo& k : map().keyframes()) frames.push_back({k.frame, k.stamp_ns, k.world_from_cam, k.map});
+  const MapView map = this->map().map();
+  const std::vector<int> map_of = map->map_of_each();
+  for (KeyframeId id : map->live_keyframes()) {
+    const Keyframe& k = *map->keyframe(id);
+    frames.push_back(
+        {k.frame, ns_from_seconds(k.timestamp), k.cam_from_world.inverse(), map_of[static_cast<size_t>(id)]});
+  }
   return frames;
 }
 
@@ -155,24 +164,24 @@ int MapSnapshot::keyframe_count() const {
 }
 
 std::vector<PointInfo> MapSnapshot::points() const {
-  const std::vector<KeyframeId> roots = map_->roots(), root_of = map_->root_of_each();
+  const std::vector<int> map_of = map_->map_of_each();
   std::vector<PointInfo> points;
   points.reserve(map_->point_count());
   for (PointId id : map_->live_points()) {
     const MapPoint& p = *map_->point(id);
-    const int map = map_number(roots, root_of[static_cast<size_t>(p.observations.front().keyframe)]);
+    const int map = map_of[static_cast<size_t>(p.observations.front().keyframe)];
     points.push_back({id, p.position, p.colour, static_cast<int>(p.observations.size()), map});
   }
   return points;
 }
 
 std::vector<KeyframeInfo> MapSnapshot::keyframes() const {
-  const std::vector<KeyframeId> roots = map_->roots();
+  const std::vector<int> map_of = map_->map_of_each();
   std::vector<KeyframeInfo> keyframes;
   for (KeyframeId id : map_->live_keyframes()) {
     const Keyframe& k = *map_->keyframe(id);
-    KeyframeInfo info{id, ns_from_seconds(k.timestamp), k.frame, k.cam_from_world.inverse(), {}, 0};
-    info.map = map_number(roots, map_->root(id));
+    KeyframeInfo info{id, ns_from_seconds(k.timestamp),   k.frame, k.cam_from_world.inverse(),
+                      {}, map_of[static_cast<size_t>(id)]};
     for (const Covisible& c : k.covisible) info.covisible.push_back({c.keyframe, c.shared_points});
     keyframes.push_back(std::move(info));
   }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "dkb/keyframes/keyframe_policy.h"
@@ -21,12 +23,11 @@ enum class TrajectoryKind { online, by_map, smoothed };
 // What a run has brought so far. The pipeline writes on its thread; any thread reads.
 class RunRecord {
  public:
-  // A frame, and the map by which it has its pose.
-  void add(const TrackedFrame& frame, const FrameResult& result, const TrackingMap& map);
+  void add(const TrackedFrame& frame, const FrameResult& result);
   void add(const KeyframeTests& tests);
   void add(KeyframeRule rule);  // that made a keyframe
   void add(const LoopInfo& loop);
-  void set_map(const TrackingMap& map);
+  void set_map(const TrackingMap& map);  // by which frames have their poses from now on
   void add_time(const std::string& stage, double ms);
   // What the stages beside tracking have counted by now, and the durations since they were asked last.
   void add_stages(const std::function<void(Statistics&)>& fill, const StageTimes& times);
@@ -69,7 +70,8 @@ class RunRecord {
   TrackingMap map_;
   Statistics counts_;
   KeyframeTestCounts tests_;
-  StageTimes times_, news_;
+  StageTimes times_;
+  std::map<std::string, double> news_;  // [ms] by stage
 };
 
 }  // namespace dkb

@@ -70,6 +70,11 @@ class Slam::Impl {
   void throw_failure() const {
     if (failure) std::rethrow_exception(failure);
   }
+  std::function<DenseMap()> dense_map_task(std::optional<int> map) {
+    const Turn turn(*this);
+    throw_failure();
+    return pipeline->dense_map_task(map);
+  }
 
   // What `work` throws ends this world: every call throws it until a new one is begun.
   template <class Work>
@@ -242,18 +247,10 @@ DenseMap Slam::dense_map() const {
   return dense_map_task()();
 }
 DenseMap Slam::dense_map(int map) const {
-  std::function<DenseMap()> make;
-  {
-    const Impl::Turn turn(*impl_);
-    impl_->throw_failure();
-    make = impl_->pipeline->dense_map_task(map);
-  }
-  return make();
+  return impl_->dense_map_task(map)();
 }
 std::function<DenseMap()> Slam::dense_map_task() const {
-  const Impl::Turn turn(*impl_);
-  impl_->throw_failure();
-  return impl_->pipeline->dense_map_task();
+  return impl_->dense_map_task({});
 }
 
 std::vector<Event> Slam::take_events() {

@@ -116,12 +116,6 @@ GeometricWeights classify_points(std::span<const Eigen::Vector3d> centres_in_wor
       !std::is_sorted(first.begin(), first.end())) {
     throw InputError("geometric weights: `first` must rise from 0 to the number of observers");
   }
-  for (const int c : observers) {
-    if (c < 0 || c >= static_cast<int>(centres_in_world.size())) {
-      throw InputError("geometric weights: observer " + std::to_string(c) + " has no centre; there are " +
-                       std::to_string(centres_in_world.size()));
-    }
-  }
   const size_t points = first.size() - 1;
   GeometricWeights weights;
   weights.edge_weight = options.edge_weight;

@@ -43,24 +43,23 @@ void PoseEdges::find_blocks(const BlockPattern& pattern) {
   }
 }
 
+double PoseEdges::squared_error(size_t k, const std::vector<Rigid3>& poses) const {
+  const PoseEdge& e = edges_[k];
+  const Vector6d error =
+      relative_pose_error(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
+  return error.dot(e.information * error);
+}
+
 void PoseEdges::judge(const std::vector<Rigid3>& poses) {
-  for (size_t k = 0; k < edges_.size(); ++k) {
-    const PoseEdge& e = edges_[k];
-    const Vector6d error =
-        relative_pose_error(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
-    placed_[k].outlier = !(error.dot(e.information * error) <= e.huber_chi2);
-  }
+  for (size_t k = 0; k < edges_.size(); ++k) placed_[k].outlier = !(squared_error(k, poses) <= edges_[k].huber_chi2);
 }
 
 double PoseEdges::cost(const std::vector<Rigid3>& poses) const {
   double total = 0;
   for (size_t k = 0; k < edges_.size(); ++k) {
     if (placed_[k].outlier) continue;
-    const PoseEdge& e = edges_[k];
-    const Vector6d error =
-        relative_pose_error(poses[static_cast<size_t>(e.a)], poses[static_cast<size_t>(e.b)], e.b_from_a);
-    const double s = error.dot(e.information * error);
-    total += s > e.huber_chi2 ? 2 * std::sqrt(e.huber_chi2 * s) - e.huber_chi2 : s;
+    const double s = squared_error(k, poses), corner = edges_[k].huber_chi2;
+    total += s > corner ? 2 * std::sqrt(corner * s) - corner : s;
   }
   return total;
 }

@@ -48,6 +48,7 @@ class PoseEdges {
   Matrix6d propagated(const std::vector<Rigid3>& cam_from_world, const PoseColumns& columns) const;
 
  private:
+  double squared_error(size_t k, const std::vector<Rigid3>& cam_from_world) const;
   struct Placed {
     int free_a, free_b;                       // -1 = fixed
     int block_a = -1, block_b = -1, ab = -1;  // entries of the pattern

@@ -30,7 +30,6 @@ void add_keyframe(Map& map, const std::vector<PointId>& sees) {
 PointId add_point(Map& map, KeyframeId keyframe, int feature) {
   MapPoint p;
   p.id = make_point_id(keyframe, feature);
-  p.born_at = keyframe;
   p.position = {0.1 * feature, 1.0 * keyframe, 2};
   map.add_point(p);
   map.observe(p.id, keyframe, feature);

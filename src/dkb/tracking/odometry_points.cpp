@@ -76,7 +76,7 @@ float OdometryPoints::depth_around(const TrackedFrame& frame, const Keypoint& ke
     sum += 1.0f / k.depth;
     ++count;
   });
-  return count > 0 ? static_cast<float>(count) / sum : static_cast<float>(reach_);
+  return count > 0 ? static_cast<float>(count) / sum : reach_;
 }
 
 void OdometryPoints::remember(const TrackedFrame& frame) {

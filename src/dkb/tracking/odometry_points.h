@@ -20,7 +20,7 @@ namespace dkb {
 class OdometryPoints {
  public:
   // `reach` [m]: points whose depth is farther are not followed.
-  OdometryPoints(const Optics& optics, double reach) : optics_(optics), reach_(reach) {}
+  OdometryPoints(const Optics& optics, double reach) : optics_(optics), reach_(static_cast<float>(reach)) {}
 
   // The points as matching wants them, in the world that `frame`, the one last remembered, lives in now. Candidate ids
   // are kNoPoint.
@@ -56,7 +56,7 @@ class OdometryPoints {
   float depth_around(const TrackedFrame& frame, const Keypoint& keypoint) const;
 
   Optics optics_;
-  double reach_;
+  float reach_;
   std::vector<Point> points_;  // by feature
 };
 

@@ -53,6 +53,13 @@ TEST(OdometryPoints, WithoutDepthTheyTakeTheHarmonicMeanAround) {
   EXPECT_NEAR(candidates[4].position.z(), 4.0, 1e-6);  // no depth is near
 }
 
+TEST(OdometryPoints, AtTheReachOfDepthNothingIsTooFar) {
+  OdometryPoints points({}, 5.3);  // as a float it is a little more
+  const TrackedFrame frame = frame_of({{100, 80, 0}});
+  points.remember(frame);
+  EXPECT_EQ(points.candidates(frame).size(), 1u);
+}
+
 TEST(OdometryPoints, ASurfaceBesideLendsItsDepthBeforeTheSurroundingsDo) {
   OdometryPoints points({}, 4.0);
   TrackedFrame frame = frame_of({{100, 80, 0}, {110, 80, 3}});

@@ -24,14 +24,18 @@ bool same_place(const Rigid3& a, const Rigid3& b) {
          vector_from_rotation((a * b.inverse()).rotation).norm() < 0.1;
 }
 
+void leave_out(std::span<const PointId> ignored, std::vector<Candidate>& points) {
+  std::erase_if(points, [&](const Candidate& c) { return std::binary_search(ignored.begin(), ignored.end(), c.id); });
+}
+
 }  // namespace
 
 Relocaliser::Relocaliser(const Optics& optics, uint64_t seed) : optics_(optics), seed_(seed) {}
 
 std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFeatures& features,
-                                              const IgnoresPoint& ignores, PointAppearance* appearance,
+                                              std::span<const PointId> ignored, PointAppearance* appearance,
                                               PlaceEvidence& evidence) const {
-  std::vector<PoseProposal> proposals = propose(map, features, ignores, appearance);
+  std::vector<PoseProposal> proposals = propose(map, features, ignored, appearance);
   if (proposals.empty()) {  // after a view of nothing known the camera may be elsewhere
     evidence.clear();
     return std::nullopt;
@@ -56,7 +60,7 @@ std::optional<PoseProposal> Relocaliser::find(const Map& map, const MatchableFea
 }
 
 std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFeatures& features,
-                                               const IgnoresPoint& ignores, PointAppearance* appearance) const {
+                                               std::span<const PointId> ignored, PointAppearance* appearance) const {
   std::vector<Descriptor> still;
   for (size_t f = 0; f < features.features.size(); ++f)
     if (!features.on_mover(f)) still.push_back(features.features.descriptors[f]);
@@ -73,7 +77,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
       return shared >= kMinPlaceMatches;
     });
     if (explained) continue;
-    if (auto proposal = propose_from(map, like.id, features, ignores)) {
+    if (auto proposal = propose_from(map, like.id, features, ignored)) {
       look_around(map, appearance, *proposal);
       proposals.push_back(std::move(*proposal));
     }
@@ -83,7 +87,7 @@ std::vector<PoseProposal> Relocaliser::propose(const Map& map, const MatchableFe
 
 std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId keyframe,
                                                       const MatchableFeatures& features,
-                                                      const IgnoresPoint& ignores) const {
+                                                      std::span<const PointId> ignored) const {
   std::vector<Candidate> known = area_around(map, keyframe, 1 + kNeighbours).points;
   // What this keyframe shows is known by how it looks there.
   const Keyframe& seen_there = *map.keyframe(keyframe);
@@ -93,31 +97,31 @@ std::optional<PoseProposal> Relocaliser::propose_from(const Map& map, KeyframeId
       return c.id < id;
     })->descriptor = seen_there.features->descriptors[f];
   }
-  std::erase_if(known, [&](const Candidate& k) { return ignores(k.id); });
+  leave_out(ignored, known);
   const auto coarse =
       fit_by_descriptors(known, features, optics_, kMinPlaceMatches, {.seed = seed_ + static_cast<uint64_t>(keyframe)});
   if (!coarse) return std::nullopt;
-  return fit_around(map, coarse->points, features, ignores, coarse->cam_from_world, kSearchRadii);
+  return fit_around(map, coarse->points, features, ignored, coarse->cam_from_world, kSearchRadii);
 }
 
 std::optional<PoseProposal> Relocaliser::propose_at(const Map& map, KeyframeId keyframe,
                                                     const Rigid3& expected_cam_from_world, double radius,
                                                     const MatchableFeatures& features,
-                                                    const IgnoresPoint& ignores) const {
+                                                    std::span<const PointId> ignored) const {
   std::vector<float> radii = {static_cast<float>(radius)};
   for (const float r : kSearchRadii)
     if (r <= radius) radii.push_back(r);
-  return fit_around(map, map.keyframe(keyframe)->points, features, ignores, expected_cam_from_world, radii);
+  return fit_around(map, map.keyframe(keyframe)->points, features, ignored, expected_cam_from_world, radii);
 }
 
 // In the map around these points.
 std::optional<PoseProposal> Relocaliser::fit_around(const Map& map, const std::vector<PointId>& points,
-                                                    const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                                    const MatchableFeatures& features, std::span<const PointId> ignored,
                                                     const Rigid3& expected_cam_from_world,
                                                     std::span<const float> radii) const {
   PoseProposal proposal;
   proposal.around = local_map_candidates(points, map);
-  std::erase_if(proposal.around, [&](const Candidate& c) { return ignores(c.id); });
+  leave_out(ignored, proposal.around);
   auto fit = fit_by_projection(proposal.around, features, optics_, expected_cam_from_world, radii);
   if (!fit) return std::nullopt;
   proposal.fit = std::move(*fit);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "dkb/features/image_appearance.h"
@@ -33,33 +33,31 @@ class Relocaliser {
  public:
   Relocaliser(const Optics& optics, uint64_t seed);
 
-  // True for points that must not be matched.
-  using IgnoresPoint = std::function<bool(PointId)>;
-
+  // Points of `ignored`, increasing, are not matched.
   // `appearance` may be null: then only what features tell is known of how a place looks.
   // The verified pose of the best odds; nothing when there is none. What the frame shows goes into `evidence`, what
   // earlier ones showed counts.
-  std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+  std::optional<PoseProposal> find(const Map& map, const MatchableFeatures& features, std::span<const PointId> ignored,
                                    PointAppearance* appearance, PlaceEvidence& evidence) const;
   // The pose that this one keyframe leads to, verified or not.
   std::optional<PoseProposal> propose_from(const Map& map, KeyframeId keyframe, const MatchableFeatures& features,
-                                           const IgnoresPoint& ignores) const;
+                                           std::span<const PointId> ignored) const;
 
   // The pose near an expected one, among what this keyframe and those around it see, verified or not: points are sought
   // within `radius` [px] of where they are expected.
   std::optional<PoseProposal> propose_at(const Map& map, KeyframeId keyframe, const Rigid3& expected_cam_from_world,
                                          double radius, const MatchableFeatures& features,
-                                         const IgnoresPoint& ignores) const;
+                                         std::span<const PointId> ignored) const;
 
   // How the map looks from a proposed pose.
   void look_around(const Map& map, PointAppearance* appearance, PoseProposal& proposal) const;
 
  private:
   // All poses that look-alike keyframes led to, the most alike keyframe first, verified or not.
-  std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, const IgnoresPoint& ignores,
+  std::vector<PoseProposal> propose(const Map& map, const MatchableFeatures& features, std::span<const PointId> ignored,
                                     PointAppearance* appearance) const;
   std::optional<PoseProposal> fit_around(const Map& map, const std::vector<PointId>& points,
-                                         const MatchableFeatures& features, const IgnoresPoint& ignores,
+                                         const MatchableFeatures& features, std::span<const PointId> ignored,
                                          const Rigid3& expected_cam_from_world, std::span<const float> radii) const;
 
   Optics optics_;

@@ -12,10 +12,6 @@
 namespace dkb {
 namespace {
 
-bool ignores_none(PointId) {
-  return false;
-}
-
 // Says the same of every place.
 class FixedAppearance final : public PointAppearance {
  public:
@@ -31,7 +27,7 @@ class RelocaliserTest : public ::testing::Test {
   Relocaliser relocaliser() const { return {{camera, {}, TestScene::kScaleFactor, TestScene::kLevels}, 1}; }
   std::optional<PoseProposal> find(const MatchableFeatures& features, PointAppearance* appearance = nullptr) const {
     PlaceEvidence evidence;
-    return relocaliser().find(map, features, ignores_none, appearance, evidence);
+    return relocaliser().find(map, features, {}, appearance, evidence);
   }
   // Keyframes in a row that see the scene from its own origin, set down at `scene_from_world` in the map's world.
   void map_scene(const TestScene& scene, const Rigid3& scene_from_world = {}) {

@@ -32,14 +32,12 @@ Tracker::Tracker(const Optics& optics, const TrackingOptions& options, uint64_t 
       options_(options),
       seed_(seed),
       relocaliser_(optics, seed),
-      odometry_(optics, options.close_depth) {
-  optics_.noise.check();
-}
+      odometry_(optics, options.close_depth) {}
 
 Rigid3 Tracker::take_view(MapView view) {
   map_.take_view(std::move(view));
   candidates_made_.reset();
-  std::erase_if(provisional_, [&](const auto& p) { return map_.view().keyframe(p.second.keyframe) != nullptr; });
+  std::erase_if(provisional_, [&](const auto& p) { return map_.view().keyframe(birth_keyframe(p.first)) != nullptr; });
   std::erase_if(retracted_, [&](PointId id) {
     return map_.view().keyframe(birth_keyframe(id)) != nullptr && map_.view().point(id) == nullptr;
   });
@@ -71,7 +69,7 @@ std::optional<Eigen::Vector3d> Tracker::position(PointId id) const {
   if (const MapPoint* p = map_.view().point(id)) return p->position;
   const auto it = provisional_.find(id);
   if (it == provisional_.end()) return std::nullopt;
-  return map_.world_from_pending(it->second.keyframe) * it->second.point_in_keyframe;
+  return map_.world_from_pending(birth_keyframe(id)) * it->second.point_in_keyframe;
 }
 
 std::vector<std::optional<Eigen::Vector3d>> Tracker::positions(const std::vector<PointId>& points) const {
@@ -85,7 +83,7 @@ int Tracker::reference_point_count(KeyframeId reference) const {
   const Keyframe* k = map_.view().live_keyframe(reference);
   int count = 0;
   if (k == nullptr) {
-    for (const auto& [id, p] : provisional_) count += p.keyframe == reference;
+    for (const auto& [id, p] : provisional_) count += birth_keyframe(id) == reference;
     return count;
   }
   const size_t observers = k->covisible.size() < 2 ? 1 : 2;  // where a map begins, little is seen twice yet
@@ -167,7 +165,7 @@ void Tracker::refresh_candidates(const std::vector<PointId>& points, double now)
   for (const auto& [id, p] : provisional_) {
     Candidate& c = candidates_.emplace_back();
     c.id = id;
-    c.position = map_.world_from_pending(p.keyframe) * p.point_in_keyframe;
+    c.position = map_.world_from_pending(birth_keyframe(id)) * p.point_in_keyframe;
     c.normal.setZero();
     c.reference_distance = static_cast<float>(p.point_in_keyframe.norm());
     c.reference_scale = p.scale;
@@ -314,7 +312,7 @@ void Tracker::finish(TrackedFrame& frame) {
     if (p == kNoPoint) continue;
     const auto it = provisional_.find(p);
     if (it != provisional_.end())
-      ++pending_votes[it->second.keyframe];
+      ++pending_votes[birth_keyframe(p)];
     else
       ++lasting;
   }
@@ -386,8 +384,7 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
   std::optional<PoseProposal> found;
   if (expected != nullptr) found = find_near(*expected, frame.matchable());
   if (!found) {
-    found = relocaliser_.find(
-        map_.view(), frame.matchable(), [this](PointId id) { return is_retracted(id); }, appearance, place_evidence_);
+    found = relocaliser_.find(map_.view(), frame.matchable(), retracted_, appearance, place_evidence_);
     if (!found) return false;
     frame.ambiguous = found->ambiguous || found->log_odds < 0;
     if (frame.ambiguous) return false;

@@ -236,7 +236,7 @@ TEST_F(TrackerTest, AllCloseDepthsMakePoints) {
   const KeyframePacket close = start();
   EXPECT_EQ(close.new_points.size(), view.shows.size());
   for (const ProvisionalPoint& p : close.new_points) {
-    EXPECT_EQ(p.id, make_point_id(0, p.feature));
+    EXPECT_EQ(birth_keyframe(p.id), 0);
     EXPECT_LT((p.point_in_keyframe - scene.points[static_cast<size_t>(scene_point(p.id))]).norm(), 1e-4);
   }
 }

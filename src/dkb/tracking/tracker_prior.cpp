@@ -135,8 +135,9 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   // Worlds of maps that are not joined have nothing to do with each other.
   const bool one_map = !last_ || map_.view().roots().size() < 2;
   const KeyframeId root = one_map ? kNoKeyframe : map_.root(last_->reference);
+  const std::vector<KeyframeId> root_of = one_map ? std::vector<KeyframeId>() : map_.view().root_of_each();
   for (KeyframeId id : map_.view().live_keyframes()) {
-    if (!one_map && map_.view().root(id) != root) continue;
+    if (!one_map && root_of[static_cast<size_t>(id)] != root) continue;
     const Rigid3& k = map_.view().keyframe(id)->cam_from_world;
     const double distance = (centre_in_world(k) - centre).norm();
     const Eigen::Vector3d axis = (expected.cam_from_world.rotation * k.rotation.conjugate()) * Eigen::Vector3d::UnitZ();
@@ -146,18 +147,17 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   }
   std::sort(nearby.begin(), nearby.end());
   if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
-  const auto ignores = [this](PointId point) { return is_retracted(point); };
   const auto right = [&](const std::optional<PoseProposal>& found) {
     return found && found->verified && expected.agrees(found->fit.cam_from_world);
   };
   if (nearby.empty()) return std::nullopt;
   for (const double radius : widening_radii(expected.covariance)) {
-    auto found =
-        relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world, radius, features, ignores);
+    auto found = relocaliser_.propose_at(map_.view(), nearby.front().second, expected.cam_from_world, radius, features,
+                                         retracted_);
     if (right(found)) return found;
   }
   for (const auto& [off, id] : nearby) {
-    auto found = relocaliser_.propose_from(map_.view(), id, features, ignores);
+    auto found = relocaliser_.propose_from(map_.view(), id, features, retracted_);
     if (right(found)) return found;
   }
   return std::nullopt;

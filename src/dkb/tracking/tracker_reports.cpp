@@ -46,13 +46,10 @@ std::vector<PointInView> Tracker::points_in_view() const {
     if (p.z() < 0.1) return;
     if (const auto at = pixel_in_view(optics_.camera, p)) in_view.push_back({id, *at, p.z()});
   };
-  auto retracted = retracted_.begin();
-  for (size_t i = 0; i < from_view_; ++i) {
-    const Candidate& c = candidates_[i];
-    while (retracted != retracted_.end() && *retracted < c.id) ++retracted;
-    if (retracted == retracted_.end() || *retracted != c.id) offer(c.id, c.position);
-  }
-  for (const auto& [id, p] : provisional_) offer(id, map_.world_from_pending(p.keyframe) * p.point_in_keyframe);
+  const std::vector<uint8_t> skipped = candidates_to_skip({});
+  for (size_t i = 0; i < from_view_; ++i)
+    if (!skipped[i]) offer(candidates_[i].id, candidates_[i].position);
+  for (const auto& [id, p] : provisional_) offer(id, map_.world_from_pending(birth_keyframe(id)) * p.point_in_keyframe);
   return in_view;
 }
 
@@ -77,8 +74,6 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
     const Keypoint& k = frame.features->keypoints[static_cast<size_t>(f)];
     ProvisionalPoint p;
     p.id = make_point_id(id, f);
-    p.keyframe = id;
-    p.feature = f;
     p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), z);
     p.scale = optics_.scale(k.octave);
     p.descriptor = frame.features->descriptors[static_cast<size_t>(f)];
@@ -90,7 +85,7 @@ KeyframePacket Tracker::make_keyframe(KeyframeId id, const TrackedFrame& frame) 
                    bridges ? frame.covariance : Matrix6d(Matrix6d::Zero()));
   for (const ProvisionalPoint& p : packet.new_points) provisional_.emplace(p.id, p);
   if (last_ && last_->index == frame.index) {
-    for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(p.feature)] = p.id;
+    for (const ProvisionalPoint& p : packet.new_points) last_->points[static_cast<size_t>(birth_feature(p.id))] = p.id;
     odometry_.drop_mapped(*last_);
     last_->reference = id;  // from here on the frame hangs on its own keyframe
     last_->cam_from_world = frame.cam_from_world;

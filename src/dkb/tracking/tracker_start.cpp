@@ -62,8 +62,8 @@ void Tracker::remake_start(std::shared_ptr<const RgbdFeatures> features, Tracked
     features = std::make_shared<const RgbdFeatures>(subset(*features, last_->source));
   std::vector<PointId> gone;
   for (auto& [id, p] : provisional_) {
-    if (p.keyframe != last_->reference) continue;
-    const Keypoint& k = features->keypoints[static_cast<size_t>(p.feature)];
+    if (birth_keyframe(id) != last_->reference) continue;
+    const Keypoint& k = features->keypoints[static_cast<size_t>(birth_feature(id))];
     if (k.depth > 0)
       p.point_in_keyframe = optics_.camera.unproject(k.pixel.cast<double>(), k.depth);
     else

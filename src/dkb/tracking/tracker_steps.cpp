@@ -82,8 +82,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   if (!fit) fit = fit_near(last_->cam_from_world, 3 * usual);
   if (!fit && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
-    auto near = relocaliser_.propose_from(map_.view(), last_->reference, features,
-                                          [this](PointId id) { return is_retracted(id); });
+    auto near = relocaliser_.propose_from(map_.view(), last_->reference, features, retracted_);
     if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) fit = std::move(near->fit);
   }
   return fit && track_local_map(fit->cam_from_world, radius_local_map(), options_.min_inliers, fit->points, frame);

@@ -317,7 +317,7 @@ TEST_F(TrackerTest, AMapsFirstFrameIsMadeAnewWithoutTheCornersOfMovers) {
   EXPECT_LT(packet.new_points.size(), points);
   ASSERT_EQ(packet.features->size(), packet.points.size());
   for (const ProvisionalPoint& p : packet.new_points) {
-    const auto f = static_cast<size_t>(p.feature);
+    const auto f = static_cast<size_t>(birth_feature(p.id));
     EXPECT_EQ(packet.features->descriptors[f], p.descriptor);
     EXPECT_GT(packet.features->keypoints[f].depth, 0);
   }

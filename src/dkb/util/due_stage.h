@@ -78,6 +78,11 @@ class DueStage {
     const std::lock_guard lock(mutex_);
     waiting_.clear();
   }
+  // Tasks pushed that are still to be worked at.
+  size_t unfinished() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.size() + (working_due_ ? 1 : 0);
+  }
   // Tasks pushed whose results were not taken.
   size_t outstanding() const {
     const std::lock_guard lock(mutex_);

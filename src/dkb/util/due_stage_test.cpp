@@ -34,6 +34,29 @@ TEST(DueStage, ResultsComeInOrderAtTheirDueTimesAndNotBefore) {
   }
 }
 
+TEST(DueStage, WhatWaitsForItsDueFrameIsNoWorkLeft) {
+  Squares stage(square, {.name = "squares", .threaded = false});
+  stage.push(3, 10);
+  EXPECT_EQ(stage.outstanding(), 1U);
+  EXPECT_EQ(stage.unfinished(), 0U);
+
+  std::promise<void> begun, go_on;
+  DueStage<int, int> busy(
+      [&](const int& x) {
+        if (x == 0) begun.set_value(), go_on.get_future().wait();
+        return x;
+      },
+      {.name = "waiting", .threaded = true});
+  busy.push(0, 10);
+  busy.push(1, 10);
+  begun.get_future().wait();
+  EXPECT_EQ(busy.unfinished(), 2U);
+  go_on.set_value();
+  EXPECT_EQ(busy.take_due(10, true), 0);
+  EXPECT_EQ(busy.take_due(10, true), 1);
+  EXPECT_EQ(busy.unfinished(), 0U);
+}
+
 // What a caller sees of a hundred frames, failures among them.
 std::string log_of(bool threaded) {
   DueStage<int, int> stage(

@@ -3,35 +3,18 @@
 
 #include <exception>
 #include <string>
-#include <string_view>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/one_line.h"
 
 namespace dkb {
-
-// A message of somebody else's as one line, as all of ours are.
-inline std::string as_one_line(std::string_view text) {
-  constexpr std::string_view kBreaks = "\r\n\t\v\f";
-  std::string line;
-  bool broken = false;
-  for (const char c : text) {
-    if (kBreaks.find(c) != std::string_view::npos) {
-      broken = true;
-      continue;
-    }
-    if (broken && !line.empty() && line.back() != ' ' && c != ' ') line += ' ';
-    broken = false;
-    line += c;
-  }
-  return line;
-}
 
 // For catch blocks: what the exception that is being handled says, in one line.
 inline std::string what_was_thrown() {
   try {
     throw;
   } catch (const std::exception& e) {
-    return as_one_line(e.what());
+    return one_line(e.what());
   } catch (...) {
     return "it threw something that is no exception";
   }

@@ -29,7 +29,6 @@ Map world(int keyframes, int points) {
       MapPoint point;
       point.id = make_point_id(k, i);
       point.position = {k + 0.01 * i, 0, 2};
-      point.born_at = k;
       map.add_point(point);
       map.observe(point.id, k, i);
     }
