@@ -110,12 +110,11 @@ bool Session::wants_dense_map() const {
 }
 
 void Session::show_dense_map(std::function<DenseMap()> task) {
+  if (dense_.joinable()) dense_.join();
   {
     const std::lock_guard lock(dense_mutex_);
-    if (making_dense_) return;
     making_dense_ = true;
   }
-  if (dense_.joinable()) dense_.join();
   // It is left out where that world ends meanwhile.
   dense_ = std::thread([this, task = std::move(task), world = model_.world()] {
     set_thread_priority(ThreadPriority::background);

@@ -52,6 +52,12 @@ FrameFact fact_of(const FrameResult& result, const MapSnapshot& map) {
   if (!result.world_from_cam || map.map() == nullptr || map.map()->keyframe_count() == 0) return fact;
   // The newest keyframes are not in the snapshot yet.
   fact.host = std::clamp(result.reference_keyframe, 0, map.map()->keyframe_count() - 1);
+  // Nor is the first one of a new map, and keyframes of the map before lie in another world.
+  if (fact.host != result.reference_keyframe &&
+      map_number(map.map()->roots(), map.map()->root(fact.host)) != result.map) {
+    fact.host = kNoKeyframe;
+    return fact;
+  }
   fact.position_in_host = map.map()->cam_from_world(fact.host) * result.world_from_cam->translation;
   return fact;
 }

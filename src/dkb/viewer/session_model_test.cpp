@@ -185,5 +185,36 @@ TEST(SessionModel, TheTruthIsLaidOnThePathAnewAfterACorrectionAndAtTheEnd) {
   EXPECT_NEAR(truth_lies_at(model), first + 7, 1e-3);
 }
 
+TEST(SessionModel, TheFirstFramesOfANewMapHangOnNoKeyframeOfTheOneBefore) {
+  SessionModel model(options_with_truth());
+  const Map map = test::world(9, 1);  // whose snapshot does not have the new map yet
+  const auto result_at = [](int frame, int number, KeyframeId reference) {
+    FrameResult result;
+    result.frame = frame;
+    result.state = TrackingState::tracking;
+    result.world_from_cam = Rigid3({Eigen::Quaterniond::Identity()}, {1.0 * frame, 0, 0});
+    result.map = number;
+    result.reference_keyframe = reference;
+    return result;
+  };
+  const auto path = [&] {
+    SessionModel::Client client;
+    StreamReader page;
+    tell(model, client, page);
+    return page.path;
+  };
+  model.take_in();
+  model.show(result_at(0, 0, 0), Frame(), {map.snapshot(), {}}, {});
+  // Keyframe 12 is not in the snapshot either, but its map is: the newest known one of that map stands in.
+  model.show(result_at(1, 0, 12), Frame(), {map.snapshot(), {}}, {});
+  model.take_in();
+  model.take_in_map(0);
+  EXPECT_EQ(path(), 2U);
+  model.show(result_at(2, 1, 13), Frame(), {map.snapshot(), {}}, {});
+  model.show(result_at(3, 1, 13), Frame(), {map.snapshot(), {}}, {});
+  model.take_in();
+  EXPECT_EQ(path(), 3U) << "the path is broken there, and goes on with the new map's first snapshot";
+}
+
 }  // namespace
 }  // namespace dkb
