@@ -120,7 +120,14 @@ void Session::show_dense_map(std::function<DenseMap()> task) {
     set_thread_priority(ThreadPriority::background);
     const auto start = std::chrono::steady_clock::now();
     try {
-      std::string messages = dense_messages(task());
+      const DenseMap map = task();
+      KeyframeId root = kNoKeyframe;
+      {
+        const auto lock = model_.hold();
+        model_.take_in();
+        root = model_.root_of(map.map);
+      }
+      std::string messages = dense_messages(map, root);
       const auto lock = model_.hold();
       model_.take_dense(std::move(messages), world);
     } catch (const std::exception& e) {

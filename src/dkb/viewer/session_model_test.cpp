@@ -216,5 +216,30 @@ TEST(SessionModel, TheFirstFramesOfANewMapHangOnNoKeyframeOfTheOneBefore) {
   EXPECT_EQ(path(), 3U) << "the path is broken there, and goes on with the new map's first snapshot";
 }
 
+TEST(SessionModel, AFrameTellsTheRootOfTheMapThatItIsIn) {
+  SessionModel model(options_with_truth());
+  Map map = test::unjoined(3);
+  const auto told = [&](int frame, bool tracked, int number, KeyframeId reference) {
+    FrameResult result;
+    result.frame = frame;
+    if (tracked) result.world_from_cam = Rigid3();
+    result.map = number;
+    result.reference_keyframe = reference;
+    model.show(std::move(result), Frame(), {map.snapshot(), {}}, {});
+    model.take_in();
+    SessionModel::Client client;
+    StreamReader page;
+    tell(model, client, page);
+    const size_t at = page.frame.find("\"map\":");
+    return at == std::string::npos ? -9 : std::stoi(page.frame.substr(at + 6));
+  };
+  EXPECT_EQ(told(0, true, 0, 0), 0);
+  EXPECT_EQ(told(1, false, 0, -1), -1) << "lost: in none";
+  EXPECT_EQ(told(2, true, 2, 2), 2);
+  EXPECT_EQ(told(3, true, 3, 5), 5) << "a new map, whose first keyframe is not in the snapshot yet";
+  map.set_parent(1, 0);
+  EXPECT_EQ(told(4, true, 1, 2), 2) << "maps before it were joined";
+}
+
 }  // namespace
 }  // namespace dkb
