@@ -38,7 +38,7 @@ function writeSession(path, { frames, every, points, features }) {
   };
   let seed = 1;
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
-  const hello = { protocol: 1, version: "0", source: `${points} points every ${every} frames`, realtime: true, budget_ms: 33.3, unit: 0.001,
+  const hello = { protocol: 2, source: `${points} points every ${every} frames`, budget_ms: 33.3, unit: 0.001, feature_unit: 1 / 16,
     camera: { width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240 } };
   chunk(0, -1, [message(1, JSON.stringify(hello))]);
   let made = 0;
@@ -47,10 +47,9 @@ function writeSession(path, { frames, every, points, features }) {
     const turn = [0, Math.sin(-angle / 2), 0, Math.cos(-angle / 2)];
     const messages = [];
     if (f % every === 0) {
-      const keyframe = Buffer.alloc(44);
+      const keyframe = Buffer.alloc(40);
       keyframe.writeInt32LE(made, 0);
-      keyframe.writeInt32LE(f, 4);
-      [...turn, ...at].forEach((v, i) => keyframe.writeFloatLE(v, 16 + 4 * i));
+      [...turn, ...at].forEach((v, i) => keyframe.writeFloatLE(v, 12 + 4 * i));
       const list = Buffer.alloc(8 + 12 * points);
       list.writeUInt32LE(made, 0);
       list.writeUInt32LE(points, 4);
@@ -64,24 +63,24 @@ function writeSession(path, { frames, every, points, features }) {
       messages.push(message(2, keyframe), message(3, list));
       made++;
     }
-    const fact = Buffer.alloc(20);
+    const fact = Buffer.alloc(16);
     fact.writeUInt32LE(f, 0);
     fact.writeFloatLE(10 + 5 * random(), 4);
-    fact.writeFloatLE(f / 30, 12);
-    fact.writeUInt16LE(400, 16);
-    fact[18] = 1;
+    fact.writeFloatLE(f / 30, 8);
+    fact.writeUInt16LE(400, 12);
+    fact[14] = 1;
     const path = Buffer.alloc(20);
     path.writeUInt32LE(f, 0);
     path.writeInt32LE(made - 1, 4);
     let json = JSON.stringify({ state: { frame: f, frames, tracked: f, lost: 0, state: "tracking", inliers: 400, keyframes: made, map_points: made * points,
-      loops: 0, movers: 0, tracking_ms: 12, paused: false, ended: f === frames - 1 }, explanation: "", camera: [...turn, ...at], movers: [], boxes: [] });
+      loops: 0, movers: 0, tracking_ms: 12, paused: false, ended: f === frames - 1 }, explanation: "", map: 0, camera: [...turn, ...at], movers: [], boxes: [] });
     json += " ".repeat((4 - (json.length % 4)) % 4);
-    const seen = Buffer.alloc(4 + 8 * features + 12);
+    const seen = Buffer.alloc(4 + 6 * features + 12);
     seen.writeUInt32LE(features, 0);
     for (let i = 0; i < features; i++) {
-      seen.writeUInt16LE(10200 * random(), 4 + 8 * i);
-      seen.writeUInt16LE(7600 * random(), 6 + 8 * i);
-      seen[8 + 8 * i] = 1;
+      seen.writeUInt16LE(10200 * random(), 4 + 6 * i);
+      seen.writeUInt16LE(7600 * random(), 6 + 6 * i);
+      seen[8 + 6 * i] = 1;
     }
     const length = Buffer.alloc(4);
     length.writeUInt32LE(json.length);

@@ -71,7 +71,7 @@ def main():
         client, frames = played(fetched)
         assert frames == sorted(frames) and set(frames) >= set(range(FRAMES)), frames
         assert len(client.points) == stats["map_points"] and sum(client.keyframes.values()) == stats["keyframes"]
-        assert client.facts == FRAMES and client.frames[-1]["state"]["ended"] and {kind for _, kind in client.images} == {0, 1}
+        assert client.facts == FRAMES and client.frames[-1]["state"]["ended"] and set(client.images) == {0, 1}
         for _, _, offset in session["entries"]:
             begun, _ = played(fetched, offset)
             assert begun.points == client.points and begun.keyframes == client.keyframes and begun.facts == FRAMES

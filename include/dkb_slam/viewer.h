@@ -67,7 +67,8 @@ class DKB_SLAM_API Viewer {
   /// Whether the dense map on the page is due: Slam::dense_map_task() is wanted. Seldom enough that a tenth of one
   /// thread's time goes into it.
   virtual bool wants_dense_map() const = 0;
-  virtual void show_dense_map(std::function<DenseMap()> task) = 0;  ///< runs the task on a thread of its own
+  /// Runs the task on a thread of its own. Who does not ask wants_dense_map() first waits for the task before.
+  virtual void show_dense_map(std::function<DenseMap()> task) = 0;
 
   /// What visitors ask for. The feeding thread calls this before each frame: true when it may go on; false when the
   /// session is still paused after `patience`, or somebody wants the map saved: at once, until take_save_order() is

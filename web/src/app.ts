@@ -102,7 +102,6 @@ function showLive(): void {
     const s = panel.state!;
     at("pause").textContent = s.paused ? "Resume" : "Pause";
     for (const id of ["pause", "step"]) at<HTMLButtonElement>(id).disabled = s.ended;
-    if (s.ended) panel.view.end();
   };
   let connection: AbortController | null = null;
   let attempt = 0;

@@ -47,13 +47,13 @@ export class Charts {
     this.stale = true;
   }
   take(data: DataView): void {
-    for (let at = 0; at < data.byteLength; at += 20) {
-      const inliers = data.getUint16(at + 16, true), state = data.getUint8(at + 18);
+    for (let at = 0; at < data.byteLength; at += 16) {
+      const inliers = data.getUint16(at + 12, true), state = data.getUint8(at + 14);
       this.frames.push(data.getUint32(at, true));
-      this.time.push(data.getFloat32(at + 12, true));
+      this.time.push(data.getFloat32(at + 8, true));
       this.ms.push(data.getFloat32(at + 4, true));
       this.points.push(inliers);
-      this.keyframe.push(data.getUint8(at + 19) === 1);
+      this.keyframe.push(data.getUint8(at + 15) === 1);
       this.lost.push(state === 2 ? 0 : null);
     }
     if (this.time.length > 2 * kept)
@@ -66,10 +66,10 @@ export class Charts {
   }
   takeStages(data: DataView): void {
     for (let at = 0; at < data.byteLength; ) {
-      const n = data.getUint32(at + 8, true), times = new Map<number, number>();
-      for (let i = 0; i < n; i++) times.set(data.getUint16(at + 12 + 4 * i, true), data.getUint16(at + 14 + 4 * i, true) / 50);
+      const n = data.getUint32(at + 4, true), times = new Map<number, number>();
+      for (let i = 0; i < n; i++) times.set(data.getUint16(at + 8 + 4 * i, true), data.getUint16(at + 10 + 4 * i, true) / 50);
       this.stages.push({ frame: data.getUint32(at, true), times });
-      at += 12 + 4 * n;
+      at += 8 + 4 * n;
     }
     if (this.stages.length > 4000) this.stages.splice(0, this.stages.length - 2000);
     this.stale = true;

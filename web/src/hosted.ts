@@ -20,6 +20,7 @@ const nowhere = "gl_Position = vec4(2.0, 2.0, 2.0, 1.0); gl_PointSize = 0.0;";
 // Poses of all keyframes ever made, by id.
 export class Poses {
   readonly known: boolean[] = [];
+  private hidden: boolean[] = []; // by id: of maps that are not shown
   readonly uniform = { value: this.texture(1) };
   private goal: Float32Array = new Float32Array(perRow * 12);
   private start: Float32Array | null = null;
@@ -34,11 +35,11 @@ export class Poses {
     return this.uniform.value.image.data as Float32Array;
   }
   clear(): void {
-    this.known.length = 0;
+    this.known.length = this.hidden.length = 0;
     this.start = null;
   }
   // `q`: x y z w.
-  set(id: number, q: number[], t: number[]): void {
+  set(id: number, q: number[], t: number[], shown: boolean): void {
     const rows = Math.floor(id / perRow) + 1;
     if (rows > this.goal.length / (perRow * 12)) {
       const grown = Math.max(rows, (2 * this.goal.length) / (perRow * 12));
@@ -60,10 +61,24 @@ export class Poses {
       2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), t[2],
     ];
     this.goal.set(m, id * 12);
-    if (!this.known[id] || !this.start) this.now.set(m, id * 12);
-    if (!this.known[id] && this.start) this.start.set(m, id * 12);
+    const jumps = !this.known[id] || !shown || this.hidden[id];
+    if (jumps || !this.start) this.now.set(shown ? m : outOfSight, id * 12);
+    if (jumps && this.start) this.start.set(m, id * 12);
     this.known[id] = true;
+    this.hidden[id] = !shown;
     this.uniform.value.needsUpdate = true;
+  }
+  // Shows some of all and puts the others out of sight, at once.
+  show(shown: (id: number) => boolean): void {
+    this.start = null;
+    this.known.forEach((_known, id) => {
+      this.hidden[id] = !shown(id);
+      this.now.set(this.hidden[id] ? outOfSight : this.goal.subarray(id * 12, id * 12 + 12), id * 12);
+    });
+    this.uniform.value.needsUpdate = true;
+  }
+  shows(id: number): boolean {
+    return !this.hidden[id];
   }
   // The poses set next are moved to, so that a correction can be seen.
   glide(): void {
@@ -76,7 +91,8 @@ export class Poses {
     const share = Math.min(1, (performance.now() - this.startTime) / 900);
     const s = share * share * (3 - 2 * share);
     const now = this.now;
-    for (let i = 0; i < this.goal.length; i++) now[i] = this.start[i] + s * (this.goal[i] - this.start[i]);
+    for (let i = 0; i < this.goal.length; i++)
+      if (!this.hidden[Math.floor(i / 12)]) now[i] = this.start[i] + s * (this.goal[i] - this.start[i]);
     this.uniform.value.needsUpdate = true;
     if (share === 1) this.start = null;
     return true;
@@ -89,6 +105,8 @@ export class Poses {
       m[o + 8] * p[0] + m[o + 9] * p[1] + m[o + 10] * p[2] + m[o + 11]);
   }
 }
+
+const outOfSight = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1e9]; // beyond what the view's camera draws, wherever a point lies
 
 const blockBits = 13, blockSize = 1 << blockBits;
 
@@ -192,6 +210,7 @@ export class Cloud {
       const [b, v] = this.place(slot);
       const { position, host } = this.blocks[b];
       const p = position.array, u = this.unit;
+      if (!this.poses.shows(host.array[v])) continue;
       this.poses.toWorld(host.array[v], [p[3 * v] * u, p[3 * v + 1] * u, p[3 * v + 2] * u], world);
       seen.copy(world).project(camera);
       if (seen.z > 1 || seen.z < -1) continue;
@@ -211,6 +230,7 @@ export class Cloud {
     for (const slot of this.slots.values()) {
       if (slot % 17 !== 0) continue;
       const [b, v] = this.place(slot);
+      if (!this.poses.shows(this.blocks[b].host.array[v])) continue;
       const a = this.blocks[b].position.array;
       sample.push(this.poses.toWorld(this.blocks[b].host.array[v], [a[3 * v] * u, a[3 * v + 1] * u, a[3 * v + 2] * u], new THREE.Vector3()));
     }

@@ -3,7 +3,7 @@
 import { Charts } from "./charts";
 import { EventList, type SessionEvent } from "./events";
 import { features, featureWords, Picture } from "./picture";
-import { Kind, type Message } from "./stream";
+import { Kind, protocol, type Message } from "./stream";
 import { layers, View, type Hello, type Layer, type Mode } from "./view";
 
 export type State = {
@@ -37,10 +37,13 @@ export class Panel {
   private boxes = new Map<string, HTMLInputElement>();
   private cells = new Map<string, HTMLElement>();
   private measuring = false;
+  private foreign = false; // what is told is of another version
+  private replays: boolean;
   private roots: HTMLElement[];
 
   // `name`: of a recorded session, else empty. `openEvent`: nothing = an event leads to where the camera was.
   constructor(main: HTMLElement, head: HTMLElement, private number: number, name: string, openEvent: ((e: SessionEvent) => void) | null) {
+    this.replays = name !== "";
     const copy = (id: string) => (document.getElementById(id + "-template") as HTMLTemplateElement).content.firstElementChild!.cloneNode(true) as HTMLElement;
     const root = copy("panel"), headRoot = copy("head");
     this.roots = [root, headRoot];
@@ -66,6 +69,9 @@ export class Panel {
     this.showMode();
     this.at("measure").onclick = () => this.onWish({ what: "measure", on: !this.measuring });
     this.at("shot").onclick = () => this.onWish({ what: "shoot" });
+    this.view.onMaps = (words) => {
+      if (this.at("maps").textContent !== words) this.at("maps").textContent = words;
+    };
     this.view.onMeasure = (words) => (this.at("measured").textContent = words);
     const image = this.at<HTMLCanvasElement>("picture");
     image.addEventListener("pointermove", (e) => {
@@ -157,9 +163,16 @@ export class Panel {
   }
 
   take({ kind, data }: Message): void {
+    if (this.foreign && kind !== Kind.hello) return;
     switch (kind) {
       case Kind.hello: {
         const hello = json(data) as Hello;
+        this.foreign = hello.protocol !== protocol;
+        if (this.foreign) {
+          this.badge("gone", this.replays ? "this recording is of another version: it was made by another version of the program, which can replay it"
+            : "this page is of another version of the program: load it anew");
+          break;
+        }
         this.view.begin(hello);
         this.picture.begin(hello.camera.width, hello.camera.height, hello.feature_unit);
         this.charts.begin(hello.budget_ms);
@@ -196,7 +209,7 @@ export class Panel {
         const length = data.getUint32(0, true);
         const frame = json(data, 4, length);
         this.showState(frame.state);
-        this.view.takeFrame(frame.camera, frame.movers, frame.world_from_truth);
+        this.view.takeFrame(frame.camera, frame.movers, frame.world_from_truth, frame.map);
         this.picture.take(new DataView(data.buffer, data.byteOffset + 4 + length, data.byteLength - 4 - length), frame.movers, frame.boxes);
         for (const kind of features)
           this.boxes.get("overlay-" + kind)!.nextElementSibling!.textContent = `${marks[kind]} ${featureWords[kind]} ${this.picture.counts[kind] ?? 0}`;
@@ -211,6 +224,7 @@ export class Panel {
   }
   private showState(s: State): void {
     this.state = s;
+    if (s.ended) this.view.end();
     if (s.ended) this.badge("ended", "ended");
     else if (s.paused) this.badge("paused", "paused");
     else this.badge(s.state, s.state);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The current image with what became of its features, the movers' mask and boxes.
-import type { Mover } from "./view";
+import type { Mover } from "./movers";
 
 // What became of a feature, by the stage that said so: the pose used it; it disagrees with the point that it was matched
 // with; it lies on a mover; it moved otherwise than the camera's motion explains; nothing was matched with it.
@@ -9,6 +9,8 @@ export type Feature = (typeof features)[number];
 export const featureWords: Record<Feature, string> = { used: "used", disagrees: "disagrees", "on-mover": "on a mover", moved: "moved", unused: "unused" };
 const states: Feature[] = ["unused", "used", "disagrees", "on-mover"]; // by the stream's state, where no reason is given
 const reasons: (Feature | null)[] = [null, "on-mover", "moved", "disagrees"];
+
+const featureBytes = 6;
 
 export class Picture {
   readonly shown = new Set<string>(["used", "disagrees", "on-mover", "moved", "mask", "boxes"]);
@@ -21,12 +23,14 @@ export class Picture {
   private movers: Mover[] = [];
   private boxes: { class: string; box: number[] }[] = [];
   private waiting = false;
-  private unit = 1 / 16;
+  private unit = 1;
+  private asked = 0; // pictures so far
+  private newest = [0, 0]; // of those that are there, colour and depth
 
   constructor(private canvas: HTMLCanvasElement) {}
 
-  // `unit` [px]: that features are told in; older recordings do not say it.
-  begin(width: number, height: number, unit = 1 / 16): void {
+  // `unit` [px]: that features are told in.
+  begin(width: number, height: number, unit: number): void {
     this.width = width;
     this.unit = unit;
     this.canvas.width = 640;
@@ -34,10 +38,16 @@ export class Picture {
     this.image?.close();
     this.depthImage?.close();
     this.image = this.depthImage = null;
+    this.newest = [this.asked, this.asked]; // what is on its way is of before
   }
   async takeImage(data: DataView): Promise<void> {
-    const depth = data.getUint32(4, true) === 1;
-    const bitmap = await createImageBitmap(new Blob([new Uint8Array(data.buffer as ArrayBuffer, 8)], { type: "image/jpeg" }));
+    if (data.byteLength <= 4) return; // of a frame without images
+    const depth = data.getUint32(0, true) === 1, number = ++this.asked;
+    const bytes = new Uint8Array(data.buffer as ArrayBuffer, data.byteOffset + 4, data.byteLength - 4);
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+    // Pictures are not ready in the order in which they came.
+    if (number <= this.newest[depth ? 1 : 0]) return bitmap.close();
+    this.newest[depth ? 1 : 0] = number;
     if (depth) {
       this.depthImage?.close();
       this.depthImage = bitmap;
@@ -62,7 +72,7 @@ export class Picture {
     this.refresh();
   }
   private fate(i: number): Feature {
-    const at = 4 + 8 * i;
+    const at = 4 + featureBytes * i;
     return reasons[this.report!.getUint8(at + 5)] ?? states[this.report!.getUint8(at + 4)] ?? "unused";
   }
   // In words, what became of the feature nearest to a place in the canvas [its pixels]; "" when none is near.
@@ -70,7 +80,7 @@ export class Picture {
     const report = this.report, s = this.canvas.width / this.width;
     let best = 10, words = "";
     for (let i = 0, n = report ? report.getUint32(0, true) : 0; i < n; i++) {
-      const fate = this.fate(i), u = report!.getUint16(4 + 8 * i, true) * this.unit, v = report!.getUint16(6 + 8 * i, true) * this.unit;
+      const fate = this.fate(i), u = report!.getUint16(4 + featureBytes * i, true) * this.unit, v = report!.getUint16(6 + featureBytes * i, true) * this.unit;
       const distance = Math.hypot(u * s - x, v * s - y);
       if (!this.shown.has(fate) || distance >= best) continue;
       best = distance;
@@ -98,7 +108,7 @@ export class Picture {
     if (!report) return;
     const s = this.canvas.width / this.width;
     const n = report.getUint32(0, true);
-    if (this.shown.has("mask")) this.drawMask(g, report, 4 + 8 * n, s, colour("--mover"));
+    if (this.shown.has("mask")) this.drawMask(g, report, 4 + featureBytes * n, s, colour("--mover"));
     const shapes: Record<Feature, (x: number, y: number) => void> = {
       used: (x, y) => { g.moveTo(x + 4.5, y); g.arc(x, y, 4.5, 0, 7); },
       disagrees: (x, y) => { g.moveTo(x - 4, y - 4); g.lineTo(x + 4, y + 4); g.moveTo(x + 4, y - 4); g.lineTo(x - 4, y + 4); },
@@ -111,7 +121,7 @@ export class Picture {
       if (!this.shown.has(kind)) continue;
       g.beginPath();
       for (let i = 0; i < n; i++) {
-        const at = 4 + 8 * i;
+        const at = 4 + featureBytes * i;
         if (this.fate(i) !== kind) continue;
         shapes[kind](report.getUint16(at, true) * this.unit * s, report.getUint16(at + 2, true) * this.unit * s);
       }

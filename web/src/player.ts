@@ -4,7 +4,7 @@ import type { Panel } from "./panel";
 import { headers, Kind, type Message } from "./stream";
 
 export type Recording = {
-  name: string; seconds: number; frame: number; frames: number; size: number; ended: boolean; damaged: boolean;
+  name: string; seconds: number; size: number; ended: boolean; damaged: boolean;
   entries: [number, number, number][]; // time, frame and byte of the places where one may begin
 };
 export async function sessionList(): Promise<Recording[]> {
@@ -143,7 +143,7 @@ export class Player {
         // A copy of what is kept longer than this call.
         const kept = kind === Kind.frame || kind === Kind.image;
         const data = kept ? new DataView(this.buffer.slice(at + 8, at + 8 + length).buffer) : new DataView(this.buffer.buffer, this.buffer.byteOffset + at + 8, length);
-        if (kept) last.set(kind === Kind.image ? `image ${data.getUint32(4, true)}` : "frame", { kind, data });
+        if (kept) last.set(kind === Kind.image ? `image ${data.getUint32(0, true)}` : "frame", { kind, data });
         else this.panel.take({ kind, data });
         at += 8 + length;
       }

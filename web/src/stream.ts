@@ -5,6 +5,7 @@ export const enum Kind {
   heartbeat, hello, keyframes, points, covisibility, loops, path, facts, events, frame, image, truth, pathReset,
   moment, stageNames, stages, surface, grid,
 }
+export const protocol = 2; // of the stream, as the hello tells it
 export type Message = { kind: Kind; data: DataView };
 
 export const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";

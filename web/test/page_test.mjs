@@ -6,6 +6,7 @@ import { execFileSync, spawn } from "node:child_process";
 import { copyFileSync, existsSync, mkdirSync, readFileSync, rmSync, statSync, symlinkSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { delimiter, join } from "node:path";
+import { writeTwoMaps } from "./two_maps.mjs";
 
 const [program, sequence, work, npm] = process.argv.slice(2);
 const web = new URL("..", import.meta.url).pathname;
@@ -262,6 +263,62 @@ await settled(film);
 await film.waitForTimeout(500);
 assert.equal(await points(film), all, "as many points as before at the end");
 
+// At its end a replay shows the whole map from where most of it is seen.
+const lookOf = (p) => p.getAttribute("#view", "data-look");
+await film.keyboard.press("f");
+await film.waitForTimeout(3000);
+const whole = (await lookOf(film)).split(" ").map(Number);
+await slide(film, 0.99);
+await film.waitForTimeout(3000);
+const behind = (await lookOf(film)).split(" ").map(Number);
+assert.ok(Math.hypot(...whole.map((v, k) => v - behind[k])) > 0.5, `the whole map at the end ${whole}, the camera before it ${behind}`);
+
+// Maps that are not joined are not drawn over each other.
+writeTwoMaps(join(work, "maps.dkbs"));
+const maps = await serve("view", join(work, "maps.dkbs"), "--port", "0", "--quiet");
+const { page: atlas } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark", reducedMotion: "reduce" }, maps.url);
+await atlas.keyboard.press("Space");
+// What is red and green in the view, as it is drawn.
+const squares = (name) => atlas.evaluate(async (png) => {
+  const image = await createImageBitmap(new Blob([Uint8Array.from(atob(png), (c) => c.charCodeAt(0))]));
+  const g = new OffscreenCanvas(image.width, image.height).getContext("2d");
+  g.drawImage(image, 0, 0);
+  const d = g.getImageData(0, 0, image.width, image.height).data;
+  let red = 0, green = 0;
+  for (let i = 0; i < d.length; i += 4) {
+    if (d[i] > 200 && d[i + 1] < 80 && d[i + 2] < 80) red++;
+    if (d[i + 1] > 200 && d[i] < 80 && d[i + 2] < 80) green++;
+  }
+  return { red: red > 500, green: green > 500 };
+}, name);
+const seen = async (name) => {
+  await atlas.waitForTimeout(500);
+  await shoot(atlas, name);
+  return squares((await atlas.locator("#view").screenshot()).toString("base64"));
+};
+await slide(atlas, 5 / 29);
+assert.deepEqual(await seen("map_1"), { red: true, green: false });
+assert.equal(await atlas.textContent("#maps"), "");
+await slide(atlas, 15 / 29);
+assert.deepEqual(await seen("map_2"), { red: false, green: true });
+assert.equal(await atlas.textContent("#maps"), "map 2 of 2, not joined");
+await atlas.keyboard.press("t");
+const above = (await lookOf(atlas)).split(" ").map(Number);
+assert.ok(above.every((v) => Math.abs(v) < 100), "what is out of sight does not count: " + above);
+await atlas.keyboard.press("f");
+await slide(atlas, 25 / 29);
+assert.equal(await atlas.getAttribute("#view", "data-shown"), "0", "joined to the first");
+await slide(atlas, 1);
+assert.deepEqual(await seen("maps_joined"), { red: true, green: true });
+assert.equal(await atlas.textContent("#maps"), "");
+writeTwoMaps(join(work, "older.dkbs"), 1);
+const older = await serve("view", join(work, "older.dkbs"), "--port", "0", "--quiet");
+const refused = await browser.newPage();
+await refused.goto(older.url);
+await until(refused, () => document.getElementById("badge")?.textContent.includes("this recording is of another version"));
+assert.equal(await points(refused), 0, "nothing of it is shown");
+await refused.close();
+
 // Two side by side, at the same time and with the same view.
 const two = await serve("view", join(work, "orb"), join(work, "default"), "--port", "0", "--quiet");
 const { page: pair } = await open({ viewport: { width: 1280, height: 720 }, colorScheme: "dark" }, two.url);
@@ -305,6 +362,6 @@ await small.page.screenshot({ path: join(work, "compare_phone.png"), fullPage: t
 assert.deepEqual(errors, []);
 assert.deepEqual(outside, []);
 await browser.close();
-for (const server of [replay, two]) assert.equal(await interrupted(server), 0);
+for (const server of [replay, maps, older, two]) assert.equal(await interrupted(server), 0);
 console.log(`the page is as it should be; a late visitor saw the map after ${late.seconds.toFixed(1)} s`);
 process.exit(0);

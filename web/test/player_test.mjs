@@ -12,14 +12,17 @@ if (!existsSync(join(packages, "node_modules", "esbuild"))) {
   process.exit(0);
 }
 const { buildSync } = createRequire(join(packages, "x.js"))("esbuild");
-const [bundle] = buildSync({ entryPoints: [join(web, "src/player.ts")], bundle: true, write: false, format: "esm" }).outputFiles;
+async function load(name) {
+  const [bundle] = buildSync({ entryPoints: [join(web, "src", name)], bundle: true, write: false, format: "esm" }).outputFiles;
+  return import("data:text/javascript;base64," + Buffer.from(bundle.text).toString("base64"));
+}
 
 globalThis.location = { hash: "" };
 globalThis.document = { hidden: false };
 // A clock that each look moves on: a turn of 12 ms tells one chunk.
 let clock = 0;
 Object.defineProperty(performance, "now", { value: () => (clock += 7) });
-const { Player } = await import("data:text/javascript;base64," + Buffer.from(bundle.text).toString("base64"));
+const { Player } = await load("player.ts");
 
 // Chunks as src/dkb/viewer/session_file.h writes them, each with one message.
 const message = 3, ofCheckpoint = 2;
@@ -99,4 +102,50 @@ for (const failing of [async () => ({ ok: false, status: 500 }), async () => { t
   }
   assert.equal(p.frame, 200, "it goes on");
 }
+
+// Pictures are decoded in any order: an older one takes no newer one's place, and none comes after the world has begun
+// anew. A frame without images is no error.
+const { Picture } = await load("picture.ts");
+globalThis.requestAnimationFrame = () => {};
+const decoding = [];
+globalThis.createImageBitmap = () => new Promise((done) => {
+  const bitmap = { closed: false, close: () => (bitmap.closed = true) };
+  decoding.push({ bitmap, done: () => done(bitmap) });
+});
+const picture = new Picture({});
+const tell = (bytes = 9) => picture.takeImage(new DataView(new ArrayBuffer(4 + bytes)));
+picture.begin(640, 480, 1);
+const [first, second, third] = [tell(), tell(), tell()];
+decoding[1].done();
+await second;
+decoding[0].done();
+await first;
+assert.ok(decoding[0].bitmap.closed && !decoding[1].bitmap.closed, "the newer one stays");
+picture.begin(640, 480, 1);
+decoding[2].done();
+await third;
+assert.ok(decoding[1].bitmap.closed && decoding[2].bitmap.closed, "none is left of the world before");
+await tell(0);
+assert.equal(decoding.length, 3, "nothing to decode");
+
+// Of maps that are not joined one is shown: the camera's, or that of an event that was gone to.
+const { Maps } = await load("maps.ts");
+const maps = new Maps();
+maps.take(0, 0, false);
+maps.take(1, 0, false);
+assert.deepEqual([maps.shown, maps.words], [0, ""]);
+maps.takeCamera(0);
+maps.takeCamera(2); // whose first keyframe is not told yet
+assert.deepEqual([maps.shows(0), maps.shows(2), maps.words], [false, true, "map 2 of 2, not joined"]);
+maps.take(2, 2, false);
+maps.take(3, 2, false);
+maps.takeCamera(-1); // lost
+assert.deepEqual([maps.shows(1), maps.shows(3)], [false, true]);
+maps.visit(1);
+assert.deepEqual([maps.shows(1), maps.shows(3), maps.showsCamera, maps.words], [true, false, false, "map 1 of 2, not joined"]);
+maps.leave();
+assert.equal(maps.shown, 2);
+maps.take(2, 0, false); // joined, and the camera's frame is not told yet
+maps.take(3, 0, false);
+assert.deepEqual([maps.shows(1), maps.shows(3), maps.showsCamera, maps.words], [true, true, true, ""]);
 console.log("the player is as it should be");

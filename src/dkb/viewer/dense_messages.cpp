@@ -98,11 +98,18 @@ SurfaceMesh coarser(const SurfaceMesh& mesh, size_t max_vertices) {
   }
 }
 
-std::string dense_messages(const DenseMap& map) {
+std::string dense_messages(const DenseMap& map, int root) {
   StreamWriter out;
   if (!map.mesh.vertices.empty())
-    out.message(StreamMessage::surface, [&](StreamWriter& m) { put_surface(m, coarser(map.mesh, kMaxVertices)); });
-  if (map.grid) out.message(StreamMessage::grid, [&](StreamWriter& m) { put_grid(m, *map.grid); });
+    out.message(StreamMessage::surface, [&](StreamWriter& m) {
+      m.put<int32_t>(root);
+      put_surface(m, coarser(map.mesh, kMaxVertices));
+    });
+  if (map.grid)
+    out.message(StreamMessage::grid, [&](StreamWriter& m) {
+      m.put<int32_t>(root);
+      put_grid(m, *map.grid);
+    });
   return std::move(out.bytes());
 }
 

@@ -11,7 +11,7 @@ namespace dkb {
 // The same surface with `max_vertices` at most: those in a cell of space become one, in cells as large as it takes.
 SurfaceMesh coarser(const SurfaceMesh& mesh, size_t max_vertices);
 
-// The messages `surface` and `grid` of a dense map.
-std::string dense_messages(const DenseMap& map);
+// The messages `surface` and `grid` of a dense map; `root` is that of the map that it is of.
+std::string dense_messages(const DenseMap& map, int root);
 
 }  // namespace dkb

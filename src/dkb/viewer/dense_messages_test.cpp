@@ -44,19 +44,22 @@ TEST(DenseMessages, ACoarserSurfaceCoversTheSame) {
 
 TEST(DenseMessages, HoldSurfaceAndGrid) {
   DenseMap map;
-  EXPECT_EQ(dense_messages(map), "");
+  EXPECT_EQ(dense_messages(map, 0), "");
   map.mesh = square(3);
   map.grid.emplace();
   map.grid->cells = Image<uint8_t>(70, 1000, OccupancyGrid::kFree);
   map.grid->cells(3, 0) = OccupancyGrid::kOccupied;
-  const std::string bytes = dense_messages(map);
-  // Head 8; 24; 9 vertices of 6, padded to 56, of 4; 8 triangles of 6. Then head 8; 48; runs of 3, 1, 65535 and the
+  const std::string bytes = dense_messages(map, 7);
+  // Head 8; 28; 9 vertices of 6, padded to 56, of 4; 8 triangles of 6. Then head 8; 52; runs of 3, 1, 65535 and the
   // rest.
-  ASSERT_EQ(bytes.size(), 8U + 24 + 56 + 36 + 48 + 8 + 48 + 4 * 4);
+  ASSERT_EQ(bytes.size(), 8U + 28 + 56 + 36 + 48 + 8 + 52 + 4 * 4);
+  int32_t root = 0;
+  std::memcpy(&root, bytes.data() + 8, 4);
+  EXPECT_EQ(root, 7);
   int16_t x = 0;
-  std::memcpy(&x, bytes.data() + 8 + 24 + 6, 2);
+  std::memcpy(&x, bytes.data() + 8 + 28 + 6, 2);
   EXPECT_EQ(x, 0);  // the middle one of the first row
-  std::memcpy(&x, bytes.data() + 8 + 24, 2);
+  std::memcpy(&x, bytes.data() + 8 + 28, 2);
   EXPECT_EQ(x, -3333);
   uint16_t runs[8];
   std::memcpy(runs, bytes.data() + bytes.size() - 16, 16);

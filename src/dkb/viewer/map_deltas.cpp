@@ -52,27 +52,30 @@ bool MapDeltas::begins_otherwise(const Map& map) const {
 
 void MapDeltas::update_keyframes(const Map& map) {
   keyframes_.resize(static_cast<size_t>(map.keyframe_count()));
+  const std::vector<KeyframeId> roots = map.root_of_each();
   int moved = 0;
   for (KeyframeId id = 0; id < map.keyframe_count(); ++id) {
     const dkb::Keyframe* given = map.keyframe(id);
     if (given == nullptr) continue;
     Keyframe& known = keyframes_[static_cast<size_t>(id)];
     const Rigid3 pose = map.cam_from_world(id).inverse();
-    if (known.version == 0 || known.culled != given->culled || !same_pose(known.world_from_cam, pose)) {
+    const KeyframeId root = roots[static_cast<size_t>(id)];
+    if (known.version == 0 || known.culled != given->culled || known.root != root ||
+        !same_pose(known.world_from_cam, pose)) {
       moved += known.version > 0 ? 1 : 0;
       known.version = version_;
       known.frame = given->frame;
       known.timestamp = given->timestamp;
       known.culled = given->culled;
       known.world_from_cam = pose;
-      known.map = map.root(id);
+      known.root = root;
     }
     if (last_ != nullptr && last_->keyframe(id) == given) continue;
-    std::vector<std::pair<uint32_t, uint32_t>> edges;
+    std::vector<uint32_t> edges;
     if (!given->culled)
       for (const Covisible& c : given->covisible)
         if (c.keyframe < id && c.shared_points >= kSharedPoints && edges.size() < kEdges)
-          edges.emplace_back(static_cast<uint32_t>(c.keyframe), static_cast<uint32_t>(c.shared_points));
+          edges.push_back(static_cast<uint32_t>(c.keyframe));
     if (edges == known.covisible) continue;
     known.covisible = std::move(edges);
     known.covisibility_version = version_;
@@ -122,7 +125,7 @@ void MapDeltas::update_points(const Map& map) {
   }
 }
 
-bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
+void MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
   if (begun_anew(client)) {
     client = {};
     client.world = world_;
@@ -132,8 +135,7 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
       const Keyframe& k = keyframes_[id];
       if (k.version <= client.keyframes) continue;
       m.put(static_cast<int32_t>(id));
-      m.put<int32_t>(k.frame);
-      m.put<int32_t>(k.map);
+      m.put<int32_t>(k.root);
       m.put<uint32_t>(k.culled ? 1 : 0);
       for (int i = 0; i < 4; ++i) m.put(static_cast<float>(k.world_from_cam.rotation.coeffs()[i]));
       for (int i = 0; i < 3; ++i) m.put(static_cast<float>(k.world_from_cam.translation[i]));
@@ -145,10 +147,7 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
       if (k.covisibility_version <= client.keyframes) continue;
       m.put(static_cast<uint32_t>(id));
       m.put(static_cast<uint32_t>(k.covisible.size()));
-      for (const auto& [other, shared] : k.covisible) {
-        m.put(other);
-        m.put(shared);
-      }
+      for (const uint32_t other : k.covisible) m.put(other);
     }
   });
   client.keyframes = version_;
@@ -157,7 +156,6 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
       for (const LoopInfo& loop : loops_) {
         m.put<int32_t>(loop.keyframe);
         m.put<int32_t>(loop.earlier_keyframe);
-        m.put<int32_t>(loop.merge ? 1 : 0);
       }
     });
     client.loops = loops_version_;
@@ -165,7 +163,6 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
   client.blocks.resize(blocks_.size(), 0);
   // Goes round: a client with little room gets every block in turn.
   const size_t start = out.size();
-  bool complete = true;
   out.message(StreamMessage::points, [&](StreamWriter& m) {
     for (size_t n = 0; n < blocks_.size(); ++n) {
       const size_t at = (client.next_block + n) % blocks_.size();
@@ -174,7 +171,6 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
       if (block.version <= known) continue;
       if (m.size() - start > budget) {
         client.next_block = at;
-        complete = false;
         return;
       }
       const auto news = [&](const Point& p) { return p.version > known && (p.observations > 0 || known > 0); };
@@ -192,7 +188,6 @@ bool MapDeltas::write(Client& client, StreamWriter& out, size_t budget) const {
       known = block.version;
     }
   });
-  return complete;
 }
 
 }  // namespace dkb

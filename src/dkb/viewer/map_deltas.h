@@ -18,28 +18,33 @@ namespace dkb {
 enum class StreamMessage : uint8_t {
   heartbeat = 0,     // empty
   hello = 1,         // JSON: the session. What the client knew before is void
-  keyframes = 2,     // {int32 id, frame, map; uint32 culled; float32 q[x y z w], t[3]} world_from_cam, each
+  keyframes = 2,     // {int32 id, root; uint32 culled; float32 q[x y z w], t[3]} world_from_cam, each; maps
+                     // that are not joined have roots and worlds of their own
   points = 3,        // {uint32 keyframe, n; n x {uint16 index; int16 x y z; uint8 r g b, observations}}: in the axes of
                      // the keyframe that they were born at, in units of the hello's; observations 0 = gone
-  covisibility = 4,  // {uint32 keyframe, n; n x {uint32 earlier keyframe, shared points}}: all edges to earlier ones
-  loops = 5,         // {int32 keyframe, earlier, merge}: the whole list
+  covisibility = 4,  // {uint32 keyframe, n; n x uint32 earlier keyframe}: all edges to earlier ones
+  loops = 5,         // {int32 keyframe, earlier}: the whole list
   path = 6,          // {uint32 frame; int32 keyframe; float32 x y z}: camera positions in a keyframe's axes
-  facts = 7,         // {uint32 frame; float32 tracking_ms, waiting_ms, time; uint16 inliers; uint8 state, keyframe}
+  facts = 7,         // {uint32 frame; float32 tracking_ms, time; uint16 inliers; uint8 state, keyframe}
   events = 8,        // JSON array
   frame = 9,         // uint32 length of JSON, JSON padded to 4; uint32 n, n x {uint16 x, y in units of the hello's;
-                     // uint8 state, reason; uint16 0}; uint32 cell, width, height of the mask, its bits by rows
-  image = 10,        // uint32 frame, uint32 0 colour or 1 depth, JPEG
-  truth = 11,        // {float32 time, x, y, z}: the whole of it
+                     // uint8 state, reason}; uint32 cell, width, height of the mask, its bits by rows
+  image = 10,        // uint32 0 colour or 1 depth, JPEG; none where the frame has no images
+  truth = 11,        // {float32 x, y, z}: the whole of it
   path_reset = 12,   // empty: the path comes anew
   moment = 13,       // of files: "DKBS"; uint32 flags (session_file.h); float64 seconds since the first frame; int32
                      // frame; uint32 bytes of the messages that follow and belong to it
   stage_names = 14,  // JSON array: the whole list
-  stages = 15,       // {uint32 frame; float32 time; uint32 n; n x {uint16 stage, time in 1/50 ms}}
-  surface = 16,      // float32 x y z, unit; uint32 vertices v, triangles t; v x int16 x y z in units from x y z, padded
-                     // to 4; v x uint8 r g b 0; t x uint16 a b c: of the dense map, the whole of it
-  grid = 17,         // float32 cell, x, y; float32 q[x y z w], t[3] floor_from_world; uint32 width, height; {uint16 n,
-                     // value}: n cells of that value, by rows from the top
+  stages = 15,       // {uint32 frame, n; n x {uint16 stage, time in 1/50 ms}}
+  surface = 16,      // int32 root of its map; float32 x y z, unit; uint32 vertices v, triangles t; v x int16 x y z in
+                     // units from x y z, padded to 4; v x uint8 r g b 0; t x uint16 a b c: of the dense map, the whole
+                     // of it
+  grid = 17,         // int32 root of its map; float32 cell, x, y; float32 q[x y z w], t[3] floor_from_world; uint32
+                     // width, height; {uint16 n, value}: n cells of that value, by rows from the top
 };
+
+// Of all this, as the hello tells it. Raised with every change, so that a page refuses what it would misread.
+inline constexpr int kStreamProtocol = 2;
 
 // Appends numbers as they lie in memory, which is little-endian on all machines this runs on.
 class StreamWriter {
@@ -98,8 +103,7 @@ class MapDeltas {
   };
   bool begun_anew(const Client& client) const { return client.world != world_; }
   // Writes what the client does not know; of points some `budget` bytes at most, the rest by the next calls.
-  // Returns whether nothing is left.
-  bool write(Client& client, StreamWriter& out, size_t budget) const;
+  void write(Client& client, StreamWriter& out, size_t budget) const;
 
   // Updates that moved more keyframes at once than a local adjustment does.
   uint64_t corrections() const { return corrections_; }
@@ -111,11 +115,12 @@ class MapDeltas {
  private:
   struct Keyframe {
     uint64_t version = 0, covisibility_version = 0;
-    int frame = 0, map = 0;
+    int frame = 0;
+    KeyframeId root = kNoKeyframe;
     double timestamp = 0;
     bool culled = false;
     Rigid3 world_from_cam;
-    std::vector<std::pair<uint32_t, uint32_t>> covisible;
+    std::vector<uint32_t> covisible;
   };
   struct Point {
     int16_t x = 0, y = 0, z = 0;

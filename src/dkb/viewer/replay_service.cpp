@@ -53,7 +53,6 @@ std::string ReplayService::list() {
     for (const SessionFile::Entry& e : r.file.entries()) entries.push_back({e.seconds, e.frame, e.offset});
     list.push_back({{"name", r.name},
                     {"seconds", r.file.seconds()},
-                    {"frame", r.file.frame()},
                     {"frames", r.file.frames()},
                     {"size", r.file.size()},
                     {"ended", r.file.ended()},

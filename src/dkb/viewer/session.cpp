@@ -110,18 +110,24 @@ bool Session::wants_dense_map() const {
 }
 
 void Session::show_dense_map(std::function<DenseMap()> task) {
+  if (dense_.joinable()) dense_.join();
   {
     const std::lock_guard lock(dense_mutex_);
-    if (making_dense_) return;
     making_dense_ = true;
   }
-  if (dense_.joinable()) dense_.join();
   // It is left out where that world ends meanwhile.
   dense_ = std::thread([this, task = std::move(task), world = model_.world()] {
     set_thread_priority(ThreadPriority::background);
     const auto start = std::chrono::steady_clock::now();
     try {
-      std::string messages = dense_messages(task());
+      const DenseMap map = task();
+      KeyframeId root = kNoKeyframe;
+      {
+        const auto lock = model_.hold();
+        model_.take_in();
+        root = model_.root_of(map.map);
+      }
+      std::string messages = dense_messages(map, root);
       const auto lock = model_.hold();
       model_.take_dense(std::move(messages), world);
     } catch (const std::exception& e) {

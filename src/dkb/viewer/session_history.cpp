@@ -40,7 +40,7 @@ void SessionHistory::add(FrameFact fact) {
 }
 
 void SessionHistory::add_stages(const FrameFact& fact) {
-  StagesOfFrame of{fact.frame, static_cast<float>(seconds_of(fact.stamp_ns)), {}};
+  StagesOfFrame of{fact.frame, {}};
   for (const StageTime& s : fact.stages) {
     auto name = std::find(stage_names_.begin(), stage_names_.end(), s.stage);
     if (name == stage_names_.end()) name = stage_names_.insert(name, s.stage);
@@ -64,7 +64,6 @@ void SessionHistory::write_stages(Client& client, StreamWriter& out) const {
     for (; client.stages - stages_gone_ < stages_.size(); ++client.stages) {
       const StagesOfFrame& of = stages_[client.stages - stages_gone_];
       m.put(static_cast<uint32_t>(of.frame));
-      m.put(of.seconds);
       m.put(static_cast<uint32_t>(of.times.size()));
       for (const auto& [stage, time] : of.times) {
         m.put(stage);
@@ -98,7 +97,6 @@ void SessionHistory::write(Client& client, StreamWriter& out, int keyframes) con
       const FrameFact& f = facts_[client.facts - facts_gone_];
       m.put(static_cast<uint32_t>(f.frame));
       m.put(f.tracking_ms);
-      m.put(f.waiting_ms);
       m.put(static_cast<float>(seconds_of(f.stamp_ns)));
       m.put(f.inliers);
       m.put(static_cast<uint8_t>(f.state));

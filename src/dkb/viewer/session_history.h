@@ -19,7 +19,7 @@ namespace dkb {
 struct FrameFact {
   int frame = 0;
   int64_t stamp_ns = 0;
-  float tracking_ms = 0, waiting_ms = 0;
+  float tracking_ms = 0;
   uint16_t inliers = 0;
   TrackingState state = TrackingState::initialising;
   bool made_keyframe = false;
@@ -72,7 +72,6 @@ class SessionHistory {
 
   struct StagesOfFrame {
     int frame = 0;
-    float seconds = 0;
     std::vector<std::pair<uint16_t, uint16_t>> times;  // index of the stage's name, 1/50 ms
   };
   void add_stages(const FrameFact& fact);

@@ -5,8 +5,12 @@
 
 #include <cstring>
 
+#include "dkb/viewer/stream_test_tools.h"
+
 namespace dkb {
 namespace {
+
+using test::unjoined;
 
 FrameFact fact(int frame, double x) {
   FrameFact f;
@@ -28,10 +32,10 @@ TEST(SessionHistory, TellsEachClientOnce) {
   for (int i = 0; i < 100; ++i) history.add(fact(i, 0.1 * i));
   history.add(SessionEvent{"note", "hello", 3, 0});
   SessionHistory::Client client;
-  EXPECT_GT(bytes_for(history, client), 100U * (20 + 20));
+  EXPECT_GT(bytes_for(history, client), 100U * (16 + 20));
   EXPECT_EQ(bytes_for(history, client), 0U);
   history.add(fact(100, 10));
-  EXPECT_EQ(bytes_for(history, client), 8U + 20 + 8 + 20);
+  EXPECT_EQ(bytes_for(history, client), 8U + 16 + 8 + 20);
 }
 
 TEST(SessionHistory, TellsStagesByNumberAndTheirNamesOnce) {
@@ -45,9 +49,9 @@ TEST(SessionHistory, TellsStagesByNumberAndTheirNamesOnce) {
   f.stages = {{"flow", 3000.0F}};
   history.add(f);
   // A fact; one stage; no further point of the path.
-  EXPECT_EQ(bytes_for(history, client), 8U + 20 + 8 + 12 + 4);
+  EXPECT_EQ(bytes_for(history, client), 8U + 16 + 8 + 8 + 4);
   SessionHistory::Client late;
-  EXPECT_EQ(bytes_for(history, late), first + 20 + 12 + 4);
+  EXPECT_EQ(bytes_for(history, late), first + 16 + 8 + 4);
 }
 
 TEST(SessionHistory, StaysBoundedOverADay) {
@@ -120,18 +124,6 @@ TEST(SessionHistory, StandingStillMakesNoPath) {
   history.add(lost);
   history.add(lost);
   EXPECT_EQ(history.path_size(), 2U);
-}
-
-// A map without points, whose keyframes hang on nothing: each is a map of its own.
-Map unjoined(int keyframes) {
-  Map map;
-  for (KeyframeId id = 0; id < keyframes; ++id) {
-    Keyframe keyframe;
-    keyframe.id = id;
-    keyframe.features = std::make_shared<RgbdFeatures>();
-    map.add_keyframe(keyframe);
-  }
-  return map;
 }
 
 TEST(SessionHistory, BringsTheTruthToTheMap) {

@@ -44,7 +44,6 @@ FrameFact fact_of(const FrameResult& result, const MapSnapshot& map) {
   fact.frame = result.frame;
   fact.stamp_ns = result.stamp_ns;
   fact.tracking_ms = static_cast<float>(result.tracking_ms);
-  fact.waiting_ms = static_cast<float>(result.waiting_ms);
   fact.inliers = static_cast<uint16_t>(std::clamp(result.inliers, 0, 65535));
   fact.state = result.state;
   fact.made_keyframe = result.keyframe;
@@ -52,6 +51,12 @@ FrameFact fact_of(const FrameResult& result, const MapSnapshot& map) {
   if (!result.world_from_cam || map.map() == nullptr || map.map()->keyframe_count() == 0) return fact;
   // The newest keyframes are not in the snapshot yet.
   fact.host = std::clamp(result.reference_keyframe, 0, map.map()->keyframe_count() - 1);
+  // Nor is the first one of a new map, and keyframes of the map before lie in another world.
+  if (fact.host != result.reference_keyframe &&
+      map_number(map.map()->roots(), map.map()->root(fact.host)) != result.map) {
+    fact.host = kNoKeyframe;
+    return fact;
+  }
   fact.position_in_host = map.map()->cam_from_world(fact.host) * result.world_from_cam->translation;
   return fact;
 }
@@ -69,7 +74,6 @@ void put_features(StreamWriter& m, const FrameResult& result, double unit) {
     m.put(in_units(f.image_y));
     m.put(static_cast<uint8_t>(f.state));
     m.put(static_cast<uint8_t>(f.reason));
-    m.put<uint16_t>(0);
   }
 }
 
@@ -214,7 +218,6 @@ void SessionModel::write_truth(StreamWriter& out) const {
     const auto& truth = options_.truth;
     const size_t step = std::max<size_t>(1, truth.size() / 5000);
     for (size_t i = 0; i < truth.size(); i += step) {
-      m.put(static_cast<float>(static_cast<double>(truth[i].stamp_ns - truth[0].stamp_ns) * 1e-9));
       for (int k = 0; k < 3; ++k) m.put(static_cast<float>(truth[i].position[k]));
     }
   });
@@ -244,10 +247,8 @@ Json SessionModel::state() const {
 std::string SessionModel::hello() const {
   const Camera& c = options_.camera;
   return text_of(
-      {{"protocol", 1},
-       {"version", DKB_SLAM_VERSION},
+      {{"protocol", kStreamProtocol},
        {"source", options_.description},
-       {"realtime", options_.realtime},
        {"budget_ms", rounded(options_.budget_ms)},
        {"unit", map_.unit()},
        {"feature_unit", feature_unit(c)},
@@ -268,10 +269,24 @@ void SessionModel::align_truth(const Map& map) {
   aligned_corrections_ = map_.corrections();
 }
 
+KeyframeId SessionModel::root_of(int number) const {
+  const Map* map = shown_ == nullptr ? nullptr : shown_->map.map().get();
+  if (map == nullptr || number < 0 || static_cast<size_t>(number) >= map->roots().size()) return kNoKeyframe;
+  return map->roots()[static_cast<size_t>(number)];
+}
+
+// A new map's first keyframe, its root, is not in the snapshot at first.
+KeyframeId SessionModel::root_of_frame() const {
+  const FrameResult& result = shown_->result;
+  if (!result.world_from_cam) return kNoKeyframe;
+  const KeyframeId known = root_of(result.map);
+  return known == kNoKeyframe ? result.reference_keyframe : known;
+}
+
 const std::string& SessionModel::frame_message() {
   if (!frame_message_.empty() || shown_ == nullptr) return frame_message_;
   const FrameResult& result = shown_->result;
-  Json json = {{"state", state()}, {"explanation", result.keyframe_explanation}};
+  Json json = {{"state", state()}, {"explanation", result.keyframe_explanation}, {"map", root_of_frame()}};
   if (result.world_from_cam) json["camera"] = json_of(*result.world_from_cam);
   json["movers"] = Json::array();
   for (const Mover& m : result.movers)
@@ -306,7 +321,6 @@ const std::string& SessionModel::image_message(bool depth) {
   const std::string jpeg = depth ? reduced_depth(shown_->frame) : reduced_picture(shown_->frame);
   StreamWriter out;
   out.message(StreamMessage::image, [&](StreamWriter& m) {
-    m.put(static_cast<uint32_t>(shown_->result.frame));
     m.put<uint32_t>(depth ? 1 : 0);
     m.put_bytes(jpeg);
   });

@@ -54,7 +54,9 @@ class SessionModel {
   void write(Client& client, StreamWriter& out, size_t budget);
 
   int frame() const { return shown_ == nullptr ? -1 : shown_->result.frame; }  // the newest; -1 = none yet
-  double seconds() const;                                                      // of it, since the first
+  // The root of the map of this number, as FrameResult::map has it; none where the newest snapshot has no such map.
+  KeyframeId root_of(int number) const;
+  double seconds() const;  // of it, since the first
   bool ended() const { return ended_; }
   nlohmann::json state() const;
 
@@ -75,6 +77,7 @@ class SessionModel {
   };
 
   void forget_world();
+  KeyframeId root_of_frame() const;
   std::string hello() const;
   void write_truth(StreamWriter& out) const;
   void align_truth(const Map& map);

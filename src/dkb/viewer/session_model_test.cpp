@@ -185,5 +185,61 @@ TEST(SessionModel, TheTruthIsLaidOnThePathAnewAfterACorrectionAndAtTheEnd) {
   EXPECT_NEAR(truth_lies_at(model), first + 7, 1e-3);
 }
 
+TEST(SessionModel, TheFirstFramesOfANewMapHangOnNoKeyframeOfTheOneBefore) {
+  SessionModel model(options_with_truth());
+  const Map map = test::world(9, 1);  // whose snapshot does not have the new map yet
+  const auto result_at = [](int frame, int number, KeyframeId reference) {
+    FrameResult result;
+    result.frame = frame;
+    result.state = TrackingState::tracking;
+    result.world_from_cam = Rigid3({Eigen::Quaterniond::Identity()}, {1.0 * frame, 0, 0});
+    result.map = number;
+    result.reference_keyframe = reference;
+    return result;
+  };
+  const auto path = [&] {
+    SessionModel::Client client;
+    StreamReader page;
+    tell(model, client, page);
+    return page.path;
+  };
+  model.take_in();
+  model.show(result_at(0, 0, 0), Frame(), {map.snapshot(), {}}, {});
+  // Keyframe 12 is not in the snapshot either, but its map is: the newest known one of that map stands in.
+  model.show(result_at(1, 0, 12), Frame(), {map.snapshot(), {}}, {});
+  model.take_in();
+  model.take_in_map(0);
+  EXPECT_EQ(path(), 2U);
+  model.show(result_at(2, 1, 13), Frame(), {map.snapshot(), {}}, {});
+  model.show(result_at(3, 1, 13), Frame(), {map.snapshot(), {}}, {});
+  model.take_in();
+  EXPECT_EQ(path(), 3U) << "the path is broken there, and goes on with the new map's first snapshot";
+}
+
+TEST(SessionModel, AFrameTellsTheRootOfTheMapThatItIsIn) {
+  SessionModel model(options_with_truth());
+  Map map = test::unjoined(3);
+  const auto told = [&](int frame, bool tracked, int number, KeyframeId reference) {
+    FrameResult result;
+    result.frame = frame;
+    if (tracked) result.world_from_cam = Rigid3();
+    result.map = number;
+    result.reference_keyframe = reference;
+    model.show(std::move(result), Frame(), {map.snapshot(), {}}, {});
+    model.take_in();
+    SessionModel::Client client;
+    StreamReader page;
+    tell(model, client, page);
+    const size_t at = page.frame.find("\"map\":");
+    return at == std::string::npos ? -9 : std::stoi(page.frame.substr(at + 6));
+  };
+  EXPECT_EQ(told(0, true, 0, 0), 0);
+  EXPECT_EQ(told(1, false, 0, -1), -1) << "lost: in none";
+  EXPECT_EQ(told(2, true, 2, 2), 2);
+  EXPECT_EQ(told(3, true, 3, 5), 5) << "a new map, whose first keyframe is not in the snapshot yet";
+  map.set_parent(1, 0);
+  EXPECT_EQ(told(4, true, 1, 2), 2) << "maps before it were joined";
+}
+
 }  // namespace
 }  // namespace dkb

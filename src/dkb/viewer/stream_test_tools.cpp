@@ -35,6 +35,17 @@ Map world(int keyframes, int points) {
   }
   return map;
 }
+Map unjoined(int keyframes) {
+  Map map;
+  for (KeyframeId id = 0; id < keyframes; ++id) {
+    Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.features = std::make_shared<RgbdFeatures>();
+    map.add_keyframe(keyframe);
+  }
+  return map;
+}
+
 bool StreamReader::take(const std::string& s) {
   for (size_t i = 0; i < s.size();) {
     if (i + 8 > s.size()) return false;
@@ -49,12 +60,13 @@ bool StreamReader::take(const std::string& s) {
       hellos = before + 1;
     }
     if (kind == StreamMessage::keyframes)
-      for (size_t k = i; k < end; k += 44) {
+      for (size_t k = i; k < end; k += 40) {
         const int id = at<int32_t>(s, k);
-        if (at<uint32_t>(s, k + 12) == 1)
+        roots[id] = at<int32_t>(s, k + 4);
+        if (at<uint32_t>(s, k + 8) == 1)
           keyframes.erase(id);
         else
-          keyframes[id] = {at<float>(s, k + 32), at<float>(s, k + 36), at<float>(s, k + 40)};
+          keyframes[id] = {at<float>(s, k + 28), at<float>(s, k + 32), at<float>(s, k + 36)};
       }
     if (kind == StreamMessage::points)
       for (size_t b = i; b < end;) {
@@ -69,16 +81,16 @@ bool StreamReader::take(const std::string& s) {
           ++points_sent;
         }
       }
-    if (kind == StreamMessage::loops) loops = (end - i) / 12;
+    if (kind == StreamMessage::loops) loops = (end - i) / 8;
     if (kind == StreamMessage::facts) {
-      facts += (end - i) / 20;
-      last_fact = at<int32_t>(s, end - 20);
+      facts += (end - i) / 16;
+      last_fact = at<int32_t>(s, end - 16);
     }
     if (kind == StreamMessage::path) path += (end - i) / 20;
     if (kind == StreamMessage::path_reset) path = 0;
     if (kind == StreamMessage::events) events = s.substr(i, end - i);
     if (kind == StreamMessage::frame) frame = s.substr(i, end - i);
-    if (kind == StreamMessage::image) images[at<int32_t>(s, i + 4)] = s.substr(i, end - i);
+    if (kind == StreamMessage::image) images[at<int32_t>(s, i)] = s.substr(i, end - i);
     i = end;
   }
   return true;
