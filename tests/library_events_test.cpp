@@ -116,8 +116,8 @@ TEST_F(LibraryEvents, ANewMapSaysWhatIsNotKnownOfIt) {
   for (const Event& e : slam.take_events())
     if (e.kind == Kind::new_map) texts.push_back(e.text);
   EXPECT_EQ(texts, (std::vector<std::string>{
-                       "map 0 begins",
-                       "map 1 begins; how its world lies to that of map 0 is not known until they are joined"}));
+                       "map 1 begins",
+                       "map 2 begins; how its world lies to that of map 1 is not known until they are joined"}));
 }
 
 TEST_F(LibraryEvents, ACallbackMayFeed) {

@@ -32,10 +32,11 @@ std::string depths_text(const DepthImage& image, const Camera& camera) {
   return fmt::format("(depths of {:.3g} to {:.3g} m{})", nearest, farthest, farthest > 100 ? ": millimetres?" : "");
 }
 
+// Counted from 1, as in the names of files.
 std::string new_map_text(int number) {
-  if (number == 0) return "map 0 begins";
-  return fmt::format("map {} begins; how its world lies to that of {} is not known until they are joined", number,
-                     number == 1 ? "map 0" : fmt::format("maps 0 to {}", number - 1));
+  if (number == 0) return "map 1 begins";
+  return fmt::format("map {} begins; how its world lies to that of {} is not known until they are joined", number + 1,
+                     number == 1 ? "map 1" : fmt::format("maps 1 to {}", number));
 }
 
 }  // namespace
