@@ -16,7 +16,7 @@ namespace dkb {
 // 256-bit binary descriptor.
 using Descriptor = std::array<uint64_t, 4>;
 
-// Number of bits that differ, 0 ... 256. To compare one descriptor with many see matching.h, which is faster.
+// Number of bits that differ, 0 ... 256.
 inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
 #if defined(__x86_64__)
   // The baseline processor has no population count: bits are added up in parallel in fields of 2, 4 and 8 bits.

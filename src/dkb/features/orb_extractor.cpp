@@ -117,9 +117,9 @@ void OrbExtractor::describe_corners(int level, Worker& worker) {
 }
 
 OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& poor, int cell) {
-  if (image.width() > 65535 || image.height() > 65535)
+  if (image.width() > 32767 || image.height() > 32767)
     throw InputError("feature extraction: the image is " + std::to_string(image.width()) + " x " +
-                     std::to_string(image.height()) + " pixels; at most 65535 per side are possible");
+                     std::to_string(image.height()) + " pixels; at most 32767 per side are possible");
   pyramid_.start(image);
   const auto levels = static_cast<size_t>(pyramid_.levels());
   corners_.resize(levels);

@@ -37,7 +37,7 @@ class OrbExtractor {
   // `threaded`: a thread of its own takes a share of the levels.
   explicit OrbExtractor(OrbOptions options = {}, Simd simd = best_simd(), bool threaded = false);
 
-  // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 65535.
+  // Features ordered by level, finest first. Throws InputError for an empty image or one with a side above 32767.
   // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
   // image; these get half of the features at most where there are enough others. Empty: no such place.
   OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1);
