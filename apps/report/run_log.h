@@ -37,7 +37,7 @@ struct Happening {
   std::string text;
 };
 
-// Listens to a run. Keeps some 80 bytes a frame and at most 25 small pictures.
+// Listens to a run. Keeps 64 bytes a frame and at most 25 small pictures.
 class RunLog {
  public:
   // `expected`: about how many frames there will be.
