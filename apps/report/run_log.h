@@ -28,6 +28,7 @@ struct FrameRow {
   float tracking_ms = 0, waiting_ms = 0;
 
   bool tracked() const { return state != TrackingState::initialising && state != TrackingState::lost; }
+  bool by_images() const { return tracked() && state != TrackingState::predicted; }
 };
 
 // Something worth a line: a loop, a new map.
