@@ -50,7 +50,8 @@ int record(const RecordArguments& args) {
     tell(stderr, "{}\n", line);
   });
   SourceOptions reading = args.reading;
-  reading.depth_limits = false;  // those are for whoever reads the recording
+  reading.depth_limits = false;     // those are for whoever reads the recording
+  reading.prior = PriorKind::none;  // images are all that is written
   const std::unique_ptr<Source> source = open_source(args.source, reading);
   PairWriterOptions writing = quick_options(args.out);
   writing.warn = [&](const std::string& line) { warnings.warn(line, line); };

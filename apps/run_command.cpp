@@ -47,8 +47,7 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
   command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, above 0 = mover");
   command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
-  command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop")
-      ->transform([](std::string list) { return (std::erase(list, ' '), list); });
+  command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
   command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else")
       ->transform(whole_number<int64_t>());
   command->add_option("--start", reading.start, "[s] after the first pair");

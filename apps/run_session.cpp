@@ -458,7 +458,7 @@ int RunSession::tell_the_end() {
     say(others + (ape_ ? fmt::format("; the APE is of {}", ape_->count) : ""));
   say("report: " + (out_ / "report.html").string());
   if (const std::string line = camera_.text(source_->counts()); (live_ || args_.live) && !line.empty()) say(line);
-  if (const SourceCounts lost = recording_->counts(); !live_ && lost.unpaired + lost.late > 0)
+  if (const SourceCounts lost = recording_->counts(); !live_ && !args_.live && lost.unpaired + lost.late > 0)
     say(fmt::format("{} without a partner of their time, {} out of order", plural(lost.unpaired, "image", "images"),
                     lost.late));
   if (viewer_) viewer_->serve_on(*slam_, args_.quiet);

@@ -167,6 +167,11 @@ TEST(BenchSuite, MutatedPublishedNumbersAreReadOrRefused) {
     }
 }
 
+TEST(BenchSuite, PartsToSwitchOffMayBeOneTextWithBlanks) {
+  const Suite suite = parse("sequences: {a: {path: b}}\nvariants: {v: {disable: \"kf, ba\"}}\n");
+  EXPECT_EQ(suite.variants.at(0).disabled(), "kf, ba");
+}
+
 TEST(BenchSuite, TheHashIsOfWhatIsMeasured) {
   const std::string hash = suite_hash(parse(kSuite));
   EXPECT_EQ(hash.size(), 16u);

@@ -15,9 +15,10 @@ namespace fs = std::filesystem;
 
 constexpr int kFrames = 20;
 
-// The first frames of the sequence, with its camera where `with_camera`, each depth image so many times.
+// The first frames of the sequence, with its camera where `with_camera`, each depth image so many times, and a message
+// of odometry on each of these topics.
 void write_recording_of(const fs::path& path, bool with_camera, Compression compression = Compression::none,
-                        int times = 1) {
+                        int times = 1, const std::vector<std::string>& odometries = {}) {
   const auto writer = write_recording(path, compression);
   const size_t camera = writer->add_topic("/dkb_slam/camera", "std_msgs/String", true);
   const size_t rgb = writer->add_topic("/camera/rgb/image_color", "sensor_msgs/Image"),
@@ -37,6 +38,12 @@ void write_recording_of(const fs::path& path, bool with_camera, Compression comp
     };
     const int64_t stamp = next.frame.stamp_ns();
     if (first && with_camera) writer->write(camera, stamp, encode_string(read_text(sequence() / "camera.yaml")));
+    if (first)
+      for (const std::string& topic : odometries) {
+        OdometryMessage odometry;
+        odometry.header = {stamp, "odom", 0}, odometry.child_frame_id = "base";
+        writer->write(writer->add_topic(topic, "nav_msgs/Odometry"), stamp, encode(odometry));
+      }
     first = false;
     write(rgb, stamp, "rgb8", next.frame.colour());
     for (int i = 0; i < times; ++i) write(depth, next.frame.depth_stamp_ns(), "32FC1", next.frame.depth());
@@ -110,6 +117,29 @@ TEST(ConvertCommand, RepeatedWarningsAreMerged) {
   EXPECT_EQ(run.exit_code, 0) << run.err;
   const std::string warning = "warning: /camera/depth/image: a stamp is not after the one before it; it is left out";
   EXPECT_EQ(run.err, warning + "\n" + warning + ": " + std::to_string(kFrames) + " times in all\n");
+}
+
+TEST(ConvertCommand, MotionThatNobodyWritesIsNotAskedFor) {
+  const TempFolder temp;
+  write_recording_of(temp / "one.bag", true, Compression::none, 1, {"/odom"});
+  write_recording_of(temp / "two.bag", true, Compression::none, 1, {"/odom", "/wheels"});
+  for (const char* bag : {"one.bag", "two.bag"})
+    for (const char* command : {"convert", "record"}) {
+      const std::string out = (temp / (std::string(bag) + command)).string();
+      const Finished run = run_program({command, (temp / bag).string(), "--out", out});
+      EXPECT_EQ(run.exit_code, 0) << run.err;
+      EXPECT_EQ(run.err, "") << command << " " << bag;
+    }
+}
+
+TEST(RecordingRun, PlayedAsACameraItsLostImagesAreToldOnce) {
+  const TempFolder temp;
+  write_recording_of(temp / "a.bag", true, Compression::none, 2);
+  const Finished run =
+      run_program({"live", (temp / "a.bag").string(), "--detector", "none", "--out", (temp / "out").string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find(" late or repeated"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find(" without a partner of their time"), std::string::npos) << run.out;
 }
 
 TEST(RecordCommand, OnATerminalWarningsBeginALineOfTheirOwn) {

@@ -176,6 +176,12 @@ TEST(RunCommand, WhatSwitchesTheFilterOffWinsOverADetectorWithoutAnError) {
   }
 }
 
+TEST(RunCommand, WithoutRejectingMoversMasksAreNotReadBlanksOrNot) {
+  const TempFolder temp;
+  const SlamRun run(sequence(), temp / "out", {"--disable", "kf, dr", "--masks", temp / "none", "--max-frames", "3"});
+  EXPECT_EQ(run.finished.exit_code, 0) << run.finished.err;
+}
+
 TEST(RunCommand, OfAPartMasksMayShowNobody) {
   const TempFolder temp;
   std::filesystem::create_directory(temp / "masks");

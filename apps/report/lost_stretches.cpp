@@ -53,7 +53,7 @@ class Judge {
     std::vector<const FrameRow*> tracked;
     std::vector<double> intervals;
     for (size_t i = 0; i < rows.size(); ++i) {
-      if (rows[i].tracked() && rows[i].state != TrackingState::predicted) tracked.push_back(&rows[i]);
+      if (rows[i].by_images()) tracked.push_back(&rows[i]);
       if (i > 0) intervals.push_back(interval_s(rows, i));
     }
     usual_ = likeness_of(tracked);
@@ -127,11 +127,10 @@ class Judge {
 }  // namespace
 
 std::vector<LostStretch> lost_stretches(const std::vector<FrameRow>& rows, const CauseLimits& limits) {
-  const auto by_images = [&](size_t i) { return rows[i].tracked() && rows[i].state != TrackingState::predicted; };
   const Judge judge(rows, limits);
   std::vector<LostStretch> stretches;
   for (size_t i = 0; i < rows.size(); ++i) {
-    if (by_images(i)) continue;
+    if (rows[i].by_images()) continue;
     if (stretches.empty() || stretches.back().end != i || stretches.back().state != rows[i].state)
       stretches.push_back({i, i, rows[i].state, "", ""});
     stretches.back().end = i + 1;

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/map/map_suffix.h"
 #include "dkb/util/plural.h"
 #include "dkb/util/settings.h"
 
@@ -12,16 +13,18 @@ namespace dkb {
 namespace fs = std::filesystem;
 
 std::string name_of_map(const std::string& name, size_t map, const std::string& ending) {
-  return map == 0 ? name + ending : name + "_map" + std::to_string(map + 1) + ending;
+  return name + map_suffix(map) + ending;
 }
 
 size_t map_of_file(const std::string& file, const std::string& name, const std::string& ending) {
+  constexpr int64_t kMost = 100000;  // maps; whoever reads the files makes room for them all
   const std::string start = name + "_map";
   int64_t number = 0;
   if (file.size() <= start.size() + ending.size() || !file.starts_with(start) || !file.ends_with(ending)) return 0;
   const std::string digits = file.substr(start.size(), file.size() - start.size() - ending.size());
-  if (digits.find_first_not_of("0123456789") != std::string::npos || !parse_number(digits, &number)) return 0;
-  return number < 2 ? 0 : static_cast<size_t>(number - 1);
+  if (!parse_number(digits, &number) || number < 2 || number > kMost) return 0;
+  const auto map = static_cast<size_t>(number - 1);
+  return file == name_of_map(name, map, ending) ? map : 0;
 }
 
 std::string other_maps_text(const std::vector<size_t>& poses_of_map) {

@@ -23,9 +23,6 @@ std::string spaced(std::string name) {
 std::string figure(const std::string& svg) {
   return "<figure>" + svg + "</figure>\n";
 }
-bool by_images(const FrameRow& r) {
-  return r.tracked() && r.state != TrackingState::predicted;
-}
 
 // A value of each row that has a pose by the images.
 template <class Value>
@@ -157,7 +154,7 @@ std::string tracking_section(const Context& c) {
                          "a frame",
                          {line_of(c, "second", "features", [&](size_t i) { return rows[i].features; }),
                           line_of(c, "est", "map points that the pose rests on",
-                                  [&](size_t i) { return by_images(rows[i]) ? rows[i].inliers : std::nan(""); })},
+                                  [&](size_t i) { return rows[i].by_images() ? rows[i].inliers : std::nan(""); })},
                          true,
                          {{static_cast<double>(c.facts.limits.min_inliers), "fewest for a pose"}}};
   out += figure(time_chart(points, c.duration, c.bands));
@@ -236,7 +233,7 @@ std::string pictures_section(const Context& c) {
   };
   std::vector<const OverlayPicture*> ranked;
   for (const OverlayPicture* p : c.log.pictures())
-    if (by_images(rows[p->row]) && std::isfinite(badness(p))) ranked.push_back(p);
+    if (rows[p->row].by_images() && std::isfinite(badness(p))) ranked.push_back(p);
   if (ranked.empty()) return "";
   const size_t kept = ranked.size();
   std::stable_sort(ranked.begin(), ranked.end(), [&](auto* a, auto* b) { return badness(a) > badness(b); });

@@ -28,6 +28,7 @@ struct FrameRow {
   float tracking_ms = 0, waiting_ms = 0;
 
   bool tracked() const { return state != TrackingState::initialising && state != TrackingState::lost; }
+  bool by_images() const { return tracked() && state != TrackingState::predicted; }
 };
 
 // Something worth a line: a loop, a new map.
@@ -37,7 +38,7 @@ struct Happening {
   std::string text;
 };
 
-// Listens to a run. Keeps some 80 bytes a frame and at most 25 small pictures.
+// Listens to a run. Keeps 64 bytes a frame and at most 25 small pictures.
 class RunLog {
  public:
   // `expected`: about how many frames there will be.

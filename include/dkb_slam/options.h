@@ -132,7 +132,7 @@ class DKB_SLAM_API Options {
   /// Sets what a YAML file holds, as written by to_yaml(), its preset first. Throws InputError with file and line.
   void load(const std::filesystem::path& path);
   /// Switches parts off, by comma: dr (rejecting what moves), kf (adaptive keyframes), ba (weighted bundle adjustment),
-  /// loop (loop closing). Throws InputError for any other, which `where` opens.
+  /// loop (loop closing). Blanks do not matter. Throws InputError for any other, which `where` opens.
   void disable(const std::string& parts, const std::string& where = "");
   /// The preset and every setting, a line each with its unit, meaning, range and default; experiments that were set.
   std::string to_yaml() const;

@@ -13,11 +13,9 @@ std::string setting_text(const py::handle& value) {
   return py::str(value);
 }
 
-// Parts to switch off, by comma, without blanks.
+// Parts to switch off, by comma.
 std::string disabled(const py::kwargs& a) {
-  auto list = argument<std::string>(a["disable"], "disable", "a str, parts by comma");
-  std::erase(list, ' ');
-  return list;
+  return argument<std::string>(a["disable"], "disable", "a str, parts by comma");
 }
 
 std::string text_or_empty(const py::kwargs& a, const char* name) {

@@ -13,7 +13,8 @@ constexpr int64_t kMaxGyroGap = 100'000'000;  // [ns] the same of angular veloci
 constexpr int64_t kMaxAhead = 100'000'000;    // [ns] beyond the newest message
 constexpr size_t kMaxMessages = 4000;         // 10 s at 400 Hz
 constexpr int kMostRefused = 10;              // messages in a row
-// The library's recordings are read with the same numbers: src/dkb/dataset/odometry_track.h and recorded_motion.cpp.
+// The library reads recordings with the same numbers and a drift of 0.01: src/dkb/dataset/odometry_track.h and
+// src/dkb/recordings/recorded_motion.cpp.
 constexpr double kMinSd = 1e-3;      // [m, rad] of any motion: wheels slip and shake
 constexpr double kDriftLength = 10;  // [m, rad] that the drift is told for
 constexpr double kGyroBias = 0.01;   // [rad/s] standard deviation of what a gyroscope shows at rest

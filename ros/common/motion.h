@@ -41,8 +41,8 @@ class OdometryHistory {
 
   // The motion of the child frame; its covariance is that of a right perturbation in the child frame's axes: in each
   // direction the growth of the pose's; else, where that tells nothing, the twist's; else that of the drift; and 1 mm
-  // and 1 mrad. So it is in recordings, too. Poses are interpolated, and carried on by the twist for at most 0.1 s
-  // after the newest. Nothing where messages are missing.
+  // and 1 mrad. So it is in recordings, too, with a drift of 0.01. Poses are interpolated, and carried on by the twist
+  // for at most 0.1 s after the newest. Nothing where messages are missing.
   std::optional<dkb::MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
 
  private:

@@ -84,8 +84,9 @@ void check_kinds(const DetectorChoice& choice, bool has_model) {
                      (choice.masks.empty() ? "" : "; --masks goes with any other detector, --detector none too"));
 }
 
-DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice) {
+DetectorChoice choice_beside(const Options& options, std::string disabled, DetectorChoice choice) {
   if (options.dynamics.filter != FilterKind::none) return choice;
+  std::erase(disabled, ' ');
   const bool asked_for = ("," + disabled + ",").find(",dr,") != std::string::npos || options.preset() == "orb";
   if (asked_for) choice.masks.clear();
   choice.kinds = "none";

@@ -28,6 +28,6 @@ void check_kinds(const DetectorChoice& choice, bool has_model);
 
 // What of the choice holds beside the options: without a filter nothing is detected.
 // `disabled`: the parts given to Options::disable(); without `dr` masks are not read either.
-DetectorChoice choice_beside(const Options& options, const std::string& disabled, DetectorChoice choice);
+DetectorChoice choice_beside(const Options& options, std::string disabled, DetectorChoice choice);
 
 }  // namespace dkb

@@ -99,10 +99,6 @@ std::string movers_to_csv(const MoverRows& rows) {
   return out;
 }
 
-void write_movers(const std::filesystem::path& path, const MoverRows& rows) {
-  write_file_atomically(path, movers_to_csv(rows));
-}
-
 MoverRows parse_movers(std::string_view text, const std::string& name) {
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
   MoverRows rows;

@@ -25,8 +25,7 @@ using MoverRows = std::vector<MoverRow>;  // by time; within a frame in the file
 // white space in class names become '_'; an empty class, "object".
 double velocity_sd(const Mover& mover);  // [m/s] of each coordinate, as the file has it
 std::string movers_to_csv(const MoverRows& rows);
-std::string written_class(std::string class_name);                            // in one word, as it stands there
-void write_movers(const std::filesystem::path& path, const MoverRows& rows);  // throws OutputError
+std::string written_class(std::string class_name);  // in one word, as it stands there
 
 // The same format; the last column may be missing, as in files of 0.2.0 and of the simulator. CRLF, a byte order mark
 // and empty lines are tolerated. Throws InputError `name:line: ...` for another header, another number of columns,

@@ -2,13 +2,12 @@
 #include "dkb/dataset/movers_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/files.h"
 #include "dkb/util/random.h"
 #include "dkb/util/test_errors.h"
+#include "dkb/util/test_folder.h"
 
 namespace dkb {
 namespace {
@@ -57,11 +56,9 @@ TEST(MoversFile, ByteOrderMarksCarriageReturnsAndEmptyLinesAreTolerated) {
 }
 
 TEST(MoversFile, WhatIsWrittenIsReadBack) {
-  const std::filesystem::path path =
-      std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "movers_file_test.csv");
-  write_movers(path, {example()});
-  EXPECT_EQ(read_movers(path), (MoverRows{example()}));
-  std::filesystem::remove(path);
+  const test::TempFolder temp;
+  write_file_atomically(temp / "movers.csv", movers_to_csv({example()}));
+  EXPECT_EQ(read_movers(temp / "movers.csv"), (MoverRows{example()}));
 }
 
 TEST(MoversFile, ClassNamesStayOneColumn) {

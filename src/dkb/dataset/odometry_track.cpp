@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "dkb/dataset/reader_source.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/one_line.h"
 #include "dkb/util/stamps.h"
 #include "dkb/util/text_rows.h"
 
@@ -64,6 +64,7 @@ std::optional<MotionPrior> OdometryTrack::between(double before, double now) con
   const Rigid3 motion = from->inverse() * *to;
   prior.previous_from_current = motion;
   prior.covariance = drift_covariance(drift_, motion.translation.norm(), vector_from_rotation(motion.rotation).norm());
+  if (!is_plausible(prior)) return std::nullopt;
   return prior;
 }
 
@@ -73,7 +74,10 @@ OdometryTrack read_odometry(const std::filesystem::path& path) {
   constexpr std::string_view key = "# drift ";
   if (text.starts_with(key)) {
     const std::string_view value = std::string_view(text).substr(key.size(), text.find_first_of("\r\n") - key.size());
-    drift = std::abs(read_number(value, path.string() + ":1", "drift"));
+    drift = read_number(value, path.string() + ":1", "drift");
+    if (!(drift >= 0 && drift <= 1))
+      throw InputError(path.string() + ":1: drift " + excerpt(value) +
+                       " is out of range; it is the share of a way that its length is off by, 0 ... 1");
   }
   Trajectory poses = parse_trajectory(text, path.string());
   const auto same_time = [](const StampedPose& a, const StampedPose& b) { return a.timestamp == b.timestamp; };

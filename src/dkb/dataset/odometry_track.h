@@ -13,6 +13,7 @@ namespace dkb {
 inline constexpr double kUsualDrift = 0.01;     // share of a way, of wheels on a floor
 inline constexpr double kMaxOdometryGap = 0.5;  // [s] between poses that motion is interpolated over
 inline constexpr double kMinOdometrySd = 1e-3;  // [m, rad] of any motion: wheels slip and shake
+inline constexpr double kFarthestMotion = 1e6;  // [m] no camera moves so far between two frames
 
 // The variance [m^2, rad^2] of a motion over `way` [m, rad] by a sensor that is off by the share `drift` of it. Drift
 // is systematic: over 10 m the standard deviation is that of the drift, over a shorter way more, since a sum of
@@ -23,12 +24,20 @@ inline double drift_variance(double drift, double way) {
 }
 
 // Of a motion by wheels over `distance` [m] and `angle` [rad]: the way and the heading are off by the drift of the way,
-// the heading by the usual drift of the turn as well. ros/common/motion.cpp has the same numbers.
+// the heading by the usual drift of the turn as well. ros/common/motion.cpp gives the same where its prior_drift is the
+// usual one; another is that of its turns, too.
 inline Matrix6d drift_covariance(double drift, double distance, double angle) {
   Matrix6d covariance = Matrix6d::Identity() * (kMinOdometrySd * kMinOdometrySd);
   covariance.diagonal().head<3>().array() += drift_variance(drift, distance);
   covariance.diagonal().tail<3>().array() += drift_variance(drift, distance) + drift_variance(kUsualDrift, angle);
   return covariance;
+}
+
+// Whether a motion can be one. Poses of finite numbers may have differences that are not.
+inline bool is_plausible(const MotionPrior& prior) {
+  const Rigid3& motion = prior.previous_from_current;
+  return motion.translation.norm() < kFarthestMotion && motion.rotation.coeffs().allFinite() &&
+         prior.covariance.allFinite();
 }
 
 // The pose at `share` (0 ... 1) of the way from one to another.
@@ -44,7 +53,8 @@ class OdometryTrack {
   // length is off by, and the heading [rad/m]; a turn is off by 1% as well. Stamps must rise.
   OdometryTrack(Trajectory odom_from_body, double drift);
 
-  // Nothing when one of the times [s] lies outside of the track, or in a gap of more than half a second.
+  // Nothing when one of the times [s] lies outside of the track, or in a gap of more than half a second, and when the
+  // poses there are too far apart to be true.
   std::optional<MotionPrior> between(double before, double now) const;
   double first() const { return poses_.front().timestamp; }  // [s]
   double last() const { return poses_.back().timestamp; }
@@ -56,8 +66,8 @@ class OdometryTrack {
   double drift_;
 };
 
-// A trajectory file in TUM format whose relative motion is taken; a first line `# drift D` says how good it is, without
-// one it is taken for 1 %. Throws InputError with file and line.
+// A trajectory file in TUM format whose relative motion is taken. A first line `# drift D`, 0 ... 1, says how good it
+// is; without one it is taken for 1 %. Throws InputError with file and line.
 OdometryTrack read_odometry(const std::filesystem::path& path);
 
 // The frames of a source with priors by a track.

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "dkb/util/errors.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -60,6 +61,12 @@ TEST(OdometryTrack, ATurnOnTheSpotIsAsUncertainAsItIsLarge) {
   EXPECT_NEAR(way(0, 0), 1e-6 + 3e-4, 1e-9);
 }
 
+TEST(OdometryTrack, WildPosesTellNothing) {
+  const double far = 1e200;  // its square is infinite
+  const OdometryTrack track({pose(1, 0), pose(1.1, far), pose(1.2, -far), pose(1.3, 0), pose(1.4, 2e6)}, 0.01);
+  for (const double from : {1.0, 1.1, 1.2, 1.3}) EXPECT_FALSE(track.between(from, from + 0.1)) << from;
+}
+
 TEST(OdometryTrack, AFileSaysHowGoodItIs) {
   const auto folder = std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "odometry_track");
   std::filesystem::create_directories(folder);
@@ -74,6 +81,13 @@ TEST(OdometryTrack, AFileSaysHowGoodItIs) {
     FAIL() << "it was read";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("bad.txt:1: "), std::string::npos) << error.what();
+  }
+  for (const char* drift : {"1e160", "-0.05", "1.01"}) {
+    std::ofstream(bad) << "# drift " << drift << "\n1 0 0 0 0 0 0 1\n1.1 1 0 0 0 0 0 1\n";
+    EXPECT_EQ(test::input_error_of([&] { read_odometry(bad); }),
+              bad.string() + ":1: drift " + drift +
+                  " is out of range; it is the share of a way that its length is off by, 0 ... 1")
+        << drift;
   }
   std::ofstream(bad) << "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
   EXPECT_THROW(read_odometry(bad), InputError) << "no motion in it";

@@ -44,22 +44,14 @@ void decode_any(const OpenedImage& image, const CameraModel& camera) {
 }
 
 // Headers tell type and size; where one is wrong the pixels are decoded as well, to tell a wrong dataset from a single
-// broken file. A wrong depth image counts for more than a broken colour image.
+// broken file.
 std::string mismatch(const DatasetPair& pair, const CameraModel& camera, bool fit_colour) {
-  std::optional<InputError> broken;
-  for (const bool is_depth : {false, true}) {
-    try {
-      const OpenedImage image = open_image(is_depth ? pair.depth_path : pair.colour_path);
-      const std::string wrong = mismatch(image, is_depth, camera, fit_colour);
-      if (wrong.empty()) continue;
-      decode_any(image, camera);
-      return wrong;
-    } catch (const InputError& e) {
-      if (!broken) broken = e;
-    }
-  }
-  if (broken) throw InputError(*broken);
-  return "";
+  return pair_mismatch([&](bool is_depth) {
+    const OpenedImage image = open_image(is_depth ? pair.depth_path : pair.colour_path);
+    const std::string wrong = mismatch(image, is_depth, camera, fit_colour);
+    if (!wrong.empty()) decode_any(image, camera);
+    return wrong;
+  });
 }
 
 std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& camera, bool fit_colour) {
@@ -82,6 +74,19 @@ std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& ca
 }
 
 }  // namespace
+
+std::string pair_mismatch(const std::function<std::string(bool is_depth)>& of_image) {
+  std::optional<InputError> broken;
+  for (const bool is_depth : {false, true}) {
+    try {
+      if (std::string wrong = of_image(is_depth); !wrong.empty()) return wrong;
+    } catch (const InputError& e) {
+      if (!broken) broken = e;
+    }
+  }
+  if (broken) throw InputError(*broken);
+  return "";
+}
 
 std::string size_mismatch(const std::string& name, int width, int height, const CameraModel& camera) {
   if (width == camera.width && height == camera.height) return "";

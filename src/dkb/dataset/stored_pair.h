@@ -35,6 +35,10 @@ using PairStream = std::function<std::optional<StoredPair>()>;
 // camera's, to which depth belongs.
 PairStream pairs_in_files(std::vector<DatasetPair> pairs, const CameraModel& camera, bool fit_colour = false);
 
+// What is wrong with a pair, by what `of_image` says of each of its two: a wrong depth image counts for more than a
+// broken colour image. Throws InputError when an image is broken and the other one not wrong.
+std::string pair_mismatch(const std::function<std::string(bool is_depth)>& of_image);
+
 // Empty when an image has the camera's size; else what is wrong, for people.
 std::string size_mismatch(const std::string& name, int width, int height, const CameraModel& camera);
 // The same of an image amid others that fit.

@@ -35,11 +35,11 @@ struct TumDataset {
   size_t unpaired = 0;             // images without a partner, of the whole folder
 };
 
-// Whether a folder is in TUM layout, by what lies in it.
 // What a folder holds in the place of files with these endings: ", but .bmp; colour is PNG or JPEG, ..."; empty where
 // it holds nothing else.
 std::string other_endings(const std::filesystem::path& folder, const std::vector<std::string>& endings);
 
+// Whether a folder is in TUM layout, by what lies in it.
 bool has_tum_lists(const std::filesystem::path& folder);
 
 // Reads the lists of a folder in TUM layout (no image is opened): the rows of associations.txt as they are

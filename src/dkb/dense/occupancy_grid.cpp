@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "dkb/map/map_suffix.h"
+
 namespace dkb {
 namespace {
 
@@ -146,8 +148,8 @@ std::string occupancy_yaml(const OccupancyGrid& grid, const std::string& image) 
       "free_thresh: 0.196\n"
       "# Map frame (z up, z = 0 on the floor) from the world of trajectory{}.txt: x y z qx qy qz qw\n"
       "floor_from_world: [{:.6f}, {:.6f}, {:.6f}, {:.7f}, {:.7f}, {:.7f}, {:.7f}]\n",
-      image, grid.cell, grid.origin_x, grid.origin_y, grid.map > 0 ? fmt::format("_map{}", grid.map + 1) : "", t.x(),
-      t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+      image, grid.cell, grid.origin_x, grid.origin_y, map_suffix(static_cast<size_t>(grid.map)), t.x(), t.y(), t.z(),
+      q.x(), q.y(), q.z(), q.w());
 }
 
 }  // namespace dkb

@@ -267,7 +267,8 @@ class OniFile final : public ImageDevice {
 Camera camera_of(const OniFile& file, const std::string& name, const SourceOptions& options) {
   const Stream& stream = file.colour();
   Camera told;
-  told.width = stream.width, told.height = stream.height, told.fps = std::clamp(stream.fps, 1, 1000);
+  told.width = stream.width, told.height = stream.height;
+  told.fps = std::clamp(stream.fps, 0, 1000);  // 0: as the first stamps say
   told.fx = told.fy = 0;
   if (stream.horizontal_fov > 0 && stream.vertical_fov > 0) {
     told.fx = stream.width / (2 * std::tan(stream.horizontal_fov / 2));

@@ -129,6 +129,17 @@ TEST_F(OniFiles, ImagesWithStampsBeyondAllTimesAreLeftOut) {
   }
 }
 
+TEST_F(OniFiles, ARateThatIsNotToldIsNotKnown) {
+  for (const auto& [told, rate] : {std::pair(0, 0), std::pair(-5, 0), std::pair(60, 60), std::pair(5000, 1000)}) {
+    std::string bytes = recording();
+    const std::string usual = raw<int32_t>(16) + raw<int32_t>(30);
+    for (size_t at = bytes.find(usual); at != std::string::npos; at = bytes.find(usual, at + 1))
+      bytes.replace(at + 4, 4, raw<int32_t>(told));
+    write(bytes);
+    EXPECT_EQ(open_oni_file(path, {})->camera().fps, rate);
+  }
+}
+
 TEST_F(OniFiles, WhatIsWrongIsNamed) {
   EXPECT_EQ(error(), "cannot be opened");
   write("NI");

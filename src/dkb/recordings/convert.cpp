@@ -244,7 +244,9 @@ class PairsToFolder {
 Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs::path& out,
                             const ConvertOptions& options) {
   std::string text = camera_text_of(in, options);
-  RecordingContents contents = look_into(stream, options.source, in.string());
+  SourceOptions reading = options.source;
+  reading.prior = PriorKind::none;  // a folder has no room for motion
+  RecordingContents contents = look_into(stream, reading, in.string());
   for (const std::string& line : contents.warnings) options.warn(line);
   if (text.empty()) {
     if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = 1000;  // as the integers are stored

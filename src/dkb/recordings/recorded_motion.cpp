@@ -80,13 +80,9 @@ void RecordedMotion::forget_before(int64_t stamp_ns) {
 }
 
 std::optional<MotionPrior> RecordedMotion::between(int64_t from_ns, int64_t to_ns) const {
-  constexpr double kFarthest = 1e6;  // [m]
   if (to_ns <= from_ns) return std::nullopt;
   std::optional<MotionPrior> prior = inertial_ ? by_rates(from_ns, to_ns) : by_poses(from_ns, to_ns);
-  // Numbers that are finite may have differences that are not.
-  if (prior && !(prior->previous_from_current.translation.norm() < kFarthest &&
-                 prior->previous_from_current.rotation.coeffs().allFinite() && prior->covariance.allFinite()))
-    prior.reset();
+  if (prior && !is_plausible(*prior)) prior.reset();
   return prior;
 }
 

@@ -51,19 +51,9 @@ std::string RecordedPairs::Channel::mismatch(const StampPairing::Stored& message
   return wrong;
 }
 
-// As with files: a wrong depth image counts for more than a broken colour image.
 std::string RecordedPairs::Decoder::mismatch(const StampPairing::Pair& pair) const {
-  std::optional<InputError> broken;
-  for (const bool is_depth : {false, true}) {
-    try {
-      const std::string wrong = is_depth ? depth.mismatch(pair.depth) : colour.mismatch(pair.colour);
-      if (!wrong.empty()) return wrong;
-    } catch (const InputError& e) {
-      if (!broken) broken = e;
-    }
-  }
-  if (broken) throw InputError(*broken);
-  return "";
+  return pair_mismatch(
+      [&](bool is_depth) { return is_depth ? depth.mismatch(pair.depth) : colour.mismatch(pair.colour); });
 }
 
 std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pair& pair) const {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -90,7 +91,7 @@ void write_lists(const Simulator& simulator, const std::vector<FrameRecord>& rec
   write_trajectory(folder / "groundtruth.txt", truth);
   if (const auto drift = simulator.odometry_drift())
     write_file_atomically(folder / "odometry.txt",
-                          fmt::format("# drift {}\n", *drift) +
+                          fmt::format("# drift {}\n", std::abs(*drift)) +
                               trajectory_to_text(wheel_odometry(records, *drift, simulator.up_in_world())));
   write_file_atomically(folder / "boxes.txt", boxes);
   write_file_atomically(folder / "movers.csv", movers);

@@ -66,6 +66,14 @@ TEST(SequenceWriter, WhatIsInterruptedDoesNotLookWhole) {
     EXPECT_FALSE(fs::exists(folder / list)) << list;
 }
 
+TEST(SequenceWriter, WheelsThatTellTooLittleAreSaidToBeAsGood) {
+  const test::TempFolder folder;
+  SimulatorOptions o = small("room", 2);
+  o.odometry_drift = -0.125;
+  write_sequence(Simulator(o), folder.path());
+  EXPECT_TRUE(read_file(folder / "odometry.txt").starts_with("# drift 0.125\n"));
+}
+
 TEST(SequenceWriter, OdometryOfAPathDriftsAboutTheVerticalOfItsWorld) {
   const test::TempFolder folder;
   // The world is that of an upright camera: its y axis points down.

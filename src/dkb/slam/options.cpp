@@ -246,7 +246,9 @@ void Options::load(const std::filesystem::path& path) {
 
 void Options::disable(const std::string& list, const std::string& where) {
   const std::vector<std::string> known = {"dr", "kf", "ba", "loop"};
-  std::istringstream names(list);
+  std::string parts = list;
+  std::erase(parts, ' ');
+  std::istringstream names(parts);
   for (std::string name; std::getline(names, name, ',');) {
     if (name == "dr")
       dynamics.filter = FilterKind::none;

@@ -201,6 +201,13 @@ TEST(Options, APartThatIsNotThereIsToldAsTheCallerSays) {
   EXPECT_EQ(test::input_error_of([&] { options.disable("bs", "--disable"); }), "--disable" + what);
 }
 
+TEST(Options, BlanksAmongDisabledPartsDoNotMatter) {
+  Options options;
+  options.disable(" kf , ba");
+  EXPECT_EQ(options.keyframes.policy, KeyframePolicyKind::baseline);
+  EXPECT_FALSE(options.mapping.ba.weighted);
+}
+
 TEST(Presets, TheOrbOneIsThePapersWithItsPartsOff) {
   Options paper("paper");
   paper.disable("dr,kf,ba");
