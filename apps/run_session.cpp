@@ -144,7 +144,7 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   r.statistics = statistics_with(slam, facts);
   r.trajectory = trajectory;
   r.poses_of_map = facts.poses_of_map;
-  r.settings = report::changed_settings(options.to_yaml(), Options().to_yaml());
+  r.settings = report::changed_settings(options);
   r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
   r.seed = options.seed;
   r.choices = {{"source", args.source},

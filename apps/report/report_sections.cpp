@@ -293,9 +293,9 @@ std::string settings_section(const Context& c) {
   out += "</table></div>\n";
   if (c.facts.settings.empty()) return out + "<p>All settings are the default ones.</p>\n</main>\n";
   out += "<div class=\"wide\"><table>\n<tr><th>setting that differs</th><th>here</th><th>default</th></tr>\n";
-  for (const ChangedSetting& s : c.facts.settings)
+  for (const Setting& s : c.facts.settings)
     out += "<tr><td>" + svg::escaped(s.key) + "</td><td>" + svg::escaped(s.value) + "</td><td>" +
-           svg::escaped(s.usual) + "</td></tr>\n";
+           svg::escaped(s.initial) + "</td></tr>\n";
   return out + "</table></div>\n</main>\n";
 }
 

@@ -2,7 +2,6 @@
 #include "report/run_report.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <limits>
 
@@ -13,32 +12,14 @@
 #include "report/report_sections.h"
 
 namespace dkb::report {
-namespace {
 
-void flatten(const YAML::Node& node, const std::string& key, std::vector<std::pair<std::string, std::string>>& out) {
-  if (!node.IsMap()) {
-    out.emplace_back(key, node.IsScalar() ? node.Scalar() : YAML::Dump(node));
-    return;
-  }
-  for (const auto& entry : node)
-    flatten(entry.second, (key.empty() ? "" : key + ".") + entry.first.as<std::string>(), out);
-}
-
-std::vector<std::pair<std::string, std::string>> flattened(const std::string& yaml) {
-  std::vector<std::pair<std::string, std::string>> out;
-  flatten(YAML::Load(yaml), "", out);
-  return out;
-}
-
-}  // namespace
-
-std::vector<ChangedSetting> changed_settings(const std::string& effective, const std::string& usual) {
-  std::map<std::string, std::string> before;
-  for (auto& [key, value] : flattened(usual)) before[key] = value;
-  std::vector<ChangedSetting> changed;
-  for (const auto& [key, value] : flattened(effective))
-    if (const auto it = before.find(key); it == before.end() || it->second != value)
-      changed.push_back({key, value, it == before.end() ? "" : it->second});
+std::vector<Setting> changed_settings(const Options& options) {
+  const std::string usual = Options().preset();
+  std::vector<Setting> changed = options.settings();
+  // An experiment that is set to its default may differ from the preset.
+  std::erase_if(changed,
+                [&](const Setting& s) { return s.value == s.initial && !options.experiments().contains(s.key); });
+  if (options.preset() != usual) changed.insert(changed.begin(), {"preset", options.preset(), usual, ""});
   return changed;
 }
 

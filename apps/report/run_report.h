@@ -14,11 +14,8 @@
 
 namespace dkb::report {
 
-struct ChangedSetting {
-  std::string key, value, usual;
-};
-// Settings in which two texts of Options::to_yaml() differ.
-std::vector<ChangedSetting> changed_settings(const std::string& effective, const std::string& usual);
+// The preset, and settings that are not what they are by default; experiments that were set.
+std::vector<Setting> changed_settings(const Options& options);
 
 // What a run says of itself at its end.
 struct ReportFacts {
@@ -33,7 +30,7 @@ struct ReportFacts {
   Statistics statistics;             // with the stages of all threads
   Trajectory trajectory;             // of the first map, as in trajectory.txt
   std::vector<size_t> poses_of_map;  // in trajectory.txt, trajectory_map2.txt ...
-  std::vector<ChangedSetting> settings;
+  std::vector<Setting> settings;     // by changed_settings()
   CauseLimits limits;
   uint64_t seed = 1;  // picks the random pictures
 };

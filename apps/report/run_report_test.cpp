@@ -20,13 +20,20 @@ TEST(Base64, EncodesAsRfc4648Says) {
 }
 
 TEST(ChangedSettings, AreThoseThatDifferWithTheirWholeKey) {
-  const auto changed = changed_settings("preset: paper\na:\n  b: 2  # two\n  c: 3\nexperiment.x: 1\n",
-                                        "preset: default\na:\n  b: 2\n  c: 4\n");
-  ASSERT_EQ(changed.size(), 3u);
-  EXPECT_EQ(changed[1].key, "a.c");
-  EXPECT_EQ(changed[1].value, "3");
-  EXPECT_EQ(changed[1].usual, "4");
-  EXPECT_EQ(changed[2].usual, "");
+  EXPECT_TRUE(changed_settings(Options()).empty());
+  Options options;
+  options.set("features.count", "950");
+  options.set("experiment.smooth_trajectory", "true");  // as it is by default
+  const auto changed = changed_settings(options);
+  ASSERT_EQ(changed.size(), 2u);
+  EXPECT_EQ(changed[0].key, "experiment.smooth_trajectory");
+  EXPECT_EQ(changed[1].key, "features.count");
+  EXPECT_EQ(changed[1].value, "950");
+  EXPECT_EQ(changed[1].initial, "900");
+  const auto of_preset = changed_settings(Options("orb"));
+  EXPECT_EQ(of_preset[0].key, "preset");
+  EXPECT_EQ(of_preset[0].value, "orb");
+  EXPECT_EQ(of_preset[0].initial, "default");
 }
 
 TEST(UpAxis, IsWhereCamerasHaveTheirTop) {

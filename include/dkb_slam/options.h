@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -29,6 +30,27 @@ enum class FilterKind {
 enum class KeyframePolicyKind {
   adaptive,  ///< parallax, match quality and visibility (DKB section 3.2)
   baseline,  ///< fewer than 85% of the reference keyframe's points, or few near ones (ORB-SLAM2)
+};
+
+/// Of which type a setting is.
+enum class SettingKind {
+  boolean,  ///< "true" or "false"
+  whole,    ///< a whole number
+  number,   ///< any finite number
+  name,     ///< one of its choices
+};
+
+/// One setting as it stands, for programs that show, declare or document all of them.
+struct Setting {
+  std::string key;      ///< as in config.yaml, with dots: "features.count"
+  std::string value;    ///< as text that Options::set() takes
+  std::string initial;  ///< the same of preset "default"
+  std::string meaning;  ///< with the unit in front: "[m] side of a voxel of the dense map"
+  SettingKind kind = SettingKind::number;
+  double min = -std::numeric_limits<double>::infinity();  ///< of a number; infinite where no limit is set
+  double max = std::numeric_limits<double>::infinity();   ///< likewise
+  bool above_min = false;                                 ///< `min` itself is out
+  std::vector<std::string> choices = {};                  ///< of a name
 };
 
 /// The settings of config.yaml, by the names they have there, and what programs alone set. Fields may be set directly;
@@ -136,6 +158,8 @@ class DKB_SLAM_API Options {
   void disable(const std::string& parts, const std::string& where = "");
   /// The preset and every setting, a line each with its unit, meaning, range and default; experiments that were set.
   std::string to_yaml() const;
+  /// The same as a list, by key, without the preset.
+  std::vector<Setting> settings() const;
   /// Throws InvalidOption naming the whole key.
   void check() const;
 

@@ -52,66 +52,13 @@ std::vector<ParameterDescription> own_parameters() {
   };
 }
 
-// "0.01 ... 1", "above 0, at most 2", "at least 1", or names by comma.
-void read_range(const std::string& text, ParameterDescription* d) {
-  std::istringstream in(text);
-  const size_t dots = text.find(" ... ");
-  if (dots != std::string::npos) {
-    d->min = std::stod(text.substr(0, dots));
-    d->max = std::stod(text.substr(dots + 5));
-    return;
-  }
-  const auto number_after = [&](const std::string& word, double otherwise) {
-    const size_t at = text.find(word + " ");
-    return at == std::string::npos ? otherwise : std::stod(text.substr(at + word.size() + 1));
-  };
-  d->min = number_after("at least", number_after("above", -kInf));
-  d->max = number_after("at most", kInf);
-  if (!std::holds_alternative<std::string>(d->initial)) return;
-  for (std::string name; in >> name;) {
-    if (name.back() == ',') name.pop_back();
-    d->choices.push_back(name);
-  }
-}
-
-// The library writes its settings as YAML, a line each: "  count: 1000  # [features] wanted (at least 1; default
-// 1000)".
 std::vector<ParameterDescription> settings() {
   std::vector<ParameterDescription> found;
-  std::istringstream yaml{dkb::Options().to_yaml()};
-  std::vector<std::string> sections;
-  for (std::string line; std::getline(yaml, line);) {
-    const size_t indent = line.find_first_not_of(' '), colon = line.find(':');
-    if (indent == std::string::npos || colon == std::string::npos) continue;
-    sections.resize(indent / 2);
-    std::string key = line.substr(indent, colon - indent);
-    const size_t comment = line.find("  # ", colon);
-    if (comment == std::string::npos) {  // a section
-      sections.push_back(key);
-      continue;
-    }
-    if (key == "preset") continue;
-    std::string name;
-    for (const std::string& s : sections) name += s + ".";
-    const std::string value = line.substr(colon + 2, comment - colon - 2);
-    const size_t notes = line.rfind(" ("), fallback = line.rfind("default ");
-    const std::string range = fallback > notes + 2 ? line.substr(notes + 2, fallback - notes - 4) : "";
-    ParameterDescription d{name + key, value, line.substr(comment + 4, notes - comment - 4)};
-    char* end = nullptr;
-    const double number = std::strtod(value.c_str(), &end);
-    const bool is_number = end != value.c_str() && *end == '\0';
-    const bool is_count = is_number && value.find_first_of(".e") == std::string::npos;
-    if (value == "true" || value == "false")
-      d.initial = value == "true";
-    else if (is_number)
-      d.initial = number;
-    read_range(range, &d);
-    // What the library keeps as a whole number refuses a fraction.
-    if (is_count) try {
-        dkb::Options().set(d.name, value + ".5");
-      } catch (const dkb::InputError&) {
-        d.initial = static_cast<int64_t>(number);
-      }
+  for (const dkb::Setting& s : dkb::Options().settings()) {
+    ParameterDescription d{s.key, s.initial, s.meaning, s.min, s.max, s.choices};
+    if (s.kind == dkb::SettingKind::boolean) d.initial = s.initial == "true";
+    if (s.kind == dkb::SettingKind::whole) d.initial = int64_t{std::stoll(s.initial)};
+    if (s.kind == dkb::SettingKind::number) d.initial = std::stod(s.initial);
     found.push_back(std::move(d));
   }
   return found;

@@ -144,6 +144,20 @@ void bind_experiments(Settings& s, SlamOptions& o) {
   s.bind("experiment.dynamics.paper.compensate", &paper.compensate, "flow against the camera's own motion");
 }
 
+// Every setting, and the experiments that were set.
+std::vector<SettingEntry> entries_of(const Options& options) {
+  Options values;
+  SlamOptions experimental;
+  Settings settings;
+  bind_settings(settings, values);
+  bind_experiments(settings, experimental);
+  values = options;
+  for (const auto& [key, value] : options.experiments()) settings.set(key, value, "experiments");
+  std::vector<SettingEntry> entries = settings.entries();
+  std::erase_if(entries, [](const SettingEntry& e) { return e.key.starts_with(kExperiment) && e.where.empty(); });
+  return entries;
+}
+
 // The stages' options that a preset stands for.
 SlamOptions preset_options(const std::string& name, const std::string& where) {
   const std::vector<std::string> names = {"default", "paper", "orb"};
@@ -265,20 +279,18 @@ void Options::disable(const std::string& list, const std::string& where) {
 }
 
 std::string Options::to_yaml() const {
-  Options values;
-  SlamOptions experimental;
-  Settings settings;
-  bind_settings(settings, values);
-  bind_experiments(settings, experimental);
-  values = *this;
-  for (const auto& [key, value] : experiments_) settings.set(key, value, "experiments");
-  std::vector<SettingEntry> written;
-  for (SettingEntry& e : settings.entries()) {
-    if (e.key.starts_with(kExperiment) && e.where.empty()) continue;
+  std::vector<SettingEntry> entries = entries_of(*this);
+  for (SettingEntry& e : entries)
     e.doc += " (" + (e.range.empty() ? "" : e.range + "; ") + "default " + e.initial + ")";
-    written.push_back(std::move(e));
-  }
-  return "preset: " + preset_ + "  # what the settings below started from\n" + settings_yaml(written);
+  return "preset: " + preset_ + "  # what the settings below started from\n" + settings_yaml(entries);
+}
+
+std::vector<Setting> Options::settings() const {
+  std::vector<Setting> all;
+  for (SettingEntry& e : entries_of(*this))
+    all.push_back(
+        {e.key, e.value, e.initial, e.doc, e.kind, e.limits.min, e.limits.max, e.limits.above_min, e.choices});
+  return all;
 }
 
 void Options::check() const {

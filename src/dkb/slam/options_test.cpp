@@ -56,6 +56,30 @@ TEST(Options, AreFortyAtMostAndALineEach) {
     }
 }
 
+TEST(Options, TheirListSaysWhatMayBeSet) {
+  Options options;
+  options.set("features.count", "950");
+  const std::vector<Setting> all = options.settings();
+  const auto found = [&](const std::string& key) {
+    return *std::find_if(all.begin(), all.end(), [&](const Setting& s) { return s.key == key; });
+  };
+  EXPECT_EQ(all.size() + 2, lines_of(settings_table()).size());
+  const Setting count = found("features.count"), scale = found("features.scale"), filter = found("dynamics.filter");
+  EXPECT_EQ(count.value, "950");
+  EXPECT_EQ(count.initial, "900");
+  EXPECT_EQ(count.meaning, "[features] wanted per image");
+  EXPECT_EQ(count.kind, SettingKind::whole);
+  EXPECT_EQ(count.min, 1);
+  EXPECT_EQ(count.max, 8000);
+  EXPECT_EQ(scale.kind, SettingKind::number);
+  EXPECT_TRUE(scale.above_min);
+  EXPECT_EQ(filter.kind, SettingKind::name);
+  EXPECT_EQ(filter.choices, (std::vector<std::string>{"none", "box", "epipolar", "multiview", "paper", "default"}));
+  EXPECT_EQ(found("loop.enabled").kind, SettingKind::boolean);
+  for (const Setting& s : all) EXPECT_NO_THROW(options.set(s.key, s.initial)) << s.key;
+  EXPECT_EQ(options.to_yaml(), Options().to_yaml());
+}
+
 TEST(Options, DefaultsOfTheHeaderAreThoseOfTheStages) {
   Options header;
   header.seed = 1;

@@ -148,7 +148,8 @@ void Settings::bind_number(const std::string& key, Number* field, const std::str
                                                       : "a whole number, not negative";
   add(key, {doc, type, range.text(), [field](const std::string& text) { return read_number(text, field); },
             [field] { return number_to_text(*field); },
-            [field, range] { return range.contains(static_cast<double>(*field)); }});
+            [field, range] { return range.contains(static_cast<double>(*field)); },
+            std::is_floating_point_v<Number> ? SettingKind::number : SettingKind::whole, range});
 }
 
 void Settings::bind(const std::string& key, int* field, const std::string& doc, const Range& range) {
@@ -168,7 +169,7 @@ void Settings::bind(const std::string& key, bool* field, const std::string& doc)
               *field = text == "true";
               return true;
             },
-            [field] { return std::string(*field ? "true" : "false"); }, [] { return true; }});
+            [field] { return std::string(*field ? "true" : "false"); }, [] { return true; }, SettingKind::boolean});
 }
 
 void Settings::set(const std::string& key, const std::string& value, const std::string& where) {
@@ -276,8 +277,8 @@ std::string settings_yaml(const std::vector<SettingEntry>& entries) {
 
 std::vector<SettingEntry> Settings::entries() const {
   std::vector<SettingEntry> result;
-  for (const auto& [key, binding] : bindings_)
-    result.push_back({key, binding.write(), binding.doc, binding.where, binding.initial, binding.range});
+  for (const auto& [key, b] : bindings_)
+    result.push_back({key, b.write(), b.doc, b.where, b.initial, b.range, b.kind, b.limits, b.choices});
   return result;
 }
 

@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "dkb_slam/options.h"
+
 namespace dkb {
 
 // The candidate with the smallest edit distance (Levenshtein) to `name`, the first of equals; empty when none is near
@@ -28,18 +30,6 @@ std::string did_you_mean(std::string_view name, const std::vector<std::string>& 
 bool parse_number(std::string_view text, int64_t* value);
 bool parse_number(std::string_view text, double* value);  // accepts nan and inf, as strtod does
 
-// One setting as it stands.
-struct SettingEntry {
-  std::string key;              // dotted, e.g. "features.count"
-  std::string value;            // as written by to_yaml()
-  std::string doc;              // unit in brackets and meaning, e.g. "[px] border without features"
-  std::string where;            // where it was set ("--set", "file.yaml:7"); empty = default
-  std::string initial;          // the value when it was bound
-  std::string range;            // what it may be: "0.5 ... 20", "true, false", "red, green"; may be empty
-  std::string unit() const;     // of its doc
-  std::string meaning() const;  // its doc without the unit
-};
-
 // The numbers that a setting may take.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
@@ -49,6 +39,21 @@ struct Range {
     return (above_min ? value > min : value >= min) && value <= max && std::isfinite(value);
   }
   std::string text() const;  // "at least 1", "0 ... 1"; empty for all numbers
+};
+
+// One setting as it stands.
+struct SettingEntry {
+  std::string key;      // dotted, e.g. "features.count"
+  std::string value;    // as written by to_yaml()
+  std::string doc;      // unit in brackets and meaning, e.g. "[px] border without features"
+  std::string where;    // where it was set ("--set", "file.yaml:7"); empty = default
+  std::string initial;  // the value when it was bound
+  std::string range;    // what it may be: "0.5 ... 20", "true, false", "red, green"; may be empty
+  SettingKind kind = SettingKind::number;
+  Range limits;                      // of a number
+  std::vector<std::string> choices;  // of a name
+  std::string unit() const;          // of its doc
+  std::string meaning() const;       // its doc without the unit
 };
 
 // The values of an enum as text.
@@ -110,6 +115,9 @@ class Settings {
     std::function<bool(const std::string&)> read;  // false: not of this type; the field is unchanged then
     std::function<std::string()> write;
     std::function<bool()> in_range;
+    SettingKind kind = SettingKind::number;
+    Range limits = {};
+    std::vector<std::string> choices = {};
     std::string where = "", initial = "";
   };
   void add(const std::string& key, Binding binding);
@@ -123,7 +131,11 @@ template <class Enum>
 void Settings::bind(const std::string& key, Enum* field, const std::string& doc, const Names<Enum>& names) {
   Binding b;
   b.doc = doc;
-  for (size_t i = 0; i < names.size(); ++i) b.range += (i == 0 ? "" : ", ") + names[i].first;
+  b.kind = SettingKind::name;
+  for (const auto& [name, value] : names) {
+    b.range += (b.range.empty() ? "" : ", ") + name;
+    b.choices.push_back(name);
+  }
   b.expected = "one of " + b.range;
   b.read = [field, names](const std::string& text) {
     for (const auto& [name, value] : names)
