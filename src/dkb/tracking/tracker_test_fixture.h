@@ -76,7 +76,7 @@ class TrackerTest : public ::testing::Test {
       p.reference_scale = n.scale;
       p.descriptor = n.descriptor;
       map.add_point(p);
-      map.observe(n.id, packet.id, n.feature);
+      map.observe(n.id, packet.id, birth_feature(n.id));
     }
     map.update_covisibility(packet.id, 1);
   }
