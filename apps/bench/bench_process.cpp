@@ -24,7 +24,7 @@ std::string Ended::failure(const std::string& error_output) const {
   std::istringstream lines(error_output);
   for (std::string line; std::getline(lines, line);)
     if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
-  last = one_line(std::move(last));
+  last = one_line(last);
   if (last.starts_with("error: ")) last.erase(0, 7);
   if (last.size() > 300) {
     last.resize(300);

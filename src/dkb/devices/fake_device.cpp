@@ -187,8 +187,7 @@ FakePlace parse_fake_place(const std::string& where) {
     const std::string_view part = rest.substr(0, rest.find('&'));
     rest.remove_prefix(std::min(part.size() + 1, rest.size()));
     const size_t equals = part.find('=');
-    apply({one_line(std::string(part.substr(0, equals))),
-           equals == std::string_view::npos ? "" : one_line(std::string(part.substr(equals + 1)))},
+    apply({one_line(part.substr(0, equals)), equals == std::string_view::npos ? "" : one_line(part.substr(equals + 1))},
           &place.faults);
   }
   return place;

@@ -42,8 +42,7 @@ void RecordedTopics::select(const std::vector<std::string>& names) {
 void RecordingWarnings::add(std::string line) {
   constexpr int kMost = 10;
   if (++told_ > kMost) return;
-  lines_.push_back(one_line(std::move(line)) +
-                   (told_ == kMost ? "; further warnings of this recording are left out" : ""));
+  lines_.push_back(one_line(line) + (told_ == kMost ? "; further warnings of this recording are left out" : ""));
 }
 
 }  // namespace dkb

@@ -66,10 +66,11 @@ TEST(Random, BelowStaysInRangeAndReachesEveryValue) {
   for (int count : seen) EXPECT_GT(count, 80);
 }
 
-TEST(OneLine, HasASpaceForEachControlCharacter) {
-  EXPECT_EQ(one_line("a\nb\r\n\tc"), "a b   c");
-  EXPECT_EQ(one_line(std::string("\0x", 2)), " x");
+TEST(OneLine, HasASpaceForControlCharacters) {
+  EXPECT_EQ(one_line("a\nb\r\n\tc"), "a b c");
+  EXPECT_EQ(one_line(std::string("\0x", 2)), "x");
   EXPECT_EQ(one_line("d\xC3\xA9j\xC3\xA0 vu~"), "d\xC3\xA9j\xC3\xA0 vu~") << "UTF-8 stays";
+  EXPECT_EQ(one_line("Traceback:\n  line 3\r\nno memory\n"), "Traceback:  line 3 no memory");
 }
 
 TEST(Quantile, IsOneOfTheValues) {

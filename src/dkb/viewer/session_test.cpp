@@ -2,9 +2,9 @@
 #include "dkb/viewer/session.h"
 
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <filesystem>
 #include <future>
 
@@ -39,7 +39,7 @@ TEST(Session, TheLastDenseMapIsShownThoughAnEarlierOneIsBeingMade) {
     std::promise<void> handing_over;
     session.show_dense_map([begun = handing_over.get_future().share()] {
       begun.wait();
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));  // who does not wait has returned by then
+      poll(nullptr, 0, 50);  // who does not wait has returned by then
       return DenseMap();
     });
     EXPECT_FALSE(session.wants_dense_map());
