@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+#include <unistd.h>
+
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -110,5 +114,24 @@ class EveryNth final : public KeyframePolicy {
 
 // The message of the InputError that `work` throws; "no error" when it throws none. Anything else fails the test.
 std::string error_of(const std::function<void()>& work);
+
+// A world to feed to the library, and a folder that goes when the test ends.
+class Library : public ::testing::Test {
+ protected:
+  Library()
+      : folder(std::filesystem::path(::testing::TempDir()) /
+               ("dkb_library_" + std::to_string(::getpid()) +
+                ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+  }
+  ~Library() override { std::filesystem::remove_all(folder); }
+  Slam slam_with(std::shared_ptr<KeyframePolicy> policy = nullptr, const Options& options = Options()) const {
+    return Slam(world.camera(), options, Detectors::none(), std::move(policy));
+  }
+
+  WallWorld world{320, 240};
+  std::filesystem::path folder;
+};
 
 }  // namespace dkb::test

@@ -253,7 +253,7 @@ Points read_points(std::string_view bytes) {
     p.colour = colour[i];
     p.found = narrow<int>(in, numbers.zigzag());
     p.visible = narrow<int>(in, numbers.zigzag());
-    numbers.zigzag();  // of older programs: the keyframe that made it, less its birth
+    narrow<int32_t>(in, numbers.zigzag());  // of older programs: the keyframe that made it, less its birth
     points.descriptor_sources[i] = numbers.varint();
     if (points.descriptor_sources[i] == 0) p.descriptor = read_descriptor(numbers);
     if (const std::string flaw = flaw_of(p); !flaw.empty()) throw InputError(flaw);

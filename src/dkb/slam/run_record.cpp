@@ -97,7 +97,12 @@ std::vector<TrajectoryFrame> RunRecord::trajectory(TrajectoryKind kind) const {
   std::vector<TrajectoryFrame> frames;
   frames.reserve(records.size());
   std::map<int, std::vector<MeasuredPose>> by_map;
-  const std::vector<KeyframeId> roots = map.view().roots();
+  const std::vector<int> map_of = map.view().map_of_each();
+  const auto map_number_of = [&](KeyframeId reference) {
+    const auto at = static_cast<size_t>(reference);
+    // Mapping has not answered for the newest yet.
+    return at < map_of.size() ? map_of[at] : map_number(map.view().roots(), map.root(reference));
+  };
   struct Place {
     Rigid3 cam_from_world;
     int map = 0;
@@ -105,7 +110,7 @@ std::vector<TrajectoryFrame> RunRecord::trajectory(TrajectoryKind kind) const {
   std::map<KeyframeId, Place> places;
   records.for_each([&](const Record& r) {
     auto [at, unknown] = places.try_emplace(r.reference);
-    if (unknown) at->second = {map.cam_from_world(r.reference), map_number(roots, map.root(r.reference))};
+    if (unknown) at->second = {map.cam_from_world(r.reference), map_number_of(r.reference)};
     const Rigid3 by_keyframe = (r.cam_from_reference * at->second.cam_from_world).inverse();
     frames.push_back(
         {r.frame, r.stamp_ns, kind == TrajectoryKind::online ? r.world_from_cam_online : by_keyframe, at->second.map});
