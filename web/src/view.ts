@@ -72,6 +72,7 @@ export class View {
   private aligned = false; // the truth, with this world
   private lastDrawn = 0;
   private movedAt = 0;
+  private drawn = { position: new THREE.Vector3(), quaternion: new THREE.Quaternion(), target: new THREE.Vector3() }; // from where
   private coarse = false; // what is seen is not the whole map
   private budget = 200000; // points drawn while moving
   private still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -398,12 +399,14 @@ export class View {
     }
     this.staleKeyframes = this.staleEdges = false;
   }
+  // What it has drawn: damping goes on below what it draws for.
   private copyLeader(): void {
-    const { camera, controls } = this.leader!;
-    if (this.camera.position.equals(camera.position) && this.controls.target.equals(controls.target)) return;
-    this.camera.position.copy(camera.position);
-    this.camera.quaternion.copy(camera.quaternion);
-    this.controls.target.copy(controls.target);
+    const { position, quaternion, target } = this.leader!.drawn;
+    if (this.leader!.lastDrawn === 0) return;
+    if (this.camera.position.equals(position) && this.controls.target.equals(target)) return;
+    this.camera.position.copy(position);
+    this.camera.quaternion.copy(quaternion);
+    this.controls.target.copy(target);
     this.movedAt = performance.now();
     this.dirty = true;
   }
@@ -447,6 +450,9 @@ export class View {
     this.cloud.material.uniforms.lift.value = document.documentElement.dataset.theme === "dark" ? 0.18 : 0;
     this.cloud.draw(points);
     this.renderer.render(this.scene, this.camera);
+    this.drawn.position.copy(this.camera.position);
+    this.drawn.quaternion.copy(this.camera.quaternion);
+    this.drawn.target.copy(this.controls.target);
     this.movers.label(this.canvas.parentElement!.getBoundingClientRect(), this.camera);
     const data = this.canvas.dataset;
     data.points = String(this.cloud.points);
