@@ -66,13 +66,18 @@ function(dkb_add_tests program prefix)
   endif()
 endfunction()
 
+# What a program of tests is compiled with: in a Release build they are less optimised than what they test, which takes a
+# third less time. No bit of a result changes.
+add_library(dkb_test_options INTERFACE)
+target_compile_options(dkb_test_options INTERFACE $<$<CONFIG:Release>:-O1>)
+
 # One program of a room's tests; LOOK_AT: files beside theirs that may have to do with threads.
 function(dkb_room_tests name suffix)
   cmake_parse_arguments(PROGRAM "" "" "FILES;LOOK_AT;DEPENDS" ${ARGN})
   set(program dkb_${name}${suffix})
   add_executable(${program} ${PROGRAM_FILES})
   dkb_unit_test(${program} label ${PROGRAM_FILES} ${PROGRAM_LOOK_AT})
-  target_link_libraries(${program} PRIVATE dkb_${name} dkb_warnings ${PROGRAM_DEPENDS} GTest::gtest GTest::gtest_main)
+  target_link_libraries(${program} PRIVATE dkb_${name} dkb_test_options dkb_warnings ${PROGRAM_DEPENDS} GTest::gtest GTest::gtest_main)
   dkb_add_tests(${program} ${name} LABELS ${label})
 endfunction()
 

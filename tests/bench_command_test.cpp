@@ -133,7 +133,7 @@ TEST_F(Bench, ASuitesDetectorIsNotThatOfTheEnvironment) {
 }
 
 TEST_F(Bench, ARunThatHangsIsEnded) {
-  const fs::path file = suite("timeout: 1\n" + suite_text());
+  const fs::path file = suite("timeout: 5\n" + suite_text());  // [s] the other runs end long before
   const Finished run =
       bench({file.string(), "--out", out(), "--variant", "ORB", "--program", program_that("exec sleep 600")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
