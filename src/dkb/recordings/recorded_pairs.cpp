@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
@@ -22,6 +23,23 @@ int64_t read_stamp(std::string_view bytes, MessageEncoding encoding) {
   MessageReader in(bytes, encoding);
   if (encoding == MessageEncoding::ros1) in.u32();  // seq
   return in.stamp_ns();
+}
+
+Vector6d diagonal_of(const std::array<double, 36>& covariance) {
+  return Eigen::Map<const Matrix6d>(covariance.data()).diagonal();
+}
+
+OdometrySample sample_of(const OdometryMessage& message) {
+  OdometrySample sample{message.header.stamp_ns, {message.pose.orientation, message.pose.position}};
+  sample.twist << message.linear, message.angular;
+  sample.pose_variance = diagonal_of(message.pose_covariance);
+  sample.twist_variance = diagonal_of(message.twist_covariance);
+  return sample;
+}
+
+GyroSample sample_of(const ImuMessage& message) {
+  const std::array<double, 9>& covariance = message.angular_velocity_covariance;
+  return {message.header.stamp_ns, message.angular_velocity, {covariance[0], covariance[4], covariance[8]}};
 }
 
 }  // namespace
@@ -94,7 +112,6 @@ RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const Record
     if (topic.name == contents.colour.name) decoder_->colour.encoding = topic.encoding;
     if (topic.name == contents.depth.name) decoder_->depth.encoding = topic.encoding;
   }
-  if (contents.motion) motion_.emplace(contents.motion->body_from_cam);
 }
 
 std::optional<StoredPair> RecordedPairs::next() {
@@ -172,16 +189,13 @@ void RecordedPairs::add_image(StampPairing::Kind kind, const RecordedTopic& topi
 
 void RecordedPairs::add_motion(const RecordedTopic& topic, const RecordedMessage& message) {
   bool added = true;
+  const auto add = [&](auto sample) {
+    if (!stamped_) sample.stamp_ns = message.recorded_ns;
+    added = motion_.add(sample);
+  };
   try {
-    if (motion_topic_->inertial) {
-      ImuMessage imu = decode_imu(message.bytes, topic.encoding);
-      if (!stamped_) imu.header.stamp_ns = message.recorded_ns;
-      added = motion_->add(imu);
-    } else {
-      OdometryMessage odometry = decode_odometry(message.bytes, topic.encoding);
-      if (!stamped_) odometry.header.stamp_ns = message.recorded_ns;
-      added = motion_->add(odometry);
-    }
+    motion_topic_->inertial ? add(sample_of(decode_imu(message.bytes, topic.encoding)))
+                            : add(sample_of(decode_odometry(message.bytes, topic.encoding)));
   } catch (const InputError& e) {
     warn_once("motion", name_ + ": " + topic.name + ": a message is broken (" + e.what() + "); it is left out");
   }
@@ -203,7 +217,7 @@ void RecordedPairs::collect() {
 bool RecordedPairs::motion_is_known(const StampPairing::Pair& pair) const {
   constexpr int64_t kPatience = kNsPerSecond / 2;
   constexpr size_t kMostReady = 30;
-  return !motion_ || ended_ || motion_->reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
+  return !motion_topic_ || ended_ || motion_.reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
          ready_bytes_ > StampPairing::kMaxBytes || *newest_colour_ns_ > pair.colour.stamp_ns + kPatience;
 }
 
@@ -212,9 +226,11 @@ StoredPair RecordedPairs::stored(StampPairing::Pair pair) {
   made.stamp_ns = pair.colour.stamp_ns, made.depth_stamp_ns = pair.depth.stamp_ns;
   made.timestamp = seconds_from_ns(made.stamp_ns);
   made.stamp = stamp_text(made.stamp_ns);
-  if (motion_) {
-    if (before_ns_) made.prior = motion_->between(*before_ns_, made.stamp_ns);
-    motion_->forget_before(made.stamp_ns);
+  if (motion_topic_) {
+    const std::optional<MotionPrior> of_body = before_ns_ ? motion_.between(*before_ns_, made.stamp_ns) : std::nullopt;
+    if (of_body) made.prior = moved_to_camera(*of_body, motion_topic_->body_from_cam.inverse());
+    if (made.prior && !is_plausible(*made.prior)) made.prior.reset();  // a mount may be any number
+    motion_.forget_before(made.stamp_ns);
   }
   before_ns_ = made.stamp_ns;
   const auto images = std::make_shared<const StampPairing::Pair>(std::move(pair));

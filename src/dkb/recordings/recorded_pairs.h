@@ -11,9 +11,9 @@
 
 #include "dkb/dataset/stored_pair.h"
 #include "dkb/recordings/depth_registration.h"
-#include "dkb/recordings/recorded_motion.h"
 #include "dkb/recordings/recording_contents.h"
 #include "dkb/recordings/stamp_pairing.h"
+#include "dkb_slam/source.h"
 
 namespace dkb {
 
@@ -66,7 +66,7 @@ class RecordedPairs {
   const bool stamped_;
   const std::optional<RecordedMotionTopic> motion_topic_;
   const std::shared_ptr<Decoder> decoder_;
-  std::optional<RecordedMotion> motion_;
+  MotionHistory motion_;  // of its topic, where there is one
   StampPairing pairing_;
   PairFilter filter_;
   std::deque<StampPairing::Pair> ready_;  // wait for what is known of the motion up to them
