@@ -25,6 +25,16 @@ int64_t read_stamp(std::string_view bytes, MessageEncoding encoding) {
   return in.stamp_ns();
 }
 
+// Why a message of so many bytes holds no image of its topic's size, whatever it says; empty when it may: pixels of any
+// encoding and padding fit.
+std::string too_large(const RecordedImageTopic& topic, size_t bytes) {
+  constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
+  if (bytes <= kMostPerPixel * static_cast<size_t>(topic.width) * static_cast<size_t>(topic.height) + kMostElse)
+    return "";
+  return topic.name + ": a message of " + std::to_string(bytes >> 20) + " MiB is too large for an image of " +
+         std::to_string(topic.width) + "x" + std::to_string(topic.height) + " px";
+}
+
 Vector6d diagonal_of(const std::array<double, 36>& covariance) {
   return Eigen::Map<const Matrix6d>(covariance.data()).diagonal();
 }
@@ -44,14 +54,6 @@ GyroSample sample_of(const ImuMessage& message) {
 
 }  // namespace
 
-std::string too_large(const RecordedImageTopic& topic, size_t bytes) {
-  constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
-  if (bytes <= kMostPerPixel * static_cast<size_t>(topic.width) * static_cast<size_t>(topic.height) + kMostElse)
-    return "";
-  return topic.name + ": a message of " + std::to_string(bytes >> 20) + " MiB is too large for an image of " +
-         std::to_string(topic.width) + "x" + std::to_string(topic.height) + " px";
-}
-
 RecordedImage RecordedPairs::Channel::read(const StampPairing::Stored& message) const {
   RecordedImage image = read_recorded_image(message.bytes, topic.type, encoding, topic.name);
   // Where headers carry no stamps, messages are told by the time that stands in.
@@ -63,7 +65,7 @@ std::string RecordedPairs::Channel::mismatch(const StampPairing::Stored& message
   const RecordedImage image = read(message);
   if (image.content != topic.content)
     return image.name + ": is " + image.encoding + ", other images there are " + topic.encoding;
-  const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
+  std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
   // Whether it is sound in itself tells a wrong camera from a broken message.
   if (!wrong.empty()) topic.content == ImageContent::depth ? void(depth_of(image, camera)) : void(picture_of(image));
   return wrong;
@@ -93,8 +95,9 @@ std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pa
 }
 
 RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const RecordingContents& contents,
-                             const DatasetSelection& selection, std::string name)
+                             const DatasetSelection& selection, std::string name, std::function<void()> go_on)
     : name_(std::move(name)),
+      go_on_(std::move(go_on)),
       stream_(std::move(stream)),
       stamped_(contents.stamped),
       motion_topic_(contents.motion),
@@ -130,6 +133,7 @@ std::optional<StoredPair> RecordedPairs::next() {
       filter_.require_any(name_);
       return std::nullopt;
     }
+    go_on_();
     read_message();
   }
   return std::nullopt;
@@ -236,6 +240,7 @@ StoredPair RecordedPairs::stored(StampPairing::Pair pair) {
   const auto images = std::make_shared<const StampPairing::Pair>(std::move(pair));
   made.mismatch = [images, decoder = decoder_] { return decoder->mismatch(*images); };
   made.decode = [images, decoder = decoder_] { return decoder->decode(*images); };
+  made.colour_file = [images, decoder = decoder_] { return decoder->colour.read(images->colour).stored; };
   return made;
 }
 

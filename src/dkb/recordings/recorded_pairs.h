@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -17,16 +18,13 @@
 
 namespace dkb {
 
-// Why a message of so many bytes holds no image of its topic's size, whatever it says; empty when it may: pixels of any
-// encoding and padding fit.
-std::string too_large(const RecordedImageTopic& topic, size_t bytes);
-
 // The pairs of images in a stream of messages. One thread at a time calls next(), any thread the rest.
 class RecordedPairs {
  public:
-  // `name` opens the messages.
-  RecordedPairs(std::unique_ptr<MessageStream> stream, const RecordingContents& contents,
-                const DatasetSelection& selection, std::string name);
+  // `name` opens the messages. `go_on` is called before each is read; next() throws what it throws.
+  RecordedPairs(
+      std::unique_ptr<MessageStream> stream, const RecordingContents& contents, const DatasetSelection& selection,
+      std::string name, std::function<void()> go_on = [] {});
 
   // Nothing at the end, and after stop(). Throws InputError when the selection leaves nothing.
   std::optional<StoredPair> next();
@@ -62,6 +60,7 @@ class RecordedPairs {
   void warn_once(const std::string& kind, const std::string& line);
 
   const std::string name_;
+  const std::function<void()> go_on_;
   const std::unique_ptr<MessageStream> stream_;
   const bool stamped_;
   const std::optional<RecordedMotionTopic> motion_topic_;
