@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Where frames come from: the interface for sources of one's own, and recorded folders.
+/// Where frames come from: the interface for sources of one's own, and recorded folders; and what wheels and gyroscopes
+/// tell of the motion between them.
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -95,5 +97,66 @@ DKB_SLAM_API std::unique_ptr<Source> open_source(const std::string& where, const
 /// that cannot be read later on is skipped.
 DKB_SLAM_API std::unique_ptr<Source> open_folder(const std::filesystem::path& folder,
                                                  const SourceOptions& options = {});
+
+/// What odometry tells at one time: nav_msgs/Odometry. A variance that is 0, negative or not finite is not known.
+struct OdometrySample {
+  int64_t stamp_ns = 0;                        ///< rises from sample to sample
+  Rigid3 pose;                                 ///< of the body in a frame that stands still
+  Vector6d twist = Vector6d::Zero();           ///< [v m/s, w rad/s] in the body's axes; not finite = not known
+  Vector6d pose_variance = Vector6d::Zero();   ///< [m^2, rad^2] of x, y, z and about them, that frame's axes
+  Vector6d twist_variance = Vector6d::Zero();  ///< of the twist, [(m/s)^2, (rad/s)^2]
+};
+
+/// What a gyroscope tells at one time: sensor_msgs/Imu.
+struct GyroSample {
+  int64_t stamp_ns = 0;                    ///< rises from sample to sample
+  Eigen::Vector3d rate{0, 0, 0};           ///< [rad/s] angular velocity in the sensor's axes
+  Eigen::Vector3d rate_variance{0, 0, 0};  ///< [(rad/s)^2] as above; x below 0 marks a unit without a gyroscope
+};
+
+/// The newest samples of one sensor that is fixed to the camera, odometry or a gyroscope; answers with the motion of
+/// its body between two times. Deterministic: by the samples and their order alone. Keeps 20,000 samples at most. One
+/// thread at a time.
+class DKB_SLAM_API MotionHistory {
+ public:
+  /// `drift`: the share of ten metres that odometry without variances is off by, 0 ... 1. A shorter way is off by more:
+  /// its standard deviation grows with the root of it. Throws InvalidOption.
+  explicit MotionHistory(double drift = 0.01);
+
+  /// False: the sample is left out, since its stamp is not after the newest one's, or its pose or its rates are none,
+  /// or samples of the other kind are held. After ten stamps in a row that do not rise the clock is taken to have been
+  /// set back, or one stamp to have been far ahead: it goes on from there.
+  bool add(const OdometrySample& sample);
+  bool add(const GyroSample& sample);  ///< likewise
+  /// Begins anew; samples of either kind may follow.
+  void clear();
+  /// The newest sample is of this time or later.
+  bool reaches(int64_t stamp_ns) const { return !samples_.empty() && samples_.back().stamp_ns >= stamp_ns; }
+  /// Drops what is not needed for times from this one on.
+  void forget_before(int64_t stamp_ns);
+
+  /// The motion from one time to a later one, and its covariance, in the body's axes: moved_to_camera() makes it the
+  /// camera's. Nothing where samples are missing, and for motions that nothing can make.
+  ///
+  /// Odometry: poses are interpolated over at most 0.5 s, and carried on by a twist that is known for at most 0.1 s
+  /// after the newest. The variance in each direction is the growth of the pose's; else, where that tells nothing, the
+  /// twist's; else that of the drift, and for the heading of 1% of ten radians besides; 1 mm and 1 mrad are added, and
+  /// more than 1 m^2 or rad^2 is as good as unknown.
+  ///
+  /// Gyroscope: the rotation alone, by rates that change evenly between samples at most 0.1 s apart; for as long the
+  /// newest one holds. Its variance is the rates', or (0.01 rad/s)^2, times the square of the duration, and 1 mrad.
+  std::optional<MotionPrior> between(int64_t from_ns, int64_t to_ns) const;
+
+ private:
+  bool take(const OdometrySample& sample, bool rates);
+
+  double drift_;
+  bool rates_ = false;                  // the twists' rotations are a gyroscope's, and there are no poses
+  int refused_ = 0;                     // stamps in a row that did not rise
+  std::deque<OdometrySample> samples_;  // by stamp
+};
+
+/// The motion of a body that is fixed to the camera, as the camera's: both in their own axes.
+DKB_SLAM_API MotionPrior moved_to_camera(const MotionPrior& prior, const Rigid3& cam_from_body);
 
 }  // namespace dkb

@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "motion.h"
-
 namespace dkb_ros {
 namespace {
 
@@ -71,7 +69,7 @@ TEST(Grid, IsTurnedIntoTheAxesOfTheMap) {
   grid.cells = dkb::Image<uint8_t>(4, 2, dkb::OccupancyGrid::kFree);
   grid.cells(3, 0) = dkb::OccupancyGrid::kOccupied;  // floor x 1.3 ... 1.4, y 0.1 ... 0.2
   grid.cells(0, 1) = dkb::OccupancyGrid::kUnknown;   // floor x 1.0 ... 1.1, y 0.0 ... 0.1
-  const Rigid3 map_from_floor(rotation_by({0, 0, M_PI / 2}), {0, 0, -0.3});
+  const Rigid3 map_from_floor(Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5)), {0, 0, -0.3});
   grid.floor_from_world = map_from_floor.inverse();
   const GridOutput out = grid_in_map(grid);
   EXPECT_NEAR(out.floor_z, -0.3, 1e-9);

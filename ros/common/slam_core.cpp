@@ -30,7 +30,7 @@ SlamCore::SlamCore(const Parameters& parameters, Middleware& middleware)
     : parameters_(parameters),
       middleware_(middleware),
       pairing_(static_cast<int64_t>(1e9 * parameters.sync_tolerance), static_cast<size_t>(parameters.queue_size)),
-      odometry_(parameters.prior_drift) {
+      odometry_{dkb::MotionHistory(parameters.prior_drift)} {
   parameters_.options.check();
   if (parameters_.localize_only && parameters_.grid_period > 0)
     middleware_.log(LogLevel::warning,
@@ -91,26 +91,31 @@ void SlamCore::camera_info(const CameraInfoMessage& info) {
   if (!camera_info_) camera_info_ = info;
 }
 
-// `history` may refuse a message: that is counted, and told the first time.
-template <class History, class Message>
-void SlamCore::add_motion(History& history, const Message& message, bool* told, const std::string& what) {
+// The history may refuse a message: that is counted, and told the first time.
+template <class Sample>
+void SlamCore::add_motion(Motion& motion, const Sample& sample, const std::string& frame, const std::string& what) {
   {
     const std::lock_guard lock(input_mutex_);
-    if (history.add(message)) return;
+    if (motion.history.add(sample)) {
+      motion.frame = frame;
+      return;
+    }
     ++late_motion_;
-    if (std::exchange(*told, true)) return;
+    if (std::exchange(motion.told, true)) return;
   }
   complain(LogLevel::warning, what + "; /diagnostics counts such as `late odometry`");
 }
 
 void SlamCore::odometry(const OdometryMessage& odometry) {
-  add_motion(odometry_, odometry, &told_of_odometry_,
-             "odom_prior: a message was left out, since its stamp is not after the one before, or its pose or twist is "
-             "none");
+  add_motion(odometry_,
+             dkb::OdometrySample{odometry.stamp_ns, odometry.pose, odometry.twist, odometry.pose_covariance.diagonal(),
+                                 odometry.twist_covariance.diagonal()},
+             odometry.child_frame_id,
+             "odom_prior: a message was left out, since its stamp is not after the one before, or its pose is none");
 }
 
 void SlamCore::imu(const ImuMessage& imu) {
-  add_motion(gyro_, imu, &told_of_imu_,
+  add_motion(gyro_, dkb::GyroSample{imu.stamp_ns, imu.angular_velocity, imu.covariance.diagonal()}, imu.frame_id,
              "imu: a message was left out, since its stamp is not after the one before, or it has no angular velocity");
 }
 
@@ -238,8 +243,8 @@ void SlamCore::process(const ImagePair& pair) {
   if (pair.clock_jumped) {
     {
       const std::lock_guard lock(input_mutex_);
-      odometry_.clear();
-      gyro_.clear();
+      odometry_.history.clear();
+      gyro_.history.clear();
     }
     begin_after_jump();
   }
@@ -368,14 +373,12 @@ std::optional<dkb::MotionPrior> SlamCore::prior(int64_t stamp_ns) {
   std::string frame;
   {
     const std::lock_guard lock(input_mutex_);
-    if ((kind == PriorKind::odom || kind == PriorKind::automatic) && !odometry_.empty()) {
-      motion = odometry_.between(*last_stamp_ns_, stamp_ns);
-      frame = odometry_.child_frame_id();
-    }
-    if (!motion && (kind == PriorKind::imu || kind == PriorKind::automatic) && !gyro_.empty()) {
-      motion = gyro_.between(*last_stamp_ns_, stamp_ns);
-      frame = gyro_.frame_id();
-    }
+    const auto ask = [&](const Motion& of) {
+      motion = of.history.between(*last_stamp_ns_, stamp_ns);
+      frame = of.frame;
+    };
+    if (kind == PriorKind::odom || kind == PriorKind::automatic) ask(odometry_);
+    if (!motion && (kind == PriorKind::imu || kind == PriorKind::automatic)) ask(gyro_);
   }
   if (!motion) return std::nullopt;
   const std::optional<Rigid3> cam_from_frame = cam_from(frame);
@@ -385,7 +388,7 @@ std::optional<dkb::MotionPrior> SlamCore::prior(int64_t stamp_ns) {
   }
   const std::lock_guard lock(report_mutex_);
   ++counts_.priors;
-  return moved_to_camera(*motion, *cam_from_frame);
+  return dkb::moved_to_camera(*motion, *cam_from_frame);
 }
 
 std::optional<Rigid3> SlamCore::cam_from(const std::string& frame) {
@@ -410,8 +413,8 @@ void SlamCore::begin_anew() {
   outdated_ += static_cast<int64_t>(pairs_.size());
   pairs_.clear();  // of the old world: their stamps would keep out those that follow
   pairing_.restart();
-  odometry_.clear();
-  gyro_.clear();
+  odometry_.history.clear();
+  gyro_.history.clear();
 }
 
 // Another recording, or the robot's clock was set: a map that was loaded holds all the same.

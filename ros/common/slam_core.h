@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <dkb_slam/source.h>
 #include <dkb_slam/viewer.h>
 
 #include <algorithm>
@@ -74,11 +75,17 @@ class SlamCore final : public RosCore {
     Matrix6d covariance;   // right perturbation, in the base's axes
     bool guessed = false;  // not by the images
   };
+  // What wheels or a gyroscope tell.
+  struct Motion {
+    dkb::MotionHistory history{};
+    std::string frame = {};  // of the newest message
+    bool told = false;       // that messages are left out
+  };
   using Task = std::function<Answer(dkb::Slam&)>;
 
   void arrived(int64_t* last, int64_t now_ns);
-  template <class History, class Message>
-  void add_motion(History& history, const Message& message, bool* told, const std::string& what);
+  template <class Sample>
+  void add_motion(Motion& motion, const Sample& sample, const std::string& frame, const std::string& what);
   void enqueue(std::vector<ImagePair> pairs);
   void request(Task task, Done done);
   void run_tracking();
@@ -122,13 +129,11 @@ class SlamCore final : public RosCore {
   std::deque<ImagePair> pairs_;
   std::deque<std::pair<Task, Done>> tasks_;
   std::optional<CameraInfoMessage> camera_info_;
-  OdometryHistory odometry_;
-  GyroHistory gyro_;
+  Motion odometry_, gyro_;
   int64_t dropped_ = 0;      // pairs that found the queue full
   int64_t outdated_ = 0;     // pairs that waited when a service began another world
   int64_t late_motion_ = 0;  // messages of odometry and imu
   Arrivals arrivals_;
-  bool told_of_odometry_ = false, told_of_imu_ = false;  // that messages are left out
 
   // The tracking thread's own.
   Rigid3 base_from_cam_;

@@ -24,8 +24,7 @@ inline double drift_variance(double drift, double way) {
 }
 
 // Of a motion by wheels over `distance` [m] and `angle` [rad]: the way and the heading are off by the drift of the way,
-// the heading by the usual drift of the turn as well. ros/common/motion.cpp gives the same where its prior_drift is the
-// usual one; another is that of its turns, too.
+// the heading by the usual drift of the turn as well.
 inline Matrix6d drift_covariance(double drift, double distance, double angle) {
   Matrix6d covariance = Matrix6d::Identity() * (kMinOdometrySd * kMinOdometrySd);
   covariance.diagonal().head<3>().array() += drift_variance(drift, distance);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dkb/dataset/tum_dataset.h"
@@ -26,6 +27,9 @@ struct StoredPair {
   std::function<std::string()> mismatch;
   // Throws InputError when one of the images is broken or does not fit.
   std::function<std::shared_ptr<RgbdImage>()> decode;
+  // Of recordings: the colour image as it is stored, while the pair lives; empty where it is pixels. Throws InputError
+  // when it is broken.
+  std::function<std::string_view()> colour_file = {};
 };
 
 // Answers pair by pair, colour stamps rising; nothing at the end. Called by one thread at a time.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/recordings/bag_stream.h"
 
-#include <algorithm>
-
 #include "dkb/recordings/bag_format.h"
 #include "dkb/util/errors.h"
 
@@ -61,22 +59,21 @@ bool BagStream::fits(RecordingFile& file) {
   return true;
 }
 
-BagStream::BagStream(std::unique_ptr<RecordingFile> file) : file_(std::move(file)) {
+BagStream::BagStream(std::unique_ptr<RecordingFile> file) : ChunkedStream(std::move(file)) {
   Record header;
   if (record_at(bag::kMagic.size(), &header) != Found::record || header.op != bag::kBagHeader)
     throw InputError(file_->name() + ": is a bag without its header; it cannot be read");
   if (const auto encryptor = field(header.header, "encryptor"); encryptor && !encryptor->empty())
     throw InputError(file_->name() + ": is encrypted; `rosbag decrypt` makes it readable");
   at_ = start_ = header.end();
-  end_ = file_->size();
   const uint64_t index = number<uint64_t>(header.header, "index_pos").value_or(0);
   if (index >= start_ && index < file_->size()) {
     end_ = index;
     read_index(index);
   } else {
-    warnings_.add(file_->name() +
-                  ": has no index: it is cut off, or its recorder was stopped. It is read up to where " +
-                  "it ends; `rosbag reindex` repairs it");
+    warn(
+        "has no index: it is cut off, or its recorder was stopped. It is read up to where it ends; `rosbag reindex` "
+        "repairs it");
     told_cut_ = true;
   }
 }
@@ -106,9 +103,8 @@ void BagStream::read_index(uint64_t at) {
     const bool cut = found == Found::cut || (small && data.size() < record.data_size);
     if (!small || cut) {
       told_cut_ = cut;
-      warnings_.add(file_->name() +
-                    (cut ? ": is cut off in its index" : ": its index is broken at byte " + std::to_string(at)) +
-                    "; it is read from front to back");
+      warn((cut ? "is cut off in its index" : "its index is broken at byte " + std::to_string(at)) +
+           "; it is read from front to back");
       topics_.forget_counts();
       chunks_.clear();  // the rest is not known, so none is passed over
       return;
@@ -123,15 +119,14 @@ void BagStream::read_index(uint64_t at) {
 void BagStream::add_connection(std::string_view header, std::string_view data) {
   // Inside a chunk nothing else bounds them.
   if (header.size() > kMaxHeader || data.size() > kMaxConnection)
-    return warnings_.add(file_->name() + ": the chunk at byte " + std::to_string(chunk_at_) +
-                         " holds a connection that is too large; it is left out");
+    return warn("the chunk at byte " + std::to_string(chunk_at_) +
+                " holds a connection that is too large; it is left out");
   const std::optional<uint32_t> id = number<uint32_t>(header, "conn");
   const std::optional<std::string_view> topic = field(header, "topic"), type = field(data, "type");
   if (!id || !topic || !type || topic_of_.count(*id)) return;
   if (topic_of_.size() >= RecordedTopics::kMost) return;
   if (topic->size() > RecordedTopics::kLongestName || type->size() > RecordedTopics::kLongestName)
-    warnings_.add(file_->name() + ": connection " + std::to_string(*id) +
-                  " has a name that is too long; it is left out");
+    warn("connection " + std::to_string(*id) + " has a name that is too long; it is left out");
   if (const auto added = topics_.add(std::string(*topic), std::string(*type), MessageEncoding::ros1))
     topic_of_[*id] = *added;
 }
@@ -143,33 +138,10 @@ void BagStream::add_chunk_info(std::string_view header, std::string_view data) {
   for (; data.size() >= 8; data.remove_prefix(8)) {
     connections.push_back(little<uint32_t>(data));
     if (const auto topic = topic_of_.find(connections.back()); topic != topic_of_.end())
-      topics_.add_count(topic->second, little<uint32_t>(data.substr(4)));
+      topics_.add_count(*topic->second, little<uint32_t>(data.substr(4)));
   }
 }
 
-// A chunk that the index does not know, or of a connection that is not known, may hold anything.
-bool BagStream::chunk_wanted(uint64_t at) const {
-  const auto chunk = chunks_.find(at);
-  if (chunk == chunks_.end()) return true;
-  return std::any_of(chunk->second.begin(), chunk->second.end(), [&](uint32_t connection) {
-    const auto topic = topic_of_.find(connection);
-    return topic == topic_of_.end() || topics_.wanted(topic->second);
-  });
-}
-
-void BagStream::rewind() {
-  at_ = start_;
-  rest_ = {};
-}
-
-void BagStream::tell_cut(uint64_t at) {
-  if (!told_cut_)
-    warnings_.add(file_->name() + ": is cut off in the record at byte " + std::to_string(at) +
-                  "; it is read up to there");
-  told_cut_ = true;
-}
-
-// Opens the next chunk that may hold something wanted. False at the end.
 bool BagStream::next_chunk() {
   Record record;
   while (at_ < end_) {
@@ -180,12 +152,10 @@ bool BagStream::next_chunk() {
       break;
     }
     if (found == Found::broken) {
-      const auto later = chunks_.upper_bound(at);
-      const bool goes_on = later != chunks_.end() && later->first < end_;
-      warnings_.add(file_->name() + ": is broken at byte " + std::to_string(at) +
-                    (goes_on ? "; it is read on from the next chunk" : "; what follows is not read"));
+      const bool goes_on = skip_to_chunk_after(at);
+      warn("is broken at byte " + std::to_string(at) +
+           (goes_on ? "; it is read on from the next chunk" : "; what follows is not read"));
       if (!goes_on) break;
-      at_ = later->first;
       continue;
     }
     at_ = record.end();
@@ -201,22 +171,11 @@ bool BagStream::next_chunk() {
 }
 
 void BagStream::open_chunk(const Record& record) {
-  const auto describe = [&] { return file_->name() + ": the chunk at byte " + std::to_string(chunk_at_); };
-  Compression compression;
-  try {
-    compression = compression_named(field(record.header, "compression").value_or("none"));
-  } catch (const InputError& e) {
-    throw InputError(file_->name() + ": " + e.what());
-  }
   const uint32_t size = number<uint32_t>(record.header, "size").value_or(record.data_size);
-  const ChunkState loaded = load_chunk(*file_, compression, record.data_at, record.data_size, size, &chunk_);
-  rest_ = chunk_.view();
-  cut_in_chunk_ = loaded.state == ChunkState::cut;
-  if (cut_in_chunk_) tell_cut(chunk_at_);
-  if (loaded.state == ChunkState::broken) {
-    warnings_.add(describe() + " is broken (" + loaded.why + ") and left out");
-    rest_ = {};
-  }
+  const std::string broken =
+      load(field(record.header, "compression").value_or("none"), record.data_at, record.data_size, size);
+  if (!broken.empty())
+    warn("the chunk at byte " + std::to_string(chunk_at_) + " is broken (" + broken + ") and left out");
 }
 
 std::optional<RecordedMessage> BagStream::next_in_chunk() {
@@ -237,8 +196,7 @@ std::optional<RecordedMessage> BagStream::next_in_chunk() {
     const std::optional<uint8_t> op = data ? number<uint8_t>(*header, "op") : std::nullopt;
     if (!op) {
       if (!cut_in_chunk_)
-        warnings_.add(file_->name() + ": the chunk at byte " + std::to_string(chunk_at_) +
-                      " is broken; the rest of it is left out");
+        warn("the chunk at byte " + std::to_string(chunk_at_) + " is broken; the rest of it is left out");
       rest_ = {};
       break;
     }
@@ -246,18 +204,11 @@ std::optional<RecordedMessage> BagStream::next_in_chunk() {
     if (*op != bag::kMessage) continue;
     const std::optional<uint32_t> connection = number<uint32_t>(*header, "conn");
     const std::optional<uint64_t> time = number<uint64_t>(*header, "time");
-    const auto topic = connection ? topic_of_.find(*connection) : topic_of_.end();
-    if (!time || topic == topic_of_.end() || !topics_.wanted(topic->second)) continue;
+    const std::optional<size_t> topic = connection ? wanted(*connection) : std::nullopt;
+    if (!time || !topic) continue;
     const int64_t ns = static_cast<int64_t>(*time & 0xFFFFFFFF) * 1'000'000'000 + static_cast<int64_t>(*time >> 32);
-    return RecordedMessage{topic->second, ns, *data};
+    return RecordedMessage{*topic, ns, *data};
   }
-  return std::nullopt;
-}
-
-std::optional<RecordedMessage> BagStream::next() {
-  do {
-    if (auto message = next_in_chunk()) return message;
-  } while (next_chunk());
   return std::nullopt;
 }
 

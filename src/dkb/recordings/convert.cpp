@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/recordings/convert.h"
 
-#include <array>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/folder_source.h"
-#include "dkb/dataset/stored_pair.h"
-#include "dkb/recordings/depth_registration.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/pair_writer.h"
-#include "dkb/recordings/recorded_image.h"
 #include "dkb/recordings/recorded_pairs.h"
 #include "dkb/recordings/recording_contents.h"
 #include "dkb/recordings/recording_writer.h"
 #include "dkb/recordings/ros_messages.h"
-#include "dkb/recordings/stamp_pairing.h"
 #include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -158,110 +154,43 @@ Converted convert_messages(MessageStream& stream, const fs::path& in, const fs::
   return converted;
 }
 
-// The pairs of a recording, on their way into a folder.
-class PairsToFolder {
- public:
-  PairsToFolder(const MessageStream& stream, const RecordingContents& contents, PairWriter& writer,
-                const ConvertOptions& options)
-      : contents_(contents), writer_(writer), options_(options) {
-    for (const RecordedTopic& topic : stream.topics()) {
-      if (topic.name == contents.colour.name) encoding_[StampPairing::colour] = topic.encoding;
-      if (topic.name == contents.depth.name) encoding_[StampPairing::depth] = topic.encoding;
-    }
-    if (contents.depth_camera)
-      registration_.emplace(contents.depth_camera->camera, without_limits(contents.camera),
-                            contents.depth_camera->colour_from_depth);
-  }
-
-  void add(StampPairing::Kind kind, const RecordedMessage& message) {
-    if (const std::string why = too_large(topic(kind), message.bytes.size()); !why.empty()) return leave_out(why);
-    try {
-      const int64_t stamp = contents_.stamped ? read(kind, message.bytes).header.stamp_ns : message.recorded_ns;
-      if (!pairing_.add(kind, {stamp, std::string(message.bytes)}))
-        leave_out(topic(kind).name + ": a stamp is not after the one before it");
-    } catch (const InputError& e) {
-      leave_out(e.what());
-    }
-    write();
-  }
-  size_t close() {
-    if (const int64_t unused = pairing_.behind(); unused > 0)
-      options_.warn("the clock of the images was set back: the last " + std::to_string(unused) +
-                    " of them have stamps before those of pairs that were written");
-    pairing_.close();
-    write();
-    if (pairing_.unpaired() > 0)
-      options_.warn(std::to_string(pairing_.unpaired()) + " images without a partner of their time are left out");
-    return written_;
-  }
-
- private:
-  const RecordedImageTopic& topic(StampPairing::Kind kind) const {
-    return kind == StampPairing::colour ? contents_.colour : contents_.depth;
-  }
-  RecordedImage read(StampPairing::Kind kind, std::string_view bytes) const {
-    return read_recorded_image(bytes, topic(kind).type, encoding_[kind], topic(kind).name);
-  }
-  // Of the size of the camera that took it. Throws InputError.
-  RecordedImage read_whole(StampPairing::Kind kind, std::string_view bytes) const {
-    RecordedImage image = read(kind, bytes);
-    const bool of_own_camera = kind == StampPairing::depth && contents_.depth_camera;
-    const Camera& camera = of_own_camera ? contents_.depth_camera->camera : contents_.camera;
-    const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
-    if (image.content == topic(kind).content && !wrong.empty()) throw InputError(wrong);
-    return image;
-  }
-  void leave_out(const std::string& why) const { options_.warn(why + "; it is left out"); }
-
-  void write() {
-    while (const auto pair = pairing_.take()) {
-      try {
-        const RecordedImage colour = read_whole(StampPairing::colour, pair->colour.bytes);
-        const Picture picture = picture_of(colour);
-        DepthImage depth =
-            depth_of(read_whole(StampPairing::depth, pair->depth.bytes), without_limits(contents_.camera));
-        if (registration_) depth = registration_->registered(depth);
-        const std::string_view file = colour.compressed ? colour.stored : std::string_view();
-        writer_.add({pair->colour.stamp_ns, pair->depth.stamp_ns, file, &picture, &depth});
-        ++written_;
-      } catch (const OutputError&) {
-        throw;
-      } catch (const InputError& e) {
-        leave_out(e.what());
-      }
-    }
-  }
-
-  const RecordingContents& contents_;
-  PairWriter& writer_;
-  const ConvertOptions& options_;
-  std::array<MessageEncoding, 2> encoding_{};
-  std::optional<DepthRegistration> registration_;
-  StampPairing pairing_;
-  size_t written_ = 0;
-};
-
-Converted convert_to_folder(MessageStream& stream, const fs::path& in, const fs::path& out,
+Converted convert_to_folder(std::unique_ptr<MessageStream> stream, const fs::path& in, const fs::path& out,
                             const ConvertOptions& options) {
   std::string text = camera_text_of(in, options);
   SourceOptions reading = options.source;
   reading.prior = PriorKind::none;  // a folder has no room for motion
-  RecordingContents contents = look_into(stream, reading, in.string());
-  for (const std::string& line : contents.warnings) options.warn(line);
+  RecordingContents contents = look_into(*stream, reading, in.string());
   if (text.empty()) {
     if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = 1000;  // as the integers are stored
     text = contents.camera.to_yaml();
   }
   const auto writer = write_pairs(out, contents.camera, text);
-  PairsToFolder pairs(stream, contents, *writer, options);
-  while (const auto message = stream.next()) {
-    options.go_on();
-    const std::string& topic = stream.topics()[message->topic].name;
-    if (topic == contents.colour.name) pairs.add(StampPairing::colour, *message);
-    if (topic == contents.depth.name) pairs.add(StampPairing::depth, *message);
+  contents.camera = without_limits(contents.camera);
+  RecordedPairs pairs(std::move(stream), contents, {}, in.string(), options.go_on);
+  const auto warn = [&] {
+    for (const std::string& line : pairs.take_warnings()) options.warn(line);
+  };
+  Converted converted{0, "pairs"};
+  while (const auto pair = pairs.next()) {
+    warn();
+    try {
+      if (const std::string wrong = pair->mismatch(); !wrong.empty()) throw InputError(wrong);
+      const auto image = pair->decode();
+      const Picture picture{std::move(image->grey), std::move(image->colour)};
+      writer->add({pair->stamp_ns, pair->depth_stamp_ns, pair->colour_file(), &picture, &image->depth});
+      ++converted.count;
+    } catch (const OutputError&) {
+      throw;
+    } catch (const InputError& e) {
+      options.warn(std::string(e.what()) + "; it is left out");
+    }
   }
-  for (const std::string& line : stream.take_warnings()) options.warn(line);
-  const Converted converted{pairs.close(), "pairs"};
+  warn();
+  const auto tell_lost = [&](int64_t count, const std::string& why) {
+    if (count > 0) options.warn(std::to_string(count) + " images " + why + " are left out");
+  };
+  tell_lost(pairs.counts().late, "whose stamps do not rise");
+  tell_lost(pairs.counts().unpaired, "that are broken or have no partner of their time");
   if (converted.count == 0) throw InputError(in.string() + ": none of its images can be paired and read");
   writer->close();
   return converted;
@@ -276,9 +205,9 @@ Converted convert(const fs::path& in, const fs::path& out, const ConvertOptions&
   if (in.extension() == ".oni")
     throw InputError(in.string() + ": is a recording of OpenNI, not of ROS messages; `dkb-slam record " + in.string() +
                      " --out " + out.string() + "` converts it");
-  const auto stream = open_messages(in);
+  auto stream = open_messages(in);
   return is_recording_name(out) ? convert_messages(*stream, in, out, options)
-                                : convert_to_folder(*stream, in, out, options);
+                                : convert_to_folder(std::move(stream), in, out, options);
 }
 
 }  // namespace dkb

@@ -276,8 +276,10 @@ TEST_F(ConvertTest, MessagesLargerThanTheirImagesAreLeftOutAndTold) {
   writer->close();
   EXPECT_EQ(convert(scratch / "a.bag", scratch / "out", options).count, 1U);
   ASSERT_EQ(warnings.size(), 2U);
-  EXPECT_EQ(warnings[0], "/rgb/image: a message of 2 MiB is too large for an image of 32x24 px; it is left out");
-  EXPECT_EQ(warnings[1], "1 images without a partner of their time are left out");
+  EXPECT_EQ(warnings[0],
+            (scratch / "a.bag").string() +
+                ": /rgb/image: a message of 2 MiB is too large for an image of 32x24 px; such are left out");
+  EXPECT_EQ(warnings[1], "2 images that are broken or have no partner of their time are left out");
 }
 
 TEST_F(ConvertTest, MotionGoesAlongFromRecordingToRecording) {

@@ -40,9 +40,8 @@ bool McapStream::fits(RecordingFile& file) {
   return true;
 }
 
-McapStream::McapStream(std::unique_ptr<RecordingFile> file) : file_(std::move(file)) {
+McapStream::McapStream(std::unique_ptr<RecordingFile> file) : ChunkedStream(std::move(file)) {
   at_ = start_ = mcap::kMagic.size();
-  end_ = file_->size();
   if (!read_summary()) {
     schemas_.clear(), chunks_.clear();
     // What stands before the first messages.
@@ -70,7 +69,7 @@ std::optional<McapStream::Record> McapStream::record_at(uint64_t at) {
 // False when there is none that can be used.
 bool McapStream::read_summary() {
   const auto read_through = [&](const std::string& why) {
-    warnings_.add(file_->name() + ": " + why);
+    warn(why);
     return false;
   };
   const std::string cut =
@@ -194,68 +193,37 @@ void McapStream::add_metadata(ByteReader in) {
 
 void McapStream::add_chunk_index(ByteReader in) {
   in.raw(8 + 8);
-  std::vector<uint16_t>& channels = chunks_[in.u64()];
+  std::vector<uint32_t>& channels = chunks_[in.u64()];
   in.u64();
   for (ByteReader offsets(text(in), "offsets"); offsets.left() > 0; offsets.u64()) channels.push_back(u16(offsets));
 }
 
-bool McapStream::chunk_wanted(uint64_t at) const {
-  const auto chunk = chunks_.find(at);
-  if (chunk == chunks_.end() || chunk->second.empty()) return true;
-  return std::any_of(chunk->second.begin(), chunk->second.end(), [&](uint16_t channel) {
-    size_t topic = 0;
-    return topic_of_.count(channel) == 0 || wanted(channel, &topic);
-  });
-}
-
-bool McapStream::wanted(uint16_t channel, size_t* topic) const {
-  const auto found = topic_of_.find(channel);
-  if (found == topic_of_.end() || !found->second || !topics_.wanted(*found->second)) return false;
-  *topic = *found->second;
-  return true;
-}
-
-void McapStream::rewind() {
-  at_ = start_;
-  rest_ = {};
-}
-
 void McapStream::warn_of_record(uint64_t at, const std::string& what) {
-  warnings_.add(file_->name() + ": the record at byte " + std::to_string(at - mcap::kRecordStart) + " " + what);
+  warn("the record at byte " + std::to_string(at - mcap::kRecordStart) + " " + what);
 }
 
 void McapStream::warn_of_name(const std::string& kind, uint16_t id) {
-  warnings_.add(file_->name() + ": " + kind + " " + std::to_string(id) +
-                " has a name that is too long; it is left out");
-}
-
-void McapStream::tell_cut(uint64_t at) {
-  if (!told_cut_)
-    warnings_.add(file_->name() + ": is cut off in the record at byte " + std::to_string(at) +
-                  "; it is read up to there");
-  told_cut_ = true;
+  warn(kind + " " + std::to_string(id) + " has a name that is too long; it is left out");
 }
 
 void McapStream::tell_foreign() {
   if (told_foreign_ || foreign_.empty() || !topics_.all().empty()) return;
   std::string names;
   for (const std::string& name : foreign_) names += (names.empty() ? "" : ", ") + name;
-  warnings_.add(file_->name() + ": its messages are encoded as " + names + "; ros1 and cdr are read");
+  warn("its messages are encoded as " + names + "; ros1 and cdr are read");
   told_foreign_ = true;
 }
 
-// Opens the next chunk or message that may be wanted. False at the end.
-bool McapStream::next_record() {
+// A message outside of chunks is read as a chunk that holds it alone.
+bool McapStream::next_chunk() {
   while (at_ < end_) {
     const uint64_t at = at_;
     const std::optional<Record> record = record_at(at);
     if (record && record->op == 0) {
-      const auto later = chunks_.upper_bound(at);
-      const bool goes_on = later != chunks_.end() && later->first < end_;
+      const bool goes_on = skip_to_chunk_after(at);
       warn_of_record(record->at, goes_on ? "is broken; what follows is read from the next chunk"
                                          : "is broken; what follows is not read");
       if (!goes_on) break;
-      at_ = later->first;
       continue;
     }
     if (!record || (record->end() > file_->size() && record->op != mcap::kChunk)) {
@@ -270,21 +238,16 @@ bool McapStream::next_record() {
     } else if (record->op == mcap::kMessage) {
       const std::string_view id = file_->peek(record->at, 2);
       ByteReader in(id, "channel");
-      size_t topic = 0;
-      if (id.size() < 2 || !wanted(u16(in), &topic)) continue;
-      // As a chunk that holds this record alone.
-      const ChunkState loaded =
-          load_chunk(*file_, Compression::none, at, mcap::kRecordStart + record->size, 0, &chunk_);
-      if (loaded.state == ChunkState::whole)
-        rest_ = chunk_.view();
-      else
-        warn_of_record(record->at, "is broken (" + loaded.why + ") and left out");
+      if (id.size() < 2 || !wanted(u16(in))) continue;
+      const std::string broken = load("", at, mcap::kRecordStart + record->size, 0);
+      if (!broken.empty()) warn_of_record(record->at, "is broken (" + broken + ") and left out");
     } else {
       take_small(*record);
     }
     if (!rest_.empty()) return true;
   }
   at_ = end_;
+  tell_foreign();
   return false;
 }
 
@@ -307,21 +270,11 @@ void McapStream::open_chunk(const Record& record) {
   }
   const uint64_t taken = 16 + 8 + 4 + 4 + compression.size() + 8;
   if (packed > record.size - taken) return warn_of_record(record.at, "is broken and left out");
-  Compression kind = Compression::none;
-  try {
-    kind = compression_named(compression);
-  } catch (const InputError& e) {
-    throw InputError(file_->name() + ": " + e.what());
-  }
-  const ChunkState loaded = load_chunk(*file_, kind, record.at + taken, packed, size, &chunk_);
-  cut_in_chunk_ = loaded.state == ChunkState::cut;
-  if (cut_in_chunk_) tell_cut(chunk_at_);
-  if (loaded.state == ChunkState::broken)
-    return warn_of_record(record.at, "is broken (" + loaded.why + ") and left out");
-  const std::string_view bytes = chunk_.view();
-  if (!cut_in_chunk_ && crc != 0 && crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()) != crc)
-    return warn_of_record(record.at, "is broken (its checksum is another) and left out");
-  rest_ = bytes;
+  std::string broken = load(compression, record.at + taken, packed, size);
+  if (broken.empty() && !cut_in_chunk_ && crc != 0 &&
+      crc32_z(0, reinterpret_cast<const Bytef*>(rest_.data()), rest_.size()) != crc)
+    broken = "its checksum is another", rest_ = {};
+  if (!broken.empty()) warn_of_record(record.at, "is broken (" + broken + ") and left out");
 }
 
 std::optional<RecordedMessage> McapStream::next_in_chunk() {
@@ -341,25 +294,16 @@ std::optional<RecordedMessage> McapStream::next_in_chunk() {
       }
       if (op != mcap::kMessage) continue;
       ByteReader message(content, "message");
-      size_t topic = 0;
-      const bool asked_for = wanted(u16(message), &topic);
+      const std::optional<size_t> topic = wanted(u16(message));
       message.u32();
       const uint64_t logged = message.u64();
       message.u64();
-      if (asked_for) return RecordedMessage{topic, static_cast<int64_t>(logged), content.substr(mcap::kMessageStart)};
+      if (topic) return RecordedMessage{*topic, static_cast<int64_t>(logged), content.substr(mcap::kMessageStart)};
     }
   } catch (const InputError&) {
     if (!cut_in_chunk_) warn_of_record(chunk_at_ + mcap::kRecordStart, "is broken; the rest of it is left out");
     rest_ = {};
   }
-  return std::nullopt;
-}
-
-std::optional<RecordedMessage> McapStream::next() {
-  do {
-    if (auto message = next_in_chunk()) return message;
-  } while (next_record());
-  tell_foreign();
   return std::nullopt;
 }
 

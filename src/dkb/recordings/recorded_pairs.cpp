@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dkb/dataset/camera_file.h"
+#include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/tum_dataset.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
@@ -24,8 +25,8 @@ int64_t read_stamp(std::string_view bytes, MessageEncoding encoding) {
   return in.stamp_ns();
 }
 
-}  // namespace
-
+// Why a message of so many bytes holds no image of its topic's size, whatever it says; empty when it may: pixels of any
+// encoding and padding fit.
 std::string too_large(const RecordedImageTopic& topic, size_t bytes) {
   constexpr size_t kMostPerPixel = 16, kMostElse = 1 << 20;  // [bytes]
   if (bytes <= kMostPerPixel * static_cast<size_t>(topic.width) * static_cast<size_t>(topic.height) + kMostElse)
@@ -33,6 +34,25 @@ std::string too_large(const RecordedImageTopic& topic, size_t bytes) {
   return topic.name + ": a message of " + std::to_string(bytes >> 20) + " MiB is too large for an image of " +
          std::to_string(topic.width) + "x" + std::to_string(topic.height) + " px";
 }
+
+Vector6d diagonal_of(const std::array<double, 36>& covariance) {
+  return Eigen::Map<const Matrix6d>(covariance.data()).diagonal();
+}
+
+OdometrySample sample_of(const OdometryMessage& message) {
+  OdometrySample sample{message.header.stamp_ns, {message.pose.orientation, message.pose.position}};
+  sample.twist << message.linear, message.angular;
+  sample.pose_variance = diagonal_of(message.pose_covariance);
+  sample.twist_variance = diagonal_of(message.twist_covariance);
+  return sample;
+}
+
+GyroSample sample_of(const ImuMessage& message) {
+  const std::array<double, 9>& covariance = message.angular_velocity_covariance;
+  return {message.header.stamp_ns, message.angular_velocity, {covariance[0], covariance[4], covariance[8]}};
+}
+
+}  // namespace
 
 RecordedImage RecordedPairs::Channel::read(const StampPairing::Stored& message) const {
   RecordedImage image = read_recorded_image(message.bytes, topic.type, encoding, topic.name);
@@ -45,7 +65,7 @@ std::string RecordedPairs::Channel::mismatch(const StampPairing::Stored& message
   const RecordedImage image = read(message);
   if (image.content != topic.content)
     return image.name + ": is " + image.encoding + ", other images there are " + topic.encoding;
-  const std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
+  std::string wrong = size_mismatch(image.name, image.width, image.height, camera);
   // Whether it is sound in itself tells a wrong camera from a broken message.
   if (!wrong.empty()) topic.content == ImageContent::depth ? void(depth_of(image, camera)) : void(picture_of(image));
   return wrong;
@@ -75,8 +95,9 @@ std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pa
 }
 
 RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const RecordingContents& contents,
-                             const DatasetSelection& selection, std::string name)
+                             const DatasetSelection& selection, std::string name, std::function<void()> go_on)
     : name_(std::move(name)),
+      go_on_(std::move(go_on)),
       stream_(std::move(stream)),
       stamped_(contents.stamped),
       motion_topic_(contents.motion),
@@ -94,7 +115,6 @@ RecordedPairs::RecordedPairs(std::unique_ptr<MessageStream> stream, const Record
     if (topic.name == contents.colour.name) decoder_->colour.encoding = topic.encoding;
     if (topic.name == contents.depth.name) decoder_->depth.encoding = topic.encoding;
   }
-  if (contents.motion) motion_.emplace(contents.motion->body_from_cam);
 }
 
 std::optional<StoredPair> RecordedPairs::next() {
@@ -113,6 +133,7 @@ std::optional<StoredPair> RecordedPairs::next() {
       filter_.require_any(name_);
       return std::nullopt;
     }
+    go_on_();
     read_message();
   }
   return std::nullopt;
@@ -172,16 +193,13 @@ void RecordedPairs::add_image(StampPairing::Kind kind, const RecordedTopic& topi
 
 void RecordedPairs::add_motion(const RecordedTopic& topic, const RecordedMessage& message) {
   bool added = true;
+  const auto add = [&](auto sample) {
+    if (!stamped_) sample.stamp_ns = message.recorded_ns;
+    added = motion_.add(sample);
+  };
   try {
-    if (motion_topic_->inertial) {
-      ImuMessage imu = decode_imu(message.bytes, topic.encoding);
-      if (!stamped_) imu.header.stamp_ns = message.recorded_ns;
-      added = motion_->add(imu);
-    } else {
-      OdometryMessage odometry = decode_odometry(message.bytes, topic.encoding);
-      if (!stamped_) odometry.header.stamp_ns = message.recorded_ns;
-      added = motion_->add(odometry);
-    }
+    motion_topic_->inertial ? add(sample_of(decode_imu(message.bytes, topic.encoding)))
+                            : add(sample_of(decode_odometry(message.bytes, topic.encoding)));
   } catch (const InputError& e) {
     warn_once("motion", name_ + ": " + topic.name + ": a message is broken (" + e.what() + "); it is left out");
   }
@@ -203,7 +221,7 @@ void RecordedPairs::collect() {
 bool RecordedPairs::motion_is_known(const StampPairing::Pair& pair) const {
   constexpr int64_t kPatience = kNsPerSecond / 2;
   constexpr size_t kMostReady = 30;
-  return !motion_ || ended_ || motion_->reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
+  return !motion_topic_ || ended_ || motion_.reaches(pair.colour.stamp_ns) || ready_.size() > kMostReady ||
          ready_bytes_ > StampPairing::kMaxBytes || *newest_colour_ns_ > pair.colour.stamp_ns + kPatience;
 }
 
@@ -212,14 +230,17 @@ StoredPair RecordedPairs::stored(StampPairing::Pair pair) {
   made.stamp_ns = pair.colour.stamp_ns, made.depth_stamp_ns = pair.depth.stamp_ns;
   made.timestamp = seconds_from_ns(made.stamp_ns);
   made.stamp = stamp_text(made.stamp_ns);
-  if (motion_) {
-    if (before_ns_) made.prior = motion_->between(*before_ns_, made.stamp_ns);
-    motion_->forget_before(made.stamp_ns);
+  if (motion_topic_) {
+    const std::optional<MotionPrior> of_body = before_ns_ ? motion_.between(*before_ns_, made.stamp_ns) : std::nullopt;
+    if (of_body) made.prior = moved_to_camera(*of_body, motion_topic_->body_from_cam.inverse());
+    if (made.prior && !is_plausible(*made.prior)) made.prior.reset();  // a mount may be any number
+    motion_.forget_before(made.stamp_ns);
   }
   before_ns_ = made.stamp_ns;
   const auto images = std::make_shared<const StampPairing::Pair>(std::move(pair));
   made.mismatch = [images, decoder = decoder_] { return decoder->mismatch(*images); };
   made.decode = [images, decoder = decoder_] { return decoder->decode(*images); };
+  made.colour_file = [images, decoder = decoder_] { return decoder->colour.read(images->colour).stored; };
   return made;
 }
 

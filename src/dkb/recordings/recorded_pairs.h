@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,22 +12,19 @@
 
 #include "dkb/dataset/stored_pair.h"
 #include "dkb/recordings/depth_registration.h"
-#include "dkb/recordings/recorded_motion.h"
 #include "dkb/recordings/recording_contents.h"
 #include "dkb/recordings/stamp_pairing.h"
+#include "dkb_slam/source.h"
 
 namespace dkb {
-
-// Why a message of so many bytes holds no image of its topic's size, whatever it says; empty when it may: pixels of any
-// encoding and padding fit.
-std::string too_large(const RecordedImageTopic& topic, size_t bytes);
 
 // The pairs of images in a stream of messages. One thread at a time calls next(), any thread the rest.
 class RecordedPairs {
  public:
-  // `name` opens the messages.
-  RecordedPairs(std::unique_ptr<MessageStream> stream, const RecordingContents& contents,
-                const DatasetSelection& selection, std::string name);
+  // `name` opens the messages. `go_on` is called before each is read; next() throws what it throws.
+  RecordedPairs(
+      std::unique_ptr<MessageStream> stream, const RecordingContents& contents, const DatasetSelection& selection,
+      std::string name, std::function<void()> go_on = [] {});
 
   // Nothing at the end, and after stop(). Throws InputError when the selection leaves nothing.
   std::optional<StoredPair> next();
@@ -62,11 +60,12 @@ class RecordedPairs {
   void warn_once(const std::string& kind, const std::string& line);
 
   const std::string name_;
+  const std::function<void()> go_on_;
   const std::unique_ptr<MessageStream> stream_;
   const bool stamped_;
   const std::optional<RecordedMotionTopic> motion_topic_;
   const std::shared_ptr<Decoder> decoder_;
-  std::optional<RecordedMotion> motion_;
+  MotionHistory motion_;  // of its topic, where there is one
   StampPairing pairing_;
   PairFilter filter_;
   std::deque<StampPairing::Pair> ready_;  // wait for what is known of the motion up to them

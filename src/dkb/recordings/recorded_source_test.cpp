@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "dkb/dataset/folder_source.h"
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/image/image.h"
@@ -393,6 +395,57 @@ TEST_F(RecordedSourceTest, AClockThatIsSetBackIsToldAtTheEnd) {
       warnings[1],
       "r.bag: the clock of its images was set back: the last 60 of them have stamps before those of pairs that were "
       "used, and are left out; split the recording there to use them");
+}
+
+// A robot on a circle: 0.5 m/s and 0.4 rad/s about its z axis.
+Rigid3 on_the_circle(double t) {
+  const double angle = 0.4 * t, radius = 0.5 / 0.4;
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
+          {radius * std::sin(angle), radius * (1 - std::cos(angle)), 0}};
+}
+
+// The odometry of each interval is recorded 50 ms after the images that end it.
+TEST(RecordedMotion, ComesWithTheFramesOfARecording) {
+  // Looks along the robot's x axis, 0.3 m in front of its middle.
+  const Rigid3 mount{Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {0.3, 0, 0.2}};
+  const auto ns = [](double t) { return kFirst + static_cast<int64_t>(t * 1e9); };
+  MessageList list;
+  list.add("/tf_static", "tf2_msgs/TFMessage", 0, TransformsMessage{transform_message("base", "camera", mount)});
+  list.add("/rgb/camera_info", "sensor_msgs/CameraInfo", 0, info_message(small_camera(), "camera"));
+  int count = 0;
+  const auto add_odometry = [&](double recorded) {
+    const Rigid3 pose = on_the_circle(0.01 * count);
+    OdometryMessage message;
+    message.header = {ns(0.01 * count++), "odom", 0}, message.child_frame_id = "base";
+    message.pose = {pose.translation, pose.rotation};
+    list.add("/odom", "nav_msgs/Odometry", ns(recorded), message);
+  };
+  for (int n = 0; n < 20; ++n) {
+    const double t = 1e-9 * static_cast<double>(n * kInterval);
+    while (0.01 * count + 0.05 < t) add_odometry(t);
+    add_pairs(list, n, 1, "camera");
+  }
+  while (count < 80) add_odometry(1);
+  size_t pictures = 0;
+  for (MessageList::Message& m : list.messages())
+    if (list.topics()[m.topic].name == "/rgb/image" && ++pictures == 8) m.bytes.resize(500);
+  RecordedSource source(std::make_unique<MessageList>(list), "r.bag", {});
+  double before = -1;
+  int frames = 0;
+  for (SourceFrame next = source.next(); next.state != SourceState::ended; next = source.next()) {
+    if (next.state == SourceState::skipped) continue;
+    const double now = 1e-9 * static_cast<double>(next.frame.stamp_ns() - kFirst);
+    ASSERT_EQ(next.frame.prior().has_value(), before >= 0) << now;
+    if (before >= 0) {
+      const Rigid3 truth = (on_the_circle(before) * mount).inverse() * (on_the_circle(now) * mount);
+      const Rigid3& told = next.frame.prior()->previous_from_current;
+      EXPECT_LT((told.translation - truth.translation).norm(), 1e-4);
+      EXPECT_LT(told.rotation.angularDistance(truth.rotation), 1e-4);
+    }
+    before = now;
+    ++frames;
+  }
+  EXPECT_EQ(frames, 19) << "the motion through the one that is broken is part of the next one's";
 }
 
 }  // namespace

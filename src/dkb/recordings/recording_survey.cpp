@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "dkb/recordings/recorded_motion.h"
 #include "dkb/recordings/topic_names.h"
 #include "dkb/util/errors.h"
 
@@ -97,10 +96,10 @@ void RecordingSurvey::take(const RecordedTopic& topic, const RecordedMessage& me
   } else if (topic.type == "sensor_msgs/Imu") {
     if (shown(topic)) return;
     const ImuMessage imu = decode_imu(message.bytes, topic.encoding);
-    if (tells_rates(imu))
-      inertial.emplace(topic.name, imu.header.frame_id);
-    else
+    if (imu.angular_velocity_covariance[0] < 0)  // ROS' mark of a unit without a gyroscope
       without_rates.insert(topic.name);
+    else
+      inertial.emplace(topic.name, imu.header.frame_id);
   } else if (topic.name == kTransforms) {
     ++transform_messages_;
     transforms.add(decode_transforms(message.bytes, topic.encoding));
