@@ -146,7 +146,6 @@ int main(int argc, char** argv) try {
   const OrbOptions options;
   OrbExtractor extractor(options);
   const auto orb = cv::ORB::create(options.count);
-  const OpticalFlow flow;
   ImagePyramid previous_pyramid(flow_pyramid()), next_pyramid(flow_pyramid());
   Samples samples;
   double coverage = 0, orb_coverage = 0, images = 0;
@@ -179,7 +178,7 @@ int main(int argc, char** argv) try {
       previous_pyramid.build(image);
       samples.time("flow pyramid", [&] { next_pyramid.build(next); });
       std::vector<FlowResult> results;
-      samples.time("flow", [&] { results = flow.track(previous_pyramid, next_pyramid, points); });
+      samples.time("flow", [&] { results = track_flow(previous_pyramid, next_pyramid, points); });
       std::vector<uint8_t> status;
       std::vector<float> errors;
       samples.time("cv flow", [&] {

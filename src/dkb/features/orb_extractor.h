@@ -45,6 +45,7 @@ class OrbExtractor {
   void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
   const ImagePyramid& pyramid() const { return pyramid_; }
+  const SteeredBrief& brief() const { return brief_; }
 
  private:
   // What one thread keeps its buffers in.

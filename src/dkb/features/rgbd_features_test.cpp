@@ -36,7 +36,8 @@ OrbFeatures corners_at(const std::vector<Eigen::Vector2f>& pixels) {
 
 RgbdFeatures make(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                   const Vector6d& velocity = Vector6d::Zero(), const DepthOptions& options = {}) {
-  return make_rgbd_features(orb, keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
+  return make_rgbd_features(orb.descriptors,
+                            keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
                             camera, SensorNoise(), velocity, options);
 }
 
