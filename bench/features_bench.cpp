@@ -87,8 +87,7 @@ void time_stages(const GreyImage& image, const OrbOptions& options, Samples& sam
     for (int i = 0; i < pyramid.levels(); ++i) pixels += static_cast<double>(pyramid.level(i).size());
     for (int i = 0; i < pyramid.levels(); ++i) {
       const GreyImage& level = pyramid.level(i);
-      const int b = kOrbBorder;
-      const CornerRegion region{b, b, level.width() - b, level.height() - b};
+      const CornerRegion region = orb_region(level);
       if (region.width() <= 0 || region.height() <= 0) continue;
       spread.drop_weak(region, options.fast_threshold, kOrbCellSize, corners[static_cast<size_t>(i)]);
       spread.keep(region, static_cast<int>(options.count * static_cast<double>(level.size()) / pixels),

@@ -214,16 +214,12 @@ RgbdFeatures make_rgbd_features(std::vector<Descriptor> descriptors, std::vector
     k.depth = in_range(z) ? z : 0.0f;
     if (!in_range(k.lent_depth)) k.lent_depth = 0;
   }
-  result.width = camera.width;
-  result.height = camera.height;
   result.grid = KeypointGrid(result.keypoints, camera.width, camera.height);
   return result;
 }
 
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices) {
   RgbdFeatures result;
-  result.width = features.width;
-  result.height = features.height;
   result.keypoints.reserve(indices.size());
   result.descriptors.reserve(indices.size());
   for (int i : indices) {
@@ -231,7 +227,7 @@ RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indice
     result.keypoints.push_back(features.keypoints[f]);
     result.descriptors.push_back(features.descriptors[f]);
   }
-  result.grid = KeypointGrid(result.keypoints, features.width, features.height);
+  result.grid = KeypointGrid(result.keypoints, features.grid);
   return result;
 }
 

@@ -32,7 +32,6 @@ struct RgbdFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;  // same length
   KeypointGrid grid;                    // over the ideal pixels
-  int width = 0, height = 0;            // [px] of the image
   size_t size() const { return keypoints.size(); }
 };
 
