@@ -122,15 +122,20 @@ void ImagePyramid::Resampling::interpolate(const int16_t* blended, uint8_t* out)
 }
 
 #if defined(__x86_64__)
+// These read by copies of the addresses: for all that the compiler knows, what they write may be the vectors
+// themselves.
 DKB_TARGET_AVX2 size_t ImagePyramid::Resampling::interpolate_avx2(const int16_t* blended, uint8_t* out) const {
   const size_t groups = (columns.size() / 4) & ~size_t{1};  // two groups of four pixels a step
+  const auto* const starts = group_start.data();
+  const auto* const sources = shuffles.data();
+  const auto* const factors = weights.data();
   const __m256i round = _mm256_set1_epi32(kRound);
   for (size_t g = 0; g < groups; g += 2) {
-    const __m128i low = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + group_start[g]));
-    const __m128i high = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + group_start[g + 1]));
-    const __m256i shuffle = load_avx2(shuffles.data() + 16 * g);
+    const __m128i low = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + starts[g]));
+    const __m128i high = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + starts[g + 1]));
+    const __m256i shuffle = load_avx2(sources + 16 * g);
     const __m256i pairs = _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1), shuffle);
-    const __m256i rounded = _mm256_add_epi32(_mm256_madd_epi16(pairs, load_avx2(weights.data() + 8 * g)), round);
+    const __m256i rounded = _mm256_add_epi32(_mm256_madd_epi16(pairs, load_avx2(factors + 8 * g)), round);
     const __m256i sums = _mm256_srai_epi32(rounded, kShift);
     const __m256i words = _mm256_packus_epi32(sums, sums);
     const __m256i bytes = _mm256_packus_epi16(words, words);
@@ -145,12 +150,14 @@ DKB_TARGET_AVX2 size_t ImagePyramid::Resampling::interpolate_avx2(const int16_t*
 DKB_TARGET_AVX512 size_t ImagePyramid::Resampling::interpolate_avx512(const int16_t* blended, uint8_t* out) const {
   const size_t groups = columns.size() / 16;
   const __m512i round = _mm512_set1_epi32(kRound);
+  const auto* const starts = wide_start.data();
+  const auto* const sources = wide_columns.data();
+  const auto* const factors = weights.data();
   for (size_t g = 0; g < groups; ++g) {
-    const __m512i chosen = _mm512_loadu_si512(wide_columns.data() + 32 * g);
-    const __m512i pairs = _mm512_permutexvar_epi16(chosen, _mm512_loadu_si512(blended + wide_start[g]));
+    const __m512i chosen = _mm512_loadu_si512(sources + 32 * g);
+    const __m512i pairs = _mm512_permutexvar_epi16(chosen, _mm512_loadu_si512(blended + starts[g]));
     // Masked, since GCC 12 warns of the undefined register that the plain ones start from.
-    const __m512i rounded =
-        _mm512_add_epi32(_mm512_madd_epi16(pairs, _mm512_loadu_si512(weights.data() + 32 * g)), round);
+    const __m512i rounded = _mm512_add_epi32(_mm512_madd_epi16(pairs, _mm512_loadu_si512(factors + 32 * g)), round);
     const __m512i sums = _mm512_maskz_srai_epi32(0xFFFF, rounded, kShift);
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out + 16 * g), _mm512_maskz_cvtepi32_epi8(0xFFFF, sums));
   }
