@@ -290,6 +290,17 @@ TEST(RgbdFeatures, NoReadoutAndNoVelocityMeanNoChange) {
   EXPECT_NE(make(orb, image, camera, velocity).keypoints[0].pixel, global.keypoints[0].pixel);
 }
 
+TEST(RgbdFeatures, ASubsetIsFoundWhereItLies) {
+  const CameraModel camera = plain_camera();
+  const RgbdFeatures all = make(corners_at({{100, 50}, {300, 200}, {500, 400}}), image_of(camera, 2), camera);
+  const RgbdFeatures some = subset(all, {2, 0});
+  ASSERT_EQ(some.size(), 2U);
+  EXPECT_EQ(some.descriptors[0], all.descriptors[2]);
+  std::vector<int> near;
+  some.grid.for_each_near({499, 401, 3}, [&](int i) { near.push_back(i); });
+  EXPECT_EQ(near, std::vector<int>{0});
+}
+
 TEST(RgbdFeatures, NothingFoundIsNoError) {
   const CameraModel camera = plain_camera();
   const RgbdFeatures f = make({}, image_of(camera, 2), camera);
