@@ -87,8 +87,7 @@ void time_stages(const GreyImage& image, const OrbOptions& options, Samples& sam
     for (int i = 0; i < pyramid.levels(); ++i) pixels += static_cast<double>(pyramid.level(i).size());
     for (int i = 0; i < pyramid.levels(); ++i) {
       const GreyImage& level = pyramid.level(i);
-      const int b = kOrbBorder;
-      const CornerRegion region{b, b, level.width() - b, level.height() - b};
+      const CornerRegion region = orb_region(level);
       if (region.width() <= 0 || region.height() <= 0) continue;
       spread.drop_weak(region, options.fast_threshold, kOrbCellSize, corners[static_cast<size_t>(i)]);
       spread.keep(region, static_cast<int>(options.count * static_cast<double>(level.size()) / pixels),
@@ -146,7 +145,6 @@ int main(int argc, char** argv) try {
   const OrbOptions options;
   OrbExtractor extractor(options);
   const auto orb = cv::ORB::create(options.count);
-  const OpticalFlow flow;
   ImagePyramid previous_pyramid(flow_pyramid()), next_pyramid(flow_pyramid());
   Samples samples;
   double coverage = 0, orb_coverage = 0, images = 0;
@@ -179,7 +177,7 @@ int main(int argc, char** argv) try {
       previous_pyramid.build(image);
       samples.time("flow pyramid", [&] { next_pyramid.build(next); });
       std::vector<FlowResult> results;
-      samples.time("flow", [&] { results = flow.track(previous_pyramid, next_pyramid, points); });
+      samples.time("flow", [&] { results = track_flow(previous_pyramid, next_pyramid, points); });
       std::vector<uint8_t> status;
       std::vector<float> errors;
       samples.time("cv flow", [&] {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dkb/features/optical_flow.h"
 #include "dkb/solver/absolute_pose.h"
 #include "dkb/solver/pose_optimiser.h"
 
@@ -29,7 +30,7 @@ std::vector<FilterFeature> RivalFilter::describe(const RivalFilterInput& input) 
     f.depth = depth_near(input.image.depth, corners[i].x, corners[i].y);
   }
   if (!needs_pyramid() || input.boxes.empty() || input.previous == nullptr) return features;
-  const auto results = flow_.track(*input.pyramid, *input.previous->pyramid, points);
+  const auto results = track_flow(*input.pyramid, *input.previous->pyramid, points);
   for (size_t i = 0; i < features.size(); ++i) {
     if (!results[i].found) continue;
     const Eigen::Vector2f at = results[i].position;

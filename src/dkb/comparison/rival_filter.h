@@ -7,7 +7,6 @@
 #include "dkb/comparison/dynamic_filter.h"
 #include "dkb/dynamics/carried_objects.h"
 #include "dkb/features/features.h"
-#include "dkb/features/optical_flow.h"
 #include "dkb/features/rgbd_features.h"
 
 namespace dkb {
@@ -42,7 +41,6 @@ class RivalFilter {
   FilterKind kind_;
   Camera camera_;
   PaperFilterOptions paper_;
-  OpticalFlow flow_;
 };
 
 }  // namespace dkb

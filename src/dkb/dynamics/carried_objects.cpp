@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dkb/detection/mask_folder.h"
+#include "dkb/features/optical_flow.h"
 
 namespace dkb {
 namespace {
@@ -39,7 +40,7 @@ std::vector<PointMotion> CarriedObjects::motions(const PastFrame& from, const Im
     }
   }
   std::vector<PointMotion> motions;
-  const auto results = flow_.track(*from.pyramid, to, points);
+  const auto results = track_flow(*from.pyramid, to, points);
   for (size_t i = 0; i < points.size(); ++i)
     if (results[i].found) motions.push_back({points[i], results[i].position});
   return motions;

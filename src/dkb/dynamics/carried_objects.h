@@ -8,7 +8,7 @@
 #include "dkb/detection/carried_detections.h"
 #include "dkb/dynamics/mover_mask.h"
 #include "dkb/dynamics/silhouette.h"
-#include "dkb/features/optical_flow.h"
+#include "dkb/features/image_pyramid.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/map/ids.h"
 
@@ -64,7 +64,6 @@ class CarriedObjects {
 
   Camera camera_;
   SensorNoise noise_;
-  OpticalFlow flow_;
   std::vector<Carried> carried_;
   GreyImage mask_;
 };

@@ -5,6 +5,7 @@
 
 #include "dkb/features/fast_corners.h"
 #include "dkb/features/feature_test_util.h"
+#include "dkb/features/optical_flow.h"
 
 namespace dkb {
 namespace {

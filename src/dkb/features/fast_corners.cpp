@@ -5,10 +5,6 @@
 #include <array>
 #include <bit>
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 namespace dkb {
 namespace {
 

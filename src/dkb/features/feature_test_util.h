@@ -17,6 +17,15 @@ inline GreyImage noise_image(int width, int height, uint64_t seed) {
   return image;
 }
 
+// 320 x 240 pixels in blocks of random greys: corners without end.
+inline GreyImage blocks_image(uint64_t seed) {
+  const GreyImage cells = noise_image(40, 30, seed);
+  GreyImage image(320, 240);
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) image(x, y) = cells(x / 8, y / 8);
+  return image;
+}
+
 // Turn, scale and shift of a view of a plane.
 struct PlaneMotion {
   double a = 1, b = 0, tx = 0, ty = 0;

@@ -47,7 +47,7 @@ class ExtractedFeatures final : public FrameFeatures {
         as_seen_(keypoints_as_seen(orb, image, undistort, camera, noise)) {}
   std::shared_ptr<const RgbdFeatures> at(const Vector6d& velocity) const override {
     return std::make_shared<const RgbdFeatures>(
-        make_rgbd_features(orb_, as_seen_, image_, camera_, noise_, velocity, options_));
+        make_rgbd_features(orb_.descriptors, as_seen_, image_, camera_, noise_, velocity, options_));
   }
 
  private:

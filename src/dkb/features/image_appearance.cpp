@@ -9,13 +9,12 @@ Look ImageAppearance::look(const Eigen::Vector2d& pixel, double depth, int octav
   constexpr int kSameBits = 80, kOtherBits = 100;  // two random descriptors differ by 128
   const Eigen::Vector2f at = camera_.distort(pixel).cast<float>();
   const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
-  if (!image_.depth.contains(x, y) || !(image_.depth(x, y) > 0)) return Look::unknown;
-  const double seen = image_.depth(x, y);
+  if (!depth_.contains(x, y) || !(depth_(x, y) > 0)) return Look::unknown;
+  const double seen = depth_(x, y);
   if (seen < depth - noise_.surface_tolerance(depth)) return Look::unknown;  // hidden, if only by a hand's breadth
   // Gone: what lies behind it is seen. It may have been taken away, which happens in every place.
   if (seen > depth + noise_.point_tolerance(depth)) return Look::unknown;
-  if (!describer_) describer_.emplace(pyramid_).set_image(image_.grey);
-  const auto bits = describer_->distance(at.x(), at.y(), octave, descriptor);
+  const auto bits = describer_.distance(at.x(), at.y(), octave, descriptor);
   if (!bits || (*bits > kSameBits && *bits < kOtherBits)) return Look::unknown;
   return *bits <= kSameBits ? Look::same : Look::other;
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
-
 #include "dkb/features/patch_describer.h"
-#include "dkb/features/rgbd_features.h"
+#include "dkb/geometry/camera.h"
 #include "dkb/geometry/sensor_noise.h"
+#include "dkb/image/image.h"
 
 namespace dkb {
 
@@ -27,18 +26,18 @@ class PointAppearance {
 // By what a descriptor differs from the image where it should be found. Does nothing until it is asked.
 class ImageAppearance final : public PointAppearance {
  public:
-  // The image and the camera must outlive it.
-  ImageAppearance(const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
-                  const ImagePyramidOptions& pyramid)
-      : image_(image), camera_(camera), noise_(noise), pyramid_(pyramid) {}
+  // Of an image by its depth and what the extractor made its features with. All but the noise must outlive it, and the
+  // pyramid must not be built anew before.
+  ImageAppearance(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                  const ImagePyramid& pyramid, const SteeredBrief& brief)
+      : depth_(depth), camera_(camera), noise_(noise), describer_(pyramid, brief) {}
   Look look(const Eigen::Vector2d& pixel, double depth, int octave, const Descriptor& descriptor) override;
 
  private:
-  const RgbdImage& image_;
+  const DepthImage& depth_;
   const CameraModel& camera_;
   SensorNoise noise_;
-  ImagePyramidOptions pyramid_;
-  std::optional<PatchDescriber> describer_;  // of the image, once it was asked for
+  PatchDescriber describer_;
 };
 
 }  // namespace dkb

@@ -3,21 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/features/feature_test_util.h"
 #include "dkb/features/orb_extractor.h"
-#include "dkb/util/random.h"
+#include "dkb/image/rgbd_image.h"
 
 namespace dkb {
 namespace {
 
 // Blocks of random greys on a wall at 2 m.
 RgbdImage wall(uint64_t seed) {
-  Random random(seed);
-  GreyImage cells(40, 30);
-  for (size_t i = 0; i < cells.size(); ++i) cells.data()[i] = static_cast<uint8_t>(random.below(256));
   RgbdImage image;
-  image.grey = GreyImage(320, 240);
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) image.grey(x, y) = cells(x / 8, y / 8);
+  image.grey = blocks_image(seed);
   image.depth = DepthImage(320, 240, 2.0f);
   return image;
 }
@@ -34,7 +30,9 @@ class ImageAppearanceTest : public ::testing::Test {
     }
   }
   Look look_in(const RgbdImage& seen, double depth = 2) const {
-    ImageAppearance appearance(seen, camera, {}, {});
+    OrbExtractor extractor;
+    extractor.extract(seen.grey);
+    ImageAppearance appearance(seen.depth, camera, {}, extractor.pyramid(), extractor.brief());
     return appearance.look({chosen->x, chosen->y}, depth, chosen->octave, descriptor);
   }
 
@@ -73,7 +71,9 @@ TEST_F(ImageAppearanceTest, WhatIsHiddenOrGoneIsNotTold) {
 }
 
 TEST_F(ImageAppearanceTest, PlacesOutsideTheImageAreNotTold) {
-  ImageAppearance appearance(image, camera, {}, {});
+  OrbExtractor extractor;
+  extractor.extract(image.grey);
+  ImageAppearance appearance(image.depth, camera, {}, extractor.pyramid(), extractor.brief());
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(-5, 100), {400, 100}, {100, -1}, {100, 300}, {1e12, -1e12}})
     EXPECT_EQ(appearance.look(pixel, 2, 0, {}), Look::unknown);
 }

@@ -7,10 +7,6 @@
 #include "dkb/features/vectorised.h"
 #include "dkb/util/errors.h"
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 namespace dkb {
 namespace {
 
@@ -28,16 +24,6 @@ void blend_rows(Simd simd, const GreyImage& source, int index, int weight, int16
     DKB_INDEPENDENT_STEPS
     for (int x = 0; x < width; ++x) blended[x] = static_cast<int16_t>(a[x] * (kRowOne - weight) + b[x] * weight);
   });
-}
-
-// One output row between the vertical blend and the end: scalar columns from `first` on.
-template <class Taps>
-void interpolate_columns(const Taps& columns, size_t first, const int16_t* blended, uint8_t* out) {
-  for (size_t x = first; x < columns.size(); ++x) {
-    const int32_t w = columns[x].weight;
-    const int16_t* v = blended + columns[x].index;
-    out[x] = static_cast<uint8_t>((v[0] * (kColumnOne - w) + v[1] * w + kRound) >> kShift);
-  }
 }
 
 }  // namespace
@@ -97,18 +83,17 @@ void ImagePyramid::plan(int width, int height) {
     images_.emplace_back(w, h);
     scales_.push_back({static_cast<double>(width) / w, static_cast<double>(height) / h});
   }
-  levels_ = static_cast<int>(images_.size());
   row_buffer_.assign(static_cast<size_t>(width + kPadding), 0);
 }
 
 void ImagePyramid::build(const GreyImage& image) {
   start(image);
-  for (int i = 1; i < levels_; ++i) build_level(i);
+  for (int i = 1; i < levels(); ++i) build_level(i);
 }
 
 void ImagePyramid::start(const GreyImage& image) {
   if (image.empty()) throw InputError("image pyramid: the image is empty; give one with at least one pixel");
-  if (levels_ == 0 || images_[0].width() != image.width() || images_[0].height() != image.height())
+  if (images_.empty() || images_[0].width() != image.width() || images_[0].height() != image.height())
     plan(image.width(), image.height());
   std::copy(image.data(), image.data() + image.size(), images_[0].data());
 }
@@ -116,71 +101,67 @@ void ImagePyramid::start(const GreyImage& image) {
 void ImagePyramid::build_level(int index) {
   const auto i = static_cast<size_t>(index);
   const Resampling& resampling = resamplings_[i - 1];
+  for (int y = 0; y < images_[i].height(); ++y) {
+    const Tap row = resampling.rows[static_cast<size_t>(y)];
+    blend_rows(resampling.simd, images_[i - 1], row.index, row.weight, row_buffer_.data());
+    resampling.interpolate(row_buffer_.data(), images_[i].row(y));
+  }
+}
+
+void ImagePyramid::Resampling::interpolate(const int16_t* blended, uint8_t* out) const {
+  size_t x = 0;
 #if defined(__x86_64__)
-  if (resampling.simd == Simd::avx512)
-    return resample_avx512(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
-  if (resampling.simd == Simd::avx2) return resample_avx2(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
+  if (simd == Simd::avx512) x = interpolate_avx512(blended, out);
+  if (simd == Simd::avx2) x = interpolate_avx2(blended, out);
 #endif
-  resample_scalar(resampling, images_[i - 1], row_buffer_.data(), images_[i]);
-}
-
-void ImagePyramid::resample_scalar(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
-                                   GreyImage& target) {
-  for (int y = 0; y < target.height(); ++y) {
-    const Tap row = plan.rows[static_cast<size_t>(y)];
-    blend_rows(Simd::scalar, source, row.index, row.weight, row_buffer);
-    interpolate_columns(plan.columns, 0, row_buffer, target.row(y));
+  for (; x < columns.size(); ++x) {
+    const int32_t w = columns[x].weight;
+    const int16_t* v = blended + columns[x].index;
+    out[x] = static_cast<uint8_t>((v[0] * (kColumnOne - w) + v[1] * w + kRound) >> kShift);
   }
 }
 
 #if defined(__x86_64__)
-DKB_TARGET_AVX2 void ImagePyramid::resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer,
-                                                 GreyImage& target) {
-  const size_t groups = (plan.columns.size() / 4) & ~size_t{1};  // two groups of four pixels a step
-  for (int y = 0; y < target.height(); ++y) {
-    const Tap row = plan.rows[static_cast<size_t>(y)];
-    blend_rows(Simd::avx2, source, row.index, row.weight, row_buffer);
-
-    uint8_t* out = target.row(y);
-    const __m256i round = _mm256_set1_epi32(kRound);
-    for (size_t g = 0; g < groups; g += 2) {
-      const __m128i low = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row_buffer + plan.group_start[g]));
-      const __m128i high = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row_buffer + plan.group_start[g + 1]));
-      const __m256i shuffle = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(plan.shuffles.data() + 16 * g));
-      const __m256i weights = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(plan.weights.data() + 8 * g));
-      const __m256i pairs = _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1), shuffle);
-      const __m256i sums = _mm256_srai_epi32(_mm256_add_epi32(_mm256_madd_epi16(pairs, weights), round), kShift);
-      const __m256i words = _mm256_packus_epi32(sums, sums);
-      const __m256i bytes = _mm256_packus_epi16(words, words);
-      const uint32_t left = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_castsi256_si128(bytes)));
-      const uint32_t right = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_extracti128_si256(bytes, 1)));
-      const uint64_t both = left | (static_cast<uint64_t>(right) << 32);
-      __builtin_memcpy(out + 4 * g, &both, 8);
-    }
-    interpolate_columns(plan.columns, 4 * groups, row_buffer, out);
+// These read by copies of the addresses: for all that the compiler knows, what they write may be the vectors
+// themselves.
+DKB_TARGET_AVX2 size_t ImagePyramid::Resampling::interpolate_avx2(const int16_t* blended, uint8_t* out) const {
+  const size_t groups = (columns.size() / 4) & ~size_t{1};  // two groups of four pixels a step
+  const auto* const starts = group_start.data();
+  const auto* const sources = shuffles.data();
+  const auto* const factors = weights.data();
+  const __m256i round = _mm256_set1_epi32(kRound);
+  for (size_t g = 0; g < groups; g += 2) {
+    const __m128i low = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + starts[g]));
+    const __m128i high = _mm_loadu_si128(reinterpret_cast<const __m128i*>(blended + starts[g + 1]));
+    const __m256i shuffle = load_avx2(sources + 16 * g);
+    const __m256i pairs = _mm256_shuffle_epi8(_mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1), shuffle);
+    const __m256i rounded = _mm256_add_epi32(_mm256_madd_epi16(pairs, load_avx2(factors + 8 * g)), round);
+    const __m256i sums = _mm256_srai_epi32(rounded, kShift);
+    const __m256i words = _mm256_packus_epi32(sums, sums);
+    const __m256i bytes = _mm256_packus_epi16(words, words);
+    const uint32_t left = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_castsi256_si128(bytes)));
+    const uint32_t right = static_cast<uint32_t>(_mm_cvtsi128_si32(_mm256_extracti128_si256(bytes, 1)));
+    const uint64_t both = left | (static_cast<uint64_t>(right) << 32);
+    __builtin_memcpy(out + 4 * g, &both, 8);
   }
+  return 4 * groups;
 }
 
-DKB_TARGET_AVX512 void ImagePyramid::resample_avx512(const Resampling& plan, const GreyImage& source,
-                                                     int16_t* row_buffer, GreyImage& target) {
-  const size_t groups = plan.columns.size() / 16;
+DKB_TARGET_AVX512 size_t ImagePyramid::Resampling::interpolate_avx512(const int16_t* blended, uint8_t* out) const {
+  const size_t groups = columns.size() / 16;
   const __m512i round = _mm512_set1_epi32(kRound);
-  for (int y = 0; y < target.height(); ++y) {
-    const Tap row = plan.rows[static_cast<size_t>(y)];
-    blend_rows(Simd::avx512, source, row.index, row.weight, row_buffer);
-
-    uint8_t* out = target.row(y);
-    for (size_t g = 0; g < groups; ++g) {
-      const __m512i columns = _mm512_loadu_si512(plan.wide_columns.data() + 32 * g);
-      const __m512i weights = _mm512_loadu_si512(plan.weights.data() + 32 * g);
-      const __m512i pairs = _mm512_permutexvar_epi16(columns, _mm512_loadu_si512(row_buffer + plan.wide_start[g]));
-      // Masked, since GCC 12 warns of the undefined register that the plain ones start from.
-      const __m512i rounded = _mm512_add_epi32(_mm512_madd_epi16(pairs, weights), round);
-      const __m512i sums = _mm512_maskz_srai_epi32(0xFFFF, rounded, kShift);
-      _mm_storeu_si128(reinterpret_cast<__m128i*>(out + 16 * g), _mm512_maskz_cvtepi32_epi8(0xFFFF, sums));
-    }
-    interpolate_columns(plan.columns, 16 * groups, row_buffer, out);
+  const auto* const starts = wide_start.data();
+  const auto* const sources = wide_columns.data();
+  const auto* const factors = weights.data();
+  for (size_t g = 0; g < groups; ++g) {
+    const __m512i chosen = _mm512_loadu_si512(sources + 32 * g);
+    const __m512i pairs = _mm512_permutexvar_epi16(chosen, _mm512_loadu_si512(blended + starts[g]));
+    // Masked, since GCC 12 warns of the undefined register that the plain ones start from.
+    const __m512i rounded = _mm512_add_epi32(_mm512_madd_epi16(pairs, _mm512_loadu_si512(factors + 32 * g)), round);
+    const __m512i sums = _mm512_maskz_srai_epi32(0xFFFF, rounded, kShift);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out + 16 * g), _mm512_maskz_cvtepi32_epi8(0xFFFF, sums));
   }
+  return 16 * groups;
 }
 #endif
 

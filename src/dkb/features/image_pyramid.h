@@ -32,7 +32,7 @@ class ImagePyramid {
   void build_level(int index);
 
   // Levels built; less than asked for when the image is small. 0 before the first build().
-  int levels() const { return levels_; }
+  int levels() const { return static_cast<int>(images_.size()); }
   const GreyImage& level(int index) const { return images_[static_cast<size_t>(index)]; }
 
   // Size of level 0 over that of level `index`, by its rounded width and height.
@@ -59,6 +59,12 @@ class ImagePyramid {
     std::vector<uint16_t> wide_columns;
     std::vector<int16_t> weights;
     Simd simd = Simd::scalar;  // the best that can do it: groups must not reach farther than one register does
+
+    // A row of the next level from two of this one, blended.
+    void interpolate(const int16_t* blended, uint8_t* out) const;
+    // The first columns of it, in whole groups; return how many.
+    size_t interpolate_avx2(const int16_t* blended, uint8_t* out) const;
+    size_t interpolate_avx512(const int16_t* blended, uint8_t* out) const;
   };
   struct Scale {
     double x = 1, y = 1;
@@ -67,13 +73,9 @@ class ImagePyramid {
   void plan(int width, int height);
   static std::vector<Tap> make_taps(int source, int target, int one);
   static Resampling make_resampling(int width, int height, int next_width, int next_height, Simd simd);
-  static void resample_scalar(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
-  static void resample_avx2(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
-  static void resample_avx512(const Resampling& plan, const GreyImage& source, int16_t* row_buffer, GreyImage& target);
 
   ImagePyramidOptions options_;
   Simd simd_;
-  int levels_ = 0;
   std::vector<GreyImage> images_;
   std::vector<Resampling> resamplings_;  // [i]: from level i to i + 1
   std::vector<Scale> scales_;

@@ -18,7 +18,7 @@ namespace dkb {
 class KeypointGrid {
  public:
   KeypointGrid() = default;
-  // Of points with a `pixel` and an `octave`.
+  // Of points with a `pixel` and an `octave`, in an image of this size [px].
   template <class Points>
   KeypointGrid(const Points& points, int width, int height) : columns_(width / kCell + 1), rows_(height / kCell + 1) {
     first_.assign(static_cast<size_t>(columns_ * rows_) + 1, 0);
@@ -39,6 +39,11 @@ class KeypointGrid {
       index_[k] = index++;
     }
   }
+
+  // In an image of the same size as that of `other`.
+  template <class Points>
+  KeypointGrid(const Points& points, const KeypointGrid& other)
+      : KeypointGrid(points, kCell * (other.columns_ - 1), kCell * (other.rows_ - 1)) {}
 
   // Where points are asked for: within `radius` [px] of (x, y), in both directions, on these octaves.
   struct Place {
@@ -98,7 +103,7 @@ class KeypointGrid {
   }
 
   static constexpr size_t kGroup = 4;  // points compared at once
-  int columns_ = 0, rows_ = 0;
+  int columns_ = 1, rows_ = 1;
   std::vector<int32_t> first_;   // point of each cell
   std::vector<float> x_, y_;     // by cells, with room for a group more
   std::vector<uint8_t> octave_;  // the same

@@ -3,10 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
+#include <limits>
 
 namespace dkb {
 namespace {
@@ -51,8 +48,8 @@ void sample_scalar(const GreyImage& image, const Placement& p, int size, int16_t
 
 LkSums sums_scalar(const LkTemplate& reference, const int16_t* samples) {
   LkSums sums;
-  for (int row = 0; row < reference.size; ++row)
-    for (int i = row * kLkStride; i < row * kLkStride + reference.size; ++i) {
+  for (int row = 0; row < kFlowWindow; ++row)
+    for (int i = row * kLkStride; i < row * kLkStride + kFlowWindow; ++i) {
       const int d = samples[i] - reference.value[i];
       sums.absolute += std::abs(d);
       sums.dx += d * reference.dx[i];
@@ -76,98 +73,77 @@ DKB_TARGET_AVX2 void sample_avx2(const GreyImage& image, const Placement& p, int
   const __m256i upper_weights = _mm256_set1_epi32(p.w00 | p.w01 << 16);
   const __m256i lower_weights = _mm256_set1_epi32(p.w10 | p.w11 << 16);
   const __m256i round = _mm256_set1_epi32(kRound);
-  for (int column = 0; column < size; column += 16) {
-    PixelPairs upper = load_pairs(image.row(p.y) + p.x + column);
-    for (int row = 0; row < size; ++row) {
-      const PixelPairs lower = load_pairs(image.row(p.y + row + 1) + p.x + column);
-      __m256i low =
-          _mm256_add_epi32(_mm256_madd_epi16(upper.low, upper_weights), _mm256_madd_epi16(lower.low, lower_weights));
-      __m256i high =
-          _mm256_add_epi32(_mm256_madd_epi16(upper.high, upper_weights), _mm256_madd_epi16(lower.high, lower_weights));
-      low = _mm256_srai_epi32(_mm256_add_epi32(low, round), kShift);
-      high = _mm256_srai_epi32(_mm256_add_epi32(high, round), kShift);
-      const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xD8);
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(samples + row * kLkStride + column), packed);
-      upper = lower;
-    }
+  PixelPairs upper = load_pairs(image.row(p.y) + p.x);
+  for (int row = 0; row < size; ++row) {
+    const PixelPairs lower = load_pairs(image.row(p.y + row + 1) + p.x);
+    __m256i low =
+        _mm256_add_epi32(_mm256_madd_epi16(upper.low, upper_weights), _mm256_madd_epi16(lower.low, lower_weights));
+    __m256i high =
+        _mm256_add_epi32(_mm256_madd_epi16(upper.high, upper_weights), _mm256_madd_epi16(lower.high, lower_weights));
+    low = _mm256_srai_epi32(_mm256_add_epi32(low, round), kShift);
+    high = _mm256_srai_epi32(_mm256_add_epi32(high, round), kShift);
+    const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xD8);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(samples + row * kLkStride), packed);
+    upper = lower;
   }
 }
 
-DKB_TARGET_AVX2 inline int64_t sum_lanes(__m256i v) {
-  const __m256i four = _mm256_add_epi64(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(v)),
-                                        _mm256_cvtepi32_epi64(_mm256_extracti128_si256(v, 1)));
-  const __m128i two = _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
-  return _mm_cvtsi128_si64(_mm_add_epi64(two, _mm_unpackhi_epi64(two, two)));
-}
-
-// No lane overflows: products of differences are below 4080^2, two to a lane and step, in at most 29 rows of 2 blocks.
 DKB_TARGET_AVX2 LkSums sums_avx2(const LkTemplate& reference, const int16_t* samples) {
   const __m256i ones = _mm256_set1_epi16(1);
   const __m256i index = _mm256_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const __m256i inside = _mm256_cmpgt_epi16(_mm256_set1_epi16(kFlowWindow), index);
   __m256i absolute = _mm256_setzero_si256(), dx = absolute, dy = absolute;
-  for (int column = 0; column < reference.size; column += 16) {
-    const __m256i inside = _mm256_cmpgt_epi16(_mm256_set1_epi16(static_cast<int16_t>(reference.size - column)), index);
-    for (int row = 0; row < reference.size; ++row) {
-      const int at = row * kLkStride + column;
-      const __m256i value = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.value + at));
-      const __m256i sample = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(samples + at));
-      const __m256i d = _mm256_and_si256(_mm256_sub_epi16(sample, value), inside);
-      const __m256i slope_x = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dx + at));
-      const __m256i slope_y = _mm256_load_si256(reinterpret_cast<const __m256i*>(reference.dy + at));
-      absolute = _mm256_add_epi32(absolute, _mm256_madd_epi16(_mm256_abs_epi16(d), ones));
-      dx = _mm256_add_epi32(dx, _mm256_madd_epi16(d, slope_x));
-      dy = _mm256_add_epi32(dy, _mm256_madd_epi16(d, slope_y));
-    }
+  for (int row = 0; row < kFlowWindow; ++row) {
+    const int at = row * kLkStride;
+    const __m256i difference = _mm256_sub_epi16(load_avx2(samples + at), load_avx2(reference.value + at));
+    const __m256i d = _mm256_and_si256(difference, inside);
+    absolute = _mm256_add_epi32(absolute, _mm256_madd_epi16(_mm256_abs_epi16(d), ones));
+    dx = _mm256_add_epi32(dx, _mm256_madd_epi16(d, load_avx2(reference.dx + at)));
+    dy = _mm256_add_epi32(dy, _mm256_madd_epi16(d, load_avx2(reference.dy + at)));
   }
-  return {sum_lanes(absolute), sum_lanes(dx), sum_lanes(dy)};
+  return {sum_avx2(absolute), sum_avx2(dx), sum_avx2(dy)};
 }
 #endif
+
+// No sum overflows its 32 bits.
+constexpr int64_t kLargest = 255 * kLkOne;  // of samples, differences and slopes
+static_assert(kFlowWindow * kFlowWindow * kLargest * kLargest <= std::numeric_limits<int32_t>::max());
 
 }  // namespace
 
 bool lk_fits(const GreyImage& image, double x, double y, int size) {
-  const double before = size / 2, after = size - 1 - size / 2;
-  return x - before >= 0 && y - before >= 0 && x + after <= image.width() - 1 && y + after <= image.height() - 1;
+  const int reach = size / 2;
+  return x - reach >= 0 && y - reach >= 0 && x + reach <= image.width() - 1 && y + reach <= image.height() - 1;
 }
 
 void lk_sample(const GreyImage& image, double x, double y, int size, int16_t* samples, [[maybe_unused]] Simd simd) {
   const Placement p = place(x, y, size);
 #if defined(__x86_64__)
-  // Blocks of 16 columns and their right neighbours are read, one row beyond the window; that must stay in memory.
-  const size_t columns = static_cast<size_t>((size + 15) / 16 * 16);
+  // 16 columns and their right neighbours are read, one row beyond the window; that must stay in memory.
   const size_t last =
-      static_cast<size_t>(p.y + size) * static_cast<size_t>(image.width()) + static_cast<size_t>(p.x) + columns;
+      static_cast<size_t>(p.y + size) * static_cast<size_t>(image.width()) + static_cast<size_t>(p.x + 16);
   if (simd >= Simd::avx2 && last < image.size()) return sample_avx2(image, p, size, samples);
 #endif
   sample_scalar(image, p, size, samples);
 }
 
-void lk_make_template(const int16_t* samples_with_rim, int size, LkTemplate& target) {
-  target.size = size;
-  int64_t xx = 0, xy = 0, yy = 0;
-  for (int row = 0; row < size; ++row) {
+void lk_make_template(const int16_t* samples_with_rim, LkTemplate& target) {
+  int32_t xx = 0, xy = 0, yy = 0;
+  for (int row = 0; row < kFlowWindow; ++row) {
     const int16_t* middle = samples_with_rim + (row + 1) * kLkStride + 1;
     const int16_t* above = middle - kLkStride;
     const int16_t* below = middle + kLkStride;
     int16_t* value = target.value + row * kLkStride;
     int16_t* dx = target.dx + row * kLkStride;
     int16_t* dy = target.dy + row * kLkStride;
-    int32_t row_xx = 0, row_xy = 0, row_yy = 0;
-    for (int i = 0; i < size; ++i) {
+    for (int i = 0; i < kFlowWindow; ++i) {
       value[i] = middle[i];
       dx[i] = static_cast<int16_t>(middle[i + 1] - middle[i - 1]);
       dy[i] = static_cast<int16_t>(below[i] - above[i]);
-      row_xx += dx[i] * dx[i];
-      row_xy += dx[i] * dy[i];
-      row_yy += dy[i] * dy[i];
+      xx += dx[i] * dx[i];
+      xy += dx[i] * dy[i];
+      yy += dy[i] * dy[i];
     }
-    // The vector kernel reads whole blocks and multiplies what lies outside by zero.
-    std::fill(value + size, value + kLkStride, int16_t{0});
-    std::fill(dx + size, dx + kLkStride, int16_t{0});
-    std::fill(dy + size, dy + kLkStride, int16_t{0});
-    xx += row_xx;
-    xy += row_xy;
-    yy += row_yy;
   }
   target.sum_xx = xx;
   target.sum_xy = xy;

@@ -17,11 +17,6 @@ struct BestTwo {
   int distance = 257, second = 257;  // [bits]
 };
 
-// Distances of `query` to the `count` descriptors of `set`.
-void distances_scalar(const Descriptor& query, const Descriptor* set, size_t count, int32_t* distances) {
-  for (size_t i = 0; i < count; ++i) distances[i] = hamming_distance(query, set[i]);
-}
-
 #if defined(__x86_64__)
 DKB_TARGET_AVX2 void distances_popcnt(const Descriptor& query, const Descriptor* set, size_t count,
                                       int32_t* distances) {
@@ -34,12 +29,13 @@ DKB_TARGET_AVX2 void distances_popcnt(const Descriptor& query, const Descriptor*
 }
 #endif
 
+// Distances of `query` to the `count` descriptors of `set`.
 void distances_of(const Descriptor& query, const Descriptor* set, size_t count, int32_t* distances,
                   [[maybe_unused]] Simd simd) {
 #if defined(__x86_64__)
   if (simd >= Simd::avx2) return distances_popcnt(query, set, count, distances);
 #endif
-  distances_scalar(query, set, count, distances);
+  for (size_t i = 0; i < count; ++i) distances[i] = hamming_distance(query, set[i]);
 }
 
 void offer(BestTwo& best, int index, int distance) {

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "dkb/features/image_pyramid.h"
+#include "dkb/features/lucas_kanade.h"
 #include "dkb/features/simd.h"
 
 namespace dkb {
-
-constexpr int kFlowWindow = 11;  // [px] side of the window (k of DKB section 3.1)
 
 // What build() of both frames' pyramids is best given.
 inline ImagePyramidOptions flow_pyramid() {
@@ -22,23 +21,13 @@ struct FlowResult {
   bool found = false;
 };
 
-// Sparse optical flow by pyramidal Lucas-Kanade (Lucas and Kanade, IJCAI 1981; Bouguet 2000): from the coarsest level
-// to the finest, the displacement minimises the squared difference of a window, [u v]^T = (A^T A)^-1 A^T b (DKB eqs.
-// 1-8), iterated with slopes of the previous image. Levels where the window does not fit or is too flat are passed
-// over, the finest excepted. Deterministic and independent of the processor; results do not depend on one another.
-class OpticalFlow {
- public:
-  explicit OpticalFlow(Simd simd = best_simd()) : simd_(simd) {}
-
-  // Positions [px, full resolution] of the previous image's `points` in the current image. Both pyramids must be of
-  // equal size (InputError).
-  std::vector<FlowResult> track(const ImagePyramid& previous, const ImagePyramid& current,
-                                std::span<const Eigen::Vector2f> points) const;
-
- private:
-  FlowResult track_one(const ImagePyramid& previous, const ImagePyramid& current, const Eigen::Vector2f& point) const;
-
-  Simd simd_;
-};
+// Positions [px, full resolution] of the previous image's `points` in the current image. Both pyramids must be of equal
+// size (InputError). Sparse optical flow by pyramidal Lucas-Kanade (Lucas and Kanade, IJCAI 1981; Bouguet 2000): from
+// the coarsest level to the finest, the displacement minimises the squared difference of a window,
+// [u v]^T = (A^T A)^-1 A^T b (DKB eqs. 1-8), iterated with slopes of the previous image. Levels where the window does
+// not fit or is too flat are passed over, the finest excepted. Deterministic and independent of the processor; results
+// do not depend on one another.
+std::vector<FlowResult> track_flow(const ImagePyramid& previous, const ImagePyramid& current,
+                                   std::span<const Eigen::Vector2f> points, Simd simd = best_simd());
 
 }  // namespace dkb

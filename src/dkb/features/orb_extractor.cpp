@@ -23,11 +23,6 @@ OrbExtractor::OrbExtractor(OrbOptions options, Simd simd, bool threaded)
       beside_(
           "feature extraction", [this] { take_levels(other_worker_); }, threaded) {}
 
-CornerRegion OrbExtractor::region(int level) const {
-  const GreyImage& image = pyramid_.level(level);
-  return {kOrbBorder, kOrbBorder, image.width() - kOrbBorder, image.height() - kOrbBorder};
-}
-
 void OrbExtractor::each_level(LevelStep step, const auto& before) {
   step_ = step;
   next_level_ = 0;
@@ -47,8 +42,9 @@ void OrbExtractor::take_levels(Worker& worker) {
 
 void OrbExtractor::find_corners(int level, Worker& worker) {
   auto& corners = corners_[static_cast<size_t>(level)];
-  worker.finder.find(pyramid_.level(level), options_.fast_threshold_min, kOrbBorder, corners);
-  worker.spread.drop_weak(region(level), options_.fast_threshold, kOrbCellSize, corners);
+  const GreyImage& pixels = pyramid_.level(level);
+  worker.finder.find(pixels, options_.fast_threshold_min, kOrbBorder, corners);
+  worker.spread.drop_weak(orb_region(pixels), options_.fast_threshold, kOrbCellSize, corners);
 }
 
 std::vector<int> OrbExtractor::quotas(const std::vector<std::vector<PixelCorner>>& corners, int count) const {
@@ -92,14 +88,14 @@ void OrbExtractor::split_corners(const Image<uint8_t>& poor, int cell) {
 
 void OrbExtractor::describe_corners(int level, Worker& worker) {
   const auto i = static_cast<size_t>(level);
+  const GreyImage& pixels = pyramid_.level(level);
   std::vector<PixelCorner>& corners = corners_[i];
-  worker.spread.keep(region(level), quotas_[i], corners);
+  worker.spread.keep(orb_region(pixels), quotas_[i], corners);
   if (!poor_quotas_.empty()) {
-    worker.spread.keep(region(level), poor_quotas_[i], poor_corners_[i]);
+    worker.spread.keep(orb_region(pixels), poor_quotas_[i], poor_corners_[i]);
     corners.insert(corners.end(), poor_corners_[i].begin(), poor_corners_[i].end());
   }
   if (corners.empty()) return;
-  const GreyImage& pixels = pyramid_.level(level);
   GreyImage& blurred = blurred_[i];
   worker.blur.apply(pixels, blurred);
   size_t at = firsts_[i];

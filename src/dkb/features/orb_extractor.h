@@ -21,6 +21,11 @@ constexpr int kOrbCellSize = 32;  // [px of the level] in which the threshold ad
 constexpr int kOrbBorder =
     kBriefRadius + kBlurRadius + 1;  // [px of the level] without corners: what a descriptor reaches
 
+// The part of a pyramid level that corners may lie in.
+inline CornerRegion orb_region(const GreyImage& level) {
+  return {kOrbBorder, kOrbBorder, level.width() - kOrbBorder, level.height() - kOrbBorder};
+}
+
 struct OrbOptions {
   int count = 1000;            // features asked for, >= 1; fewer come where the image has no more corners
   double scale = 1.2;          // size of a pyramid level over that of the next, (1, 4]
@@ -45,6 +50,7 @@ class OrbExtractor {
   void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
   const ImagePyramid& pyramid() const { return pyramid_; }
+  const SteeredBrief& brief() const { return brief_; }
 
  private:
   // What one thread keeps its buffers in.
@@ -56,7 +62,6 @@ class OrbExtractor {
   };
   using LevelStep = void (OrbExtractor::*)(int level, Worker& worker);
 
-  CornerRegion region(int level) const;
   // `step` for every level, by both threads; `before` is done first by the one that calls.
   void each_level(LevelStep step, const auto& before);
   void take_levels(Worker& worker);

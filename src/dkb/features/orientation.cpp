@@ -5,10 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 namespace dkb {
 namespace {
 
@@ -64,35 +60,24 @@ CentroidMoments moments_scalar(const uint8_t* centre, ptrdiff_t stride) {
 }
 
 #if defined(__x86_64__)
-DKB_TARGET_AVX2 inline __m256i load(const void* p) {
-  return _mm256_loadu_si256(static_cast<const __m256i*>(p));
-}
-
-DKB_TARGET_AVX2 inline int32_t sum32(__m256i v) {
-  __m128i s = _mm_add_epi32(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
-  s = _mm_add_epi32(s, _mm_shuffle_epi32(s, 0x4E));
-  s = _mm_add_epi32(s, _mm_shuffle_epi32(s, 0xB1));
-  return _mm_cvtsi128_si32(s);
-}
-
 DKB_TARGET_AVX2 CentroidMoments moments_avx2(const uint8_t* centre, ptrdiff_t stride) {
-  const __m256i weight = load(kColumns.weight.data());
+  const __m256i weight = load_avx2(kColumns.weight.data());
   const __m256i ones = _mm256_set1_epi16(1);
   const __m256i zero = _mm256_setzero_si256();
-  const __m256i middle = _mm256_and_si256(load(centre - 16), load(kColumns.inside[0].data()));
+  const __m256i middle = _mm256_and_si256(load_avx2(centre - 16), load_avx2(kColumns.inside[0].data()));
   __m256i x = _mm256_madd_epi16(_mm256_maddubs_epi16(middle, weight), ones);
   // sum of v d_v = sum over k of (sum of d_v with v >= k): running sums from the outermost row inwards.
   __m256i running = zero, y = zero;
   for (int v = kRadius; v >= 1; --v) {
-    const __m256i inside = load(kColumns.inside[static_cast<size_t>(v)].data());
-    const __m256i below = _mm256_and_si256(load(centre + v * stride - 16), inside);
-    const __m256i above = _mm256_and_si256(load(centre - v * stride - 16), inside);
+    const __m256i inside = load_avx2(kColumns.inside[static_cast<size_t>(v)].data());
+    const __m256i below = _mm256_and_si256(load_avx2(centre + v * stride - 16), inside);
+    const __m256i above = _mm256_and_si256(load_avx2(centre - v * stride - 16), inside);
     const __m256i products = _mm256_add_epi16(_mm256_maddubs_epi16(below, weight), _mm256_maddubs_epi16(above, weight));
     x = _mm256_add_epi32(x, _mm256_madd_epi16(products, ones));
     running = _mm256_add_epi32(running, _mm256_sub_epi32(_mm256_sad_epu8(below, zero), _mm256_sad_epu8(above, zero)));
     y = _mm256_add_epi32(y, running);
   }
-  return {sum32(x), sum32(y)};
+  return {sum_avx2(x), sum_avx2(y)};
 }
 #endif
 

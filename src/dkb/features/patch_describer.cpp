@@ -13,21 +13,21 @@ constexpr int kMargin = std::max(kBriefRadius + kBlurRadius, kOrientationRadius 
 
 }  // namespace
 
-void PatchDescriber::set_image(const GreyImage& image) {
-  pyramid_.build(image);
+const GreyImage& PatchDescriber::blurred(int level) {
   blurred_.resize(static_cast<size_t>(pyramid_.levels()));
-  for (int level = 0; level < pyramid_.levels(); ++level)
-    blur_.apply(pyramid_.level(level), blurred_[static_cast<size_t>(level)]);
+  GreyImage& image = blurred_[static_cast<size_t>(level)];
+  if (image.empty()) blur_.apply(pyramid_.level(level), image);
+  return image;
 }
 
-std::optional<int> PatchDescriber::distance(float x, float y, int octave, const Descriptor& sought) const {
+std::optional<int> PatchDescriber::distance(float x, float y, int octave, const Descriptor& sought) {
   if (octave < 0 || octave >= pyramid_.levels()) return std::nullopt;
   const GreyImage& pixels = pyramid_.level(octave);
   const double column = std::round(pyramid_.level_x(octave, x)), line = std::round(pyramid_.level_y(octave, y));
   if (!(column >= kMargin && line >= kMargin && column < pixels.width() - kMargin && line < pixels.height() - kMargin))
     return std::nullopt;
   const int cx = static_cast<int>(column), cy = static_cast<int>(line);
-  const GreyImage& smooth = blurred_[static_cast<size_t>(octave)];
+  const GreyImage& smooth = blurred(octave);
   int min_distance = 256;
   for (int py = cy - 1; py <= cy + 1; ++py)
     for (int px = cx - 1; px <= cx + 1; ++px) {

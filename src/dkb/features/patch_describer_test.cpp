@@ -5,29 +5,18 @@
 
 #include <limits>
 
+#include "dkb/features/feature_test_util.h"
 #include "dkb/features/orb_extractor.h"
-#include "dkb/util/random.h"
 
 namespace dkb {
 namespace {
 
-// Blocks of random greys: corners without end.
-GreyImage blocks(uint64_t seed) {
-  Random random(seed);
-  GreyImage cells(40, 30), image(320, 240);
-  for (size_t i = 0; i < cells.size(); ++i) cells.data()[i] = static_cast<uint8_t>(random.below(256));
-  for (int y = 0; y < image.height(); ++y)
-    for (int x = 0; x < image.width(); ++x) image(x, y) = cells(x / 8, y / 8);
-  return image;
-}
-
 TEST(PatchDescriber, SeesWhatTheExtractorSawAndNotWhatIsElsewhere) {
-  const GreyImage image = blocks(1);
-  const OrbFeatures features = OrbExtractor().extract(image);
+  OrbExtractor extractor, elsewhere;
+  const OrbFeatures features = extractor.extract(blocks_image(1));
   ASSERT_GT(features.corners.size(), 200U);
-  PatchDescriber same({}), other({});
-  same.set_image(image);
-  other.set_image(blocks(2));
+  elsewhere.extract(blocks_image(2));
+  PatchDescriber same(extractor.pyramid(), extractor.brief()), other(elsewhere.pyramid(), elsewhere.brief());
   int compared = 0, unlike = 0;
   for (size_t i = 0; i < features.corners.size(); ++i) {
     const Corner& c = features.corners[i];
@@ -42,9 +31,11 @@ TEST(PatchDescriber, SeesWhatTheExtractorSawAndNotWhatIsElsewhere) {
 }
 
 TEST(PatchDescriber, TellsNothingBeyondTheImage) {
-  PatchDescriber describer({});
-  EXPECT_FALSE(describer.distance(100, 100, 0, {})) << "no image yet";
-  describer.set_image(blocks(1));
+  ImagePyramid pyramid;
+  const SteeredBrief brief;
+  EXPECT_FALSE(PatchDescriber(pyramid, brief).distance(100, 100, 0, {})) << "no image yet";
+  pyramid.build(blocks_image(1));
+  PatchDescriber describer(pyramid, brief);
   EXPECT_TRUE(describer.distance(100, 100, 0, {}));
   EXPECT_FALSE(describer.distance(5, 100, 0, {}));
   EXPECT_FALSE(describer.distance(100, 238, 0, {}));

@@ -137,7 +137,8 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
   // The images have mostly left the cache by now, and corners lie all over them.
   const auto ask_early = [&image](const Corner& c) {
     const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
-    for (int row = std::max(0, y - 4); row <= std::min(y + 4, image.depth.height() - 1); ++row)
+    constexpr int kReach = CornerDepths::kReach;
+    for (int row = std::max(0, y - kReach); row <= std::min(y + kReach, image.depth.height() - 1); ++row)
       __builtin_prefetch(&image.depth(x, row));
     if (!image.colour.empty()) __builtin_prefetch(&image.colour(x, y));
   };
@@ -167,12 +168,12 @@ std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage&
   return keypoints;
 }
 
-RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
-                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
-                                const DepthOptions& options) {
+RgbdFeatures make_rgbd_features(std::vector<Descriptor> descriptors, std::vector<Keypoint> as_seen,
+                                const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
+                                const Vector6d& velocity, const DepthOptions& options) {
   RgbdFeatures result;
   const CornerDepths depths(image.depth, camera, noise);
-  result.descriptors = orb.descriptors;
+  result.descriptors = std::move(descriptors);
   result.keypoints = std::move(as_seen);
   const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
@@ -181,9 +182,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
       options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
                                     vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
   const bool rolling = options.model_rolling_shutter && camera.readout > 0 && velocity.squaredNorm() > 0;
-  for (size_t i = 0; i < orb.corners.size(); ++i) {
-    const Corner& c = orb.corners[i];
-    Keypoint& k = result.keypoints[i];
+  for (Keypoint& k : result.keypoints) {
     float z = k.depth;
     if (moved && z > 0) {
       // Where was this surface point when the depth image was taken? Ask there, and carry the answer over.
@@ -191,7 +190,8 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
       const Eigen::Vector3d then = back * (now - colour_cam_from_depth_cam.translation);
       if (then.z() > 0.05) {
         const Eigen::Vector2d shift = camera.project(then) - k.pixel.cast<double>();
-        const float z_then = depths.at(c.x + static_cast<float>(shift.x()), c.y + static_cast<float>(shift.y())).own;
+        const Eigen::Vector2f pixel_then = k.image_pixel + shift.cast<float>();
+        const float z_then = depths.at(pixel_then.x(), pixel_then.y()).own;
         z = z_then > 0 ? static_cast<float>(
                              (rotation * (then * (z_then / then.z())) + colour_cam_from_depth_cam.translation).z())
                        : 0.0f;
@@ -199,7 +199,7 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
     }
     if (rolling) {
       const double early =
-          (0.5 - c.y / camera.height) * camera.readout;  // this row was exposed so long before the middle
+          (0.5 - k.image_pixel.y() / camera.height) * camera.readout;  // this row was exposed so long before the middle
       const Eigen::Vector3d seen = camera.unproject(k.pixel.cast<double>(), z > 0 ? z : 1.0);
       const Eigen::Vector3d turned =
           seen + early * (velocity.tail<3>().cross(seen) + (z > 0 ? 1.0 : 0.0) * velocity.head<3>());
@@ -214,16 +214,12 @@ RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as
     k.depth = in_range(z) ? z : 0.0f;
     if (!in_range(k.lent_depth)) k.lent_depth = 0;
   }
-  result.width = camera.width;
-  result.height = camera.height;
   result.grid = KeypointGrid(result.keypoints, camera.width, camera.height);
   return result;
 }
 
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices) {
   RgbdFeatures result;
-  result.width = features.width;
-  result.height = features.height;
   result.keypoints.reserve(indices.size());
   result.descriptors.reserve(indices.size());
   for (int i : indices) {
@@ -231,7 +227,7 @@ RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indice
     result.keypoints.push_back(features.keypoints[f]);
     result.descriptors.push_back(features.descriptors[f]);
   }
-  result.grid = KeypointGrid(result.keypoints, features.width, features.height);
+  result.grid = KeypointGrid(result.keypoints, features.grid);
   return result;
 }
 

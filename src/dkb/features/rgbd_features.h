@@ -32,7 +32,6 @@ struct RgbdFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;  // same length
   KeypointGrid grid;                    // over the ideal pixels
-  int width = 0, height = 0;            // [px] of the image
   size_t size() const { return keypoints.size(); }
 };
 
@@ -86,7 +85,7 @@ class CornerDepths {
 
   const DepthImage& depth_;
   const double focal_;
-  const SensorNoise& noise_;
+  const SensorNoise noise_;
   const Simd simd_;
 };
 
@@ -94,11 +93,11 @@ class CornerDepths {
 std::vector<Keypoint> keypoints_as_seen(const OrbFeatures& orb, const RgbdImage& image,
                                         const UndistortionTable& undistort, const CameraModel& camera,
                                         const SensorNoise& noise);
-// Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen: hand-held
-// Kinects move millimetres between the stamps of colour and depth.
-RgbdFeatures make_rgbd_features(const OrbFeatures& orb, std::vector<Keypoint> as_seen, const RgbdImage& image,
-                                const CameraModel& camera, const SensorNoise& noise, const Vector6d& velocity,
-                                const DepthOptions& options);
+// Features of a camera that moves at `velocity` [m/s, rad/s; zero when unknown], from keypoints as seen and as many
+// descriptors: hand-held Kinects move millimetres between the stamps of colour and depth.
+RgbdFeatures make_rgbd_features(std::vector<Descriptor> descriptors, std::vector<Keypoint> as_seen,
+                                const RgbdImage& image, const CameraModel& camera, const SensorNoise& noise,
+                                const Vector6d& velocity, const DepthOptions& options);
 
 // The features of these indices, in this order, with a grid of their own.
 RgbdFeatures subset(const RgbdFeatures& features, const std::vector<int>& indices);

@@ -36,7 +36,8 @@ OrbFeatures corners_at(const std::vector<Eigen::Vector2f>& pixels) {
 
 RgbdFeatures make(const OrbFeatures& orb, const RgbdImage& image, const CameraModel& camera,
                   const Vector6d& velocity = Vector6d::Zero(), const DepthOptions& options = {}) {
-  return make_rgbd_features(orb, keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
+  return make_rgbd_features(orb.descriptors,
+                            keypoints_as_seen(orb, image, UndistortionTable(camera), camera, SensorNoise()), image,
                             camera, SensorNoise(), velocity, options);
 }
 
@@ -287,6 +288,17 @@ TEST(RgbdFeatures, NoReadoutAndNoVelocityMeanNoChange) {
       EXPECT_EQ(f->keypoints[i].depth, 2);
     }
   EXPECT_NE(make(orb, image, camera, velocity).keypoints[0].pixel, global.keypoints[0].pixel);
+}
+
+TEST(RgbdFeatures, ASubsetIsFoundWhereItLies) {
+  const CameraModel camera = plain_camera();
+  const RgbdFeatures all = make(corners_at({{100, 50}, {300, 200}, {500, 400}}), image_of(camera, 2), camera);
+  const RgbdFeatures some = subset(all, {2, 0});
+  ASSERT_EQ(some.size(), 2U);
+  EXPECT_EQ(some.descriptors[0], all.descriptors[2]);
+  std::vector<int> near;
+  some.grid.for_each_near({499, 401, 3}, [&](int i) { near.push_back(i); });
+  EXPECT_EQ(near, std::vector<int>{0});
 }
 
 TEST(RgbdFeatures, NothingFoundIsNoError) {

@@ -38,8 +38,16 @@ inline Simd best_simd() {
 
 namespace dkb {
 
-DKB_TARGET_AVX2 inline __m256i load_avx2(const uint8_t* p) {
-  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
+DKB_TARGET_AVX2 inline __m256i load_avx2(const void* p) {
+  return _mm256_loadu_si256(static_cast<const __m256i*>(p));
+}
+
+// Of eight 32-bit numbers.
+DKB_TARGET_AVX2 inline int32_t sum_avx2(__m256i v) {
+  __m128i s = _mm_add_epi32(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
+  s = _mm_add_epi32(s, _mm_shuffle_epi32(s, 0x4E));
+  s = _mm_add_epi32(s, _mm_shuffle_epi32(s, 0xB1));
+  return _mm_cvtsi128_si32(s);
 }
 
 }  // namespace dkb

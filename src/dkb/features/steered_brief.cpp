@@ -7,10 +7,6 @@
 
 #include "dkb/util/random.h"
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 namespace dkb {
 namespace {
 
@@ -38,6 +34,31 @@ class ImageModel {
   static constexpr double kSteps = 8.0;
   std::array<double, 8 * 4 * kBriefRadius * kBriefRadius + 9> table_{};
 };
+
+#if defined(__x86_64__)
+DKB_TARGET_AVX2 Descriptor describe_avx2(const uint8_t* centre, ptrdiff_t stride, const void* first,
+                                         const void* second) {
+  const __m256i* a = static_cast<const __m256i*>(first);
+  const __m256i* b = static_cast<const __m256i*>(second);
+  const __m256i strides = _mm256_set1_epi32(static_cast<int32_t>(static_cast<uint32_t>(stride) << 16 | 1u));
+  const __m256i byte = _mm256_set1_epi32(0xFF);
+  const int* base = reinterpret_cast<const int*>(centre);
+  Descriptor descriptor;
+  for (size_t word = 0; word < 4; ++word) {
+    uint64_t bits = 0;
+    for (size_t k = 0; k < 8; ++k) {
+      const __m256i ia = _mm256_madd_epi16(load_avx2(a + 8 * word + k), strides);
+      const __m256i ib = _mm256_madd_epi16(load_avx2(b + 8 * word + k), strides);
+      const __m256i va = _mm256_and_si256(_mm256_i32gather_epi32(base, ia, 1), byte);
+      const __m256i vb = _mm256_and_si256(_mm256_i32gather_epi32(base, ib, 1), byte);
+      const int mask = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(vb, va)));
+      bits |= static_cast<uint64_t>(static_cast<uint32_t>(mask)) << (8 * k);
+    }
+    descriptor[word] = bits;
+  }
+  return descriptor;
+}
+#endif
 
 }  // namespace
 
@@ -90,7 +111,7 @@ std::array<BriefTest, kTests> make_brief_tests() {
 }
 
 SteeredBrief::SteeredBrief(Simd simd) : simd_(simd), offsets_(static_cast<size_t>(kRotations) * 2 * kTests) {
-  // Drawn once: it takes longer than a frame, and a describer is made for every frame of a lost camera.
+  // Drawn once: it takes longer than a frame.
   static const std::array<BriefTest, kTests> tests = make_brief_tests();
   for (int r = 0; r < kRotations; ++r) {
     const double angle = 2.0 * std::numbers::pi * r / kRotations;
@@ -106,35 +127,6 @@ SteeredBrief::SteeredBrief(Simd simd) : simd_(simd), offsets_(static_cast<size_t
     }
   }
 }
-
-namespace {
-
-#if defined(__x86_64__)
-DKB_TARGET_AVX2 Descriptor describe_avx2(const uint8_t* centre, ptrdiff_t stride, const void* first,
-                                         const void* second) {
-  const __m256i* a = static_cast<const __m256i*>(first);
-  const __m256i* b = static_cast<const __m256i*>(second);
-  const __m256i strides = _mm256_set1_epi32(static_cast<int32_t>(static_cast<uint32_t>(stride) << 16 | 1u));
-  const __m256i byte = _mm256_set1_epi32(0xFF);
-  const int* base = reinterpret_cast<const int*>(centre);
-  Descriptor descriptor;
-  for (size_t word = 0; word < 4; ++word) {
-    uint64_t bits = 0;
-    for (size_t k = 0; k < 8; ++k) {
-      const __m256i ia = _mm256_madd_epi16(_mm256_loadu_si256(a + 8 * word + k), strides);
-      const __m256i ib = _mm256_madd_epi16(_mm256_loadu_si256(b + 8 * word + k), strides);
-      const __m256i va = _mm256_and_si256(_mm256_i32gather_epi32(base, ia, 1), byte);
-      const __m256i vb = _mm256_and_si256(_mm256_i32gather_epi32(base, ib, 1), byte);
-      const int mask = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(vb, va)));
-      bits |= static_cast<uint64_t>(static_cast<uint32_t>(mask)) << (8 * k);
-    }
-    descriptor[word] = bits;
-  }
-  return descriptor;
-}
-#endif
-
-}  // namespace
 
 Descriptor SteeredBrief::describe(const uint8_t* centre, ptrdiff_t stride, float angle) const {
   constexpr float kSteps = static_cast<float>(kRotations) / (2.0F * std::numbers::pi_v<float>);

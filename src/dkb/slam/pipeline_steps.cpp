@@ -224,8 +224,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   camera_at_readout_.readout = readout_.readout();
   ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
-  ImageAppearance appearance(image, context_.camera, options_.noise,
-                             {.levels = options_.features.levels, .scale = options_.features.scale});
+  ImageAppearance appearance(image.depth, context_.camera, options_.noise, extractor_.pyramid(), extractor_.brief());
   std::optional<ExtractedFeatures> start;
   if (start_)
     start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,

@@ -6,6 +6,7 @@
 
 #include "dkb/detection/mask_folder.h"
 #include "dkb/dynamics/mover_mask.h"
+#include "dkb/features/optical_flow.h"
 
 namespace dkb {
 SceneStage::SceneStage(const Camera& camera, const SensorNoise& noise, const DynamicsOptions& options,

@@ -9,7 +9,7 @@ namespace {
 void move(RgbdFeatures& features, const Eigen::Vector2f& moved, size_t share) {
   for (size_t f = 0; f < features.size(); ++f)
     if (f % 10 < share) features.keypoints[f].pixel += moved;
-  features.grid = KeypointGrid(features.keypoints, features.width, features.height);
+  features.grid = KeypointGrid(features.keypoints, features.grid);
 }
 
 class ExpectedCamera : public TrackerTest {
