@@ -105,8 +105,10 @@ TEST(BenchSuite, TheNameIsTheFilesWithoutOne) {
 
 TEST(BenchSuite, FaultsAreOneLineWithThePlace) {
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {replaced(kSuite, "seeds:", "sedes:"), "small.yaml:4: unknown key \"sedes\" (did you mean \"seeds\"?)"},
-      {replaced(kSuite, "camera:", "camra:"), "small.yaml:11: sequences.fr1_xyz: unknown key \"camra\""},
+      {replaced(kSuite, "seeds:", "sedes:"),
+       "small.yaml:4: unknown key \"sedes\" (did you mean \"seeds\"?); the keys are name, "},
+      {replaced(kSuite, "camera:", "camra:"),
+       "small.yaml:11: unknown key \"sequences.fr1_xyz.camra\" (did you mean \"camera\"?)"},
       {replaced(kSuite, "preset: orb", "preset: orbs"), "there is no preset \"orbs\" (did you mean \"orb\"?)"},
       {replaced(kSuite, "features.count", "features.cuont"), "(did you mean \"features.count\"?)"},
       {replaced(kSuite, "900", "-900"), "count: -900 is out of range"},
@@ -117,12 +119,15 @@ TEST(BenchSuite, FaultsAreOneLineWithThePlace) {
       {replaced(kSuite, "filter: box", "boxes: b.txt"), "--boxes: --detector yolo+motion does not read boxes"},
       {replaced(kSuite, "paper, detector: none", "paper, detector: file"), "--detector file: no boxes"},
       {replaced(kSuite, "[kf, ba]", "[kf, bs]"), "there is no part \"bs\""},
-      {replaced(kSuite, "reference: ORB", "reference: ORBS"), "there is no variant \"ORBS\" (did you mean \"ORB\"?)"},
-      {replaced(kSuite, "plotted: [ORB,", "plotted: [OR,"), "there is no variant \"OR\""},
-      {replaced(kSuite, "scene: room", "scene: rom"), "there is no scene \"rom\" (did you mean \"room\"?)"},
-      {replaced(kSuite, "seeds: 3", "seeds: 0"), "whole number from 1"},
-      {replaced(kSuite, "seeds: 3", "seeds: 3\nseeds: 4"), "given twice"},
-      {replaced(kSuite, "path: rgbd", "pth: rgbd"), "path"},
+      {replaced(kSuite, "reference: ORB", "reference: ORBS"),
+       "small.yaml:7: reference: there is no variant \"ORBS\" (did you mean \"ORB\"?)"},
+      {replaced(kSuite, "plotted: [ORB,", "plotted: [OR,"), "small.yaml:8: plotted: there is no variant \"OR\""},
+      {replaced(kSuite, "scene: room", "scene: rom"),
+       "small.yaml:13: sequences.room.simulate.scene: \"rom\" is not one of room, "},
+      {replaced(kSuite, "scene: room", "scene: rom"), "(did you mean \"room\"?)"},
+      {replaced(kSuite, "seeds: 3", "seeds: 0"), "small.yaml:4: seeds: 0 is out of range; it must be 1 ... 1000"},
+      {replaced(kSuite, "seeds: 3", "seeds: 3\nseeds: 4"), "small.yaml:5: seeds: is given twice; leave one out"},
+      {replaced(kSuite, "path: rgbd", "pth: rgbd"), "unknown key \"sequences.fr1_xyz.pth\" (did you mean \"path\"?)"},
       {replaced(kSuite, "  room:", "  ../room:"), "must be made of letters"},
       {replaced(kSuite, "values: [1.0, 1.5]", "values: [1.0]"), "at least two values"},
       {replaced(kSuite, "experiment.mapping.ba.edge_weight\n  label", "experiment.mapping.ba.edge_wight\n  label"),
@@ -130,8 +135,8 @@ TEST(BenchSuite, FaultsAreOneLineWithThePlace) {
       {"sequences: {a: {path: b}}\n", "has no variants"},
       {"variants: {a: }\n", "has no sequences"},
       {"{{{", "is not valid YAML"},
-      {"", "expected lines"},
-      {"- a\n", "expected lines"},
+      {"", "small.yaml:1: must be lines of the form `key: value`; the keys are name, "},
+      {"- a\n", "small.yaml:1: must be lines of"},
   };
   for (const auto& [text, says] : cases) {
     const std::string message = message_of(text);

@@ -2,14 +2,10 @@
 #include "bench/bench_suite.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "bench/fnv1a.h"
 #include "dkb/dataset/detector_choice.h"
@@ -17,6 +13,7 @@
 #include "dkb/util/files.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
+#include "dkb/util/yaml_reader.h"
 #include "dkb_slam/options.h"
 #include "run_session.h"
 
@@ -24,157 +21,62 @@ namespace dkb::bench {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr size_t kMaxBytes = size_t{1} << 20;
-constexpr int64_t kMaxSeeds = 1000, kMaxFrames = 10'000'000;
+const Range kMaxFrames{0, 1e7};
 constexpr size_t kMaxSequences = 1000, kMaxVariants = 1000;
 
 std::string in_quotes(const std::string& text) {
-  return "\"" + one_line(text.substr(0, 80)) + (text.size() > 80 ? "...\"" : "\"");
+  return "\"" + excerpt(text) + "\"";
 }
 
-// A node with its place in the file, for messages.
-class Reader {
- public:
-  Reader(const YAML::Node& node, std::string file, std::string path)
-      : node_(node), file_(std::move(file)), path_(std::move(path)) {}
-
-  [[noreturn]] void fail(const std::string& what) const {
-    const YAML::Mark mark = node_.Mark();
-    throw InputError((mark.is_null() ? file_ : file_ + ":" + std::to_string(mark.line + 1)) + ": " +
-                     (path_.empty() ? "" : path_ + ": ") + what);
-  }
-
-  // The map's values by key. `known` empty: any keys.
-  std::vector<std::pair<std::string, Reader>> items(const std::vector<std::string>& known = {}) const {
-    if (!node_.IsMap()) fail("expected lines of the form `key: value`");
-    std::vector<std::pair<std::string, Reader>> result;
-    std::set<std::string> seen;
-    for (const auto& item : node_) {
-      const Reader key_reader(item.first, file_, path_);
-      if (!item.first.IsScalar()) key_reader.fail("a key must be a word");
-      const std::string key = item.first.Scalar();
-      if (!known.empty() && std::find(known.begin(), known.end(), key) == known.end())
-        key_reader.fail("unknown key " + in_quotes(key) + did_you_mean(key, known));
-      if (!seen.insert(key).second) key_reader.fail("key " + in_quotes(key) + " is given twice");
-      const std::string path = one_line(path_.empty() ? key : path_ + "." + key);
-      result.emplace_back(key, Reader(item.second, file_, path.substr(0, 160)));
-    }
-    return result;
-  }
-
-  std::vector<Reader> list() const {
-    if (!node_.IsSequence()) fail("expected a list, e.g. [a, b]");
-    std::vector<Reader> result;
-    for (const auto& item : node_) result.emplace_back(item, file_, path_);
-    return result;
-  }
-
-  bool empty() const { return node_.IsNull(); }
-  bool is_list() const { return node_.IsSequence(); }
-  std::string text() const {
-    if (!node_.IsScalar()) fail("expected a text");
-    return node_.Scalar();
-  }
-  int64_t whole(int64_t min, int64_t max) const {
-    int64_t value = 0;
-    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || value < min || value > max)
-      fail(fmt::format("expected a whole number from {} to {}", min, max));
-    return value;
-  }
-  double number(double min, double max) const {
-    double value = 0;
-    if (!parse_number(node_.IsScalar() ? node_.Scalar() : "", &value) || !(value >= min && value <= max))
-      fail(fmt::format("expected a number from {:g} to {:g}", min, max));
-    return value;
-  }
-  // Names become file names and columns of tables.
-  void check_name(const std::string& name) const {
-    const auto fine = [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-             std::string("._+=-").find(c) != std::string::npos;
-    };
-    if (name.empty() || name.size() > 80 || name[0] == '.' || name[0] == '-' ||
-        !std::all_of(name.begin(), name.end(), fine))
-      fail("the name " + in_quotes(name) + " must be made of letters, digits and . _ + = -");
-  }
-
- private:
-  YAML::Node node_;
-  std::string file_, path_;
-};
-
-// Runs `read` on the text as YAML; faults of the text become InputErrors.
-void with_yaml(const std::string& text, const std::string& name, const std::function<void(const Reader&)>& read) {
-  if (text.size() > kMaxBytes) throw InputError(name + ": is too large for a suite");
-  if (text.find('\0') != std::string::npos) throw InputError(name + ": is not a text file");
-  try {
-    read(Reader(YAML::Load(text), name, ""));
-  } catch (const YAML::Exception& e) {
-    throw InputError((e.mark.is_null() ? name : name + ":" + std::to_string(e.mark.line + 1)) +
-                     ": is not valid YAML (" + one_line(e.msg).substr(0, 120) + ")");
-  }
+// Names become file names and columns of tables. `reader`: where the name stands.
+void check_name(const std::string& name, const YamlReader& reader) {
+  const auto fine = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string("._+=-").find(c) != std::string::npos;
+  };
+  if (name.empty() || name.size() > 80 || name[0] == '.' || name[0] == '-' ||
+      !std::all_of(name.begin(), name.end(), fine))
+    reader.fail("the name " + in_quotes(name) + " must be made of letters, digits and . _ + = -");
 }
 
-using Readers = std::vector<std::pair<std::string, std::function<void(const Reader&)>>>;
-
-// Hands every value of the map to the function of its key.
-void read_keys(const Reader& map, const Readers& readers) {
-  std::vector<std::string> known;
-  for (const auto& [key, unused] : readers) known.push_back(key);
-  for (const auto& [key, value] : map.items(known))
-    for (const auto& [name, read] : readers)
-      if (name == key) read(value);
-}
-
-std::function<void(const Reader&)> to_text(std::string* field) {
-  return [field](const Reader& r) { *field = r.text(); };
-}
-std::function<void(const Reader&)> to_whole(int64_t* field, int64_t min, int64_t max) {
-  return [field, min, max](const Reader& r) { *field = r.whole(min, max); };
-}
-
-std::vector<std::string> words_of(const Reader& r) {
+std::vector<std::string> words_of(const YamlReader& map, const std::string& key) {
+  if (!map.has(key)) return {};
+  const YamlReader value = map.at(key);
+  if (!value.is_list()) return {value.text()};
   std::vector<std::string> words;
-  if (r.is_list())
-    for (const Reader& item : r.list()) words.push_back(item.text());
-  else
-    words.push_back(r.text());
+  for (const YamlReader& word : value.list()) words.push_back(word.text());
   return words;
 }
 
-SimulatorOptions read_simulation(const Reader& reader) {
+SimulatorOptions read_simulation(const YamlReader& reader) {
   SimulatorOptions o;
-  int64_t frames = 0, people = -1, seed = 1;
-  read_keys(reader, {{"scene", to_text(&o.scene)},
-                     {"frames", to_whole(&frames, 0, 100000)},
-                     {"people", to_whole(&people, 0, 30)},
-                     {"seed", to_whole(&seed, 0, 1'000'000'000)}});
-  o.frames = static_cast<int>(frames);
-  o.people = static_cast<int>(people);
+  int64_t seed = 1;
+  reader.check_keys({"scene", "frames", "people", "seed"});
+  reader.read("scene", &o.scene, simulator_scenes());
+  reader.read("frames", &o.frames, {0, 100000});
+  reader.read("people", &o.people, {0, 30});
+  reader.read("seed", &seed, {0, 1e9});
   o.seed = static_cast<uint64_t>(seed);
-  const auto& scenes = simulator_scenes();
-  if (std::find(scenes.begin(), scenes.end(), o.scene) == scenes.end())
-    reader.fail("there is no scene " + in_quotes(o.scene) + did_you_mean(o.scene, scenes));
   return o;
 }
 
-SuiteSequence read_sequence(const std::string& name, const Reader& reader) {
+SuiteSequence read_sequence(const std::string& name, const YamlReader& reader) {
   SuiteSequence s;
   s.name = name;
-  reader.check_name(name);
-  read_keys(reader, {{"path", to_text(&s.path)},
-                     {"simulate", [&](const Reader& r) { s.simulated = read_simulation(r); }},
-                     {"camera", to_text(&s.camera)},
-                     {"truth", to_text(&s.truth)},
-                     {"get", to_text(&s.get)},
-                     {"published", to_text(&s.published)},
-                     {"max_frames", to_whole(&s.max_frames, 0, kMaxFrames)}});
+  check_name(name, reader);
+  reader.check_keys({"path", "simulate", "camera", "truth", "get", "published", "max_frames"});
+  if (reader.has("simulate")) s.simulated = read_simulation(reader.at("simulate"));
+  for (const auto& [key, field] :
+       {std::pair{"path", &s.path}, std::pair{"camera", &s.camera}, std::pair{"truth", &s.truth},
+        std::pair{"get", &s.get}, std::pair{"published", &s.published}})
+    reader.read(key, field);
+  reader.read("max_frames", &s.max_frames, kMaxFrames);
   if (s.simulated.has_value() == !s.path.empty()) reader.fail("needs either a path or `simulate`");
   return s;
 }
 
 // Everything that `run` would refuse before its first frame, found before the first run of all.
-void check_options(const SuiteVariant& v, const Reader& reader) {
+void check_options(const SuiteVariant& v, const YamlReader& reader) {
   try {
     Options options(v.preset);
     for (const auto& [key, value] : v.set) options.set(key, value, "set");
@@ -196,47 +98,40 @@ void check_options(const SuiteVariant& v, const Reader& reader) {
   }
 }
 
-SuiteVariant read_variant(const std::string& name, const Reader& reader) {
+SuiteVariant read_variant(const std::string& name, const YamlReader& reader) {
   SuiteVariant v;
   v.name = name;
-  reader.check_name(name);
+  check_name(name, reader);
   if (reader.empty()) return v;
-  read_keys(reader, {{"preset", to_text(&v.preset)},
-                     {"disable", [&](const Reader& r) { v.disable = words_of(r); }},
-                     {"detector", to_text(&v.detector)},
-                     {"filter", to_text(&v.filter)},
-                     {"model", to_text(&v.model)},
-                     {"labels", to_text(&v.labels)},
-                     {"classes", to_text(&v.classes)},
-                     {"inference", to_text(&v.inference)},
-                     {"boxes", to_text(&v.boxes)},
-                     {"masks", to_text(&v.masks)},
-                     {"set",
-                      [&](const Reader& r) {
-                        for (const auto& [key, value] : r.items()) v.set[key] = value.text();
-                      }},
-                     {"get", to_text(&v.get)},
-                     {"published", to_text(&v.published)}});
+  const std::vector<std::pair<std::string, std::string*>> texts = {
+      {"preset", &v.preset}, {"detector", &v.detector}, {"filter", &v.filter},       {"model", &v.model},
+      {"labels", &v.labels}, {"classes", &v.classes},   {"inference", &v.inference}, {"boxes", &v.boxes},
+      {"masks", &v.masks},   {"get", &v.get},           {"published", &v.published}};
+  std::vector<std::string> keys = {"disable", "set"};
+  for (const auto& [key, unused] : texts) keys.push_back(key);
+  reader.check_keys(keys);
+  for (const auto& [key, field] : texts) reader.read(key, field);
+  v.disable = words_of(reader, "disable");
+  if (reader.has("set"))
+    for (const auto& [key, value] : reader.at("set").items()) v.set[key] = value.text();
   check_options(v, reader);
   return v;
 }
 
-void read_sweep(const Reader& reader, Suite* suite) {
+void read_sweep(const YamlReader& reader, Suite* suite) {
   SuiteSweep sweep;
   SuiteVariant base;
-  base.name = "sweep";
   std::vector<std::string> written;
-  read_keys(reader, {{"setting", to_text(&sweep.setting)},
-                     {"label", to_text(&sweep.label)},
-                     {"values",
-                      [&](const Reader& r) {
-                        for (const Reader& item : r.list()) {
-                          sweep.values.push_back(item.number(-1e9, 1e9));
-                          written.push_back(item.text());
-                        }
-                      }},
-                     {"published_choice", [&](const Reader& r) { sweep.published_choice = r.number(-1e9, 1e9); }},
-                     {"options", [&](const Reader& r) { base = read_variant("sweep", r); }}});
+  reader.check_keys({"setting", "label", "values", "published_choice", "options"});
+  reader.read("setting", &sweep.setting);
+  reader.read("label", &sweep.label);
+  if (reader.has("values"))
+    for (const YamlReader& value : reader.at("values").list()) {
+      sweep.values.push_back(value.number({-1e9, 1e9}));
+      written.push_back(value.text());
+    }
+  if (reader.has("published_choice")) sweep.published_choice = reader.at("published_choice").number({-1e9, 1e9});
+  if (reader.has("options")) base = read_variant("sweep", reader.at("options"));
   if (sweep.setting.empty() || sweep.values.size() < 2) reader.fail("needs a setting and at least two values");
   if (sweep.values.size() > 100) reader.fail("has more than 100 values");
   if (sweep.label.empty()) sweep.label = sweep.setting;
@@ -245,14 +140,14 @@ void read_sweep(const Reader& reader, Suite* suite) {
     v.name = sweep.label + "=" + written[i];
     v.set[sweep.setting] = written[i];
     v.swept = sweep.values[i];
-    reader.check_name(v.name);
+    check_name(v.name, reader);
     check_options(v, reader);
     suite->variants.push_back(std::move(v));
   }
   suite->sweep = std::move(sweep);
 }
 
-void check_references(const Suite& suite, const Reader& root) {
+void check_references(const Suite& suite, const YamlReader& root) {
   std::vector<std::string> names;
   for (const SuiteVariant& v : suite.variants) {
     if (std::find(names.begin(), names.end(), v.name) != names.end())
@@ -261,7 +156,7 @@ void check_references(const Suite& suite, const Reader& root) {
   }
   const auto check = [&](const std::string& key, const std::string& name) {
     if (suite.variant(name) == nullptr)
-      root.fail(key + ": there is no variant " + in_quotes(name) + did_you_mean(name, names));
+      root.at(key).fail("there is no variant " + in_quotes(name) + did_you_mean(name, names));
   };
   if (!suite.reference.empty()) check("reference", suite.reference);
   for (const std::string& name : suite.plotted) check("plotted", name);
@@ -271,11 +166,11 @@ void check_references(const Suite& suite, const Reader& root) {
     root.fail(fmt::format("has more than {} sequences or {} variants", kMaxSequences, kMaxVariants));
 }
 
-std::map<std::string, std::map<std::string, double>> read_numbers(const Reader& reader) {
-  std::map<std::string, std::map<std::string, double>> table;
-  for (const auto& [row, cells] : reader.items())
-    for (const auto& [column, value] : cells.items()) table[row][column] = value.number(0, 1e9);
-  return table;
+void read_numbers(const YamlReader& root, const std::string& key,
+                  std::map<std::string, std::map<std::string, double>>* table) {
+  if (!root.has(key)) return;
+  for (const auto& [row, cells] : root.at(key).items())
+    for (const auto& [column, value] : cells.items()) (*table)[row][column] = value.number({0, 1e9});
 }
 
 }  // namespace
@@ -312,44 +207,31 @@ std::optional<double> Suite::published_ape(const SuiteSequence& s, const SuiteVa
 
 Suite parse_suite(const SuiteText& text) {
   Suite suite;
-  with_yaml(text.text, text.file, [&](const Reader& root) {
-    int64_t seeds = suite.seeds;
-    Readers readers = {
-        {"name",
-         [&](const Reader& r) {
-           suite.name = r.text();
-           r.check_name(suite.name);
-         }},
-        {"description", to_text(&suite.description)},
-        {"root", to_text(&suite.root)},
-        {"seeds", to_whole(&seeds, 1, kMaxSeeds)},
-        {"max_frames", to_whole(&suite.max_frames, 0, kMaxFrames)},
-        {"timeout", [&](const Reader& r) { suite.timeout = r.number(1, 1e6); }},
-        {"reference", to_text(&suite.reference)},
-        {"plotted", [&](const Reader& r) { suite.plotted = words_of(r); }},
-        {"published", to_text(&suite.published_file)},
-        {"sequences",
-         [&](const Reader& r) {
-           for (const auto& [name, value] : r.items()) suite.sequences.push_back(read_sequence(name, value));
-         }},
-        {"variants",
-         [&](const Reader& r) {
-           for (const auto& [name, value] : r.items()) suite.variants.push_back(read_variant(name, value));
-         }},
-        {"sweep", [&](const Reader& r) { read_sweep(r, &suite); }},
-    };
-    read_keys(root, readers);
-    suite.seeds = static_cast<int>(text.seeds > 0 ? text.seeds : seeds);
-    if (text.max_frames > 0) {
-      suite.max_frames = text.max_frames;
-      for (SuiteSequence& s : suite.sequences) s.max_frames = 0;
-    }
-    if (suite.name.empty()) {
-      suite.name = fs::path(text.file).stem().string();
-      root.check_name(suite.name);
-    }
-    check_references(suite, root);
-  });
+  const YamlReader root(text.text, text.file);
+  root.check_keys({"name", "description", "root", "seeds", "max_frames", "timeout", "reference", "plotted", "published",
+                   "sequences", "variants", "sweep"});
+  suite.name = fs::path(text.file).stem().string();
+  for (const auto& [key, field] :
+       {std::pair{"name", &suite.name}, std::pair{"description", &suite.description}, std::pair{"root", &suite.root},
+        std::pair{"reference", &suite.reference}, std::pair{"published", &suite.published_file}})
+    root.read(key, field);
+  check_name(suite.name, root.has("name") ? root.at("name") : root);
+  root.read("seeds", &suite.seeds, {1, 1000});
+  root.read("max_frames", &suite.max_frames, kMaxFrames);
+  root.read("timeout", &suite.timeout, {1, 1e6});
+  suite.plotted = words_of(root, "plotted");
+  if (root.has("sequences"))
+    for (const auto& [name, value] : root.at("sequences").items())
+      suite.sequences.push_back(read_sequence(name, value));
+  if (root.has("variants"))
+    for (const auto& [name, value] : root.at("variants").items()) suite.variants.push_back(read_variant(name, value));
+  if (root.has("sweep")) read_sweep(root.at("sweep"), &suite);
+  if (text.seeds > 0) suite.seeds = text.seeds;
+  if (text.max_frames > 0) {
+    suite.max_frames = text.max_frames;
+    for (SuiteSequence& s : suite.sequences) s.max_frames = 0;
+  }
+  check_references(suite, root);
   if (!suite.published_file.empty()) suite.published = parse_published(text.published, suite.published_file);
   return suite;
 }
@@ -359,21 +241,18 @@ SuiteText read_suite(const fs::path& file) {
   text.file = file.string();
   text.text = read_file(file);
   std::string published;
-  with_yaml(text.text, text.file, [&](const Reader& root) {
-    for (const auto& [key, value] : root.items())
-      if (key == "published") published = value.text();
-  });
+  YamlReader(text.text, text.file).read("published", &published);
   if (!published.empty()) text.published = read_file(file.parent_path() / published);
   return text;
 }
 
 PublishedTable parse_published(const std::string& text, const std::string& name) {
   PublishedTable table;
-  with_yaml(text, name, [&](const Reader& root) {
-    read_keys(root, {{"source", to_text(&table.source)},
-                     {"ape_m", [&](const Reader& r) { table.ape_m = read_numbers(r); }},
-                     {"sweep_m", [&](const Reader& r) { table.sweep_m = read_numbers(r); }}});
-  });
+  const YamlReader root(text, name);
+  root.check_keys({"source", "ape_m", "sweep_m"});
+  root.read("source", &table.source);
+  read_numbers(root, "ape_m", &table.ape_m);
+  read_numbers(root, "sweep_m", &table.sweep_m);
   return table;
 }
 

@@ -78,7 +78,9 @@ TEST(CameraFile, WhatIsWrongWithACalibrationIsNamed) {
             "camera.yaml: key \"image_height\" is missing; a calibration needs image_width, image_height and "
             "camera_matrix");
   EXPECT_EQ(parse_message(replaced(kRos, "image_width: 640", "image_width: 640.5")),
-            "camera.yaml:1: image_width: must be 16 ... 16384 whole pixels");
+            "camera.yaml:1: image_width: \"640.5\" is not a whole number");
+  EXPECT_EQ(parse_message(replaced(kRos, "image_width: 640", "image_width: 15")),
+            "camera.yaml:1: image_width: 15 is out of range; it must be 16 ... 16384");
   EXPECT_EQ(parse_message(replaced(kRos, "distortion_model", "distorsion_model")),
             "camera.yaml:8: unknown key \"distorsion_model\" (did you mean \"distortion_model\"?)");
   EXPECT_EQ(parse_message(replaced(kRos, "plumb_bob", "equidistant")),
@@ -88,14 +90,17 @@ TEST(CameraFile, WhatIsWrongWithACalibrationIsNamed) {
             "camera.yaml:4: camera_matrix: must be fx, 0, cx, 0, fy, cy, 0, 0, 1, by rows");
   EXPECT_EQ(parse_message(replaced(kRos, "517.25, ", "")),
             "camera.yaml:4: camera_matrix: holds 8 numbers, and its rows and cols say 9");
-  EXPECT_EQ(parse_message(replaced(kRos, "517.25", "x")), "camera.yaml:4: camera_matrix: \"x\" is not a number");
+  EXPECT_EQ(parse_message(replaced(kRos, "517.25", "x")), "camera.yaml:7: camera_matrix.data: \"x\" is not a number");
   EXPECT_EQ(parse_message(replaced(kRos, "517.25", "0.")),
             "camera.yaml: fx: 0.000000 is out of range; it must be greater than 0 px");
+  EXPECT_EQ(parse_message(replaced(kRos, "data: [517.25", "dada: [517.25")),
+            "camera.yaml:4: key \"camera_matrix.data\" is missing; a matrix has rows, cols and data");
+  EXPECT_EQ(parse_message(kRos + "fps: -3\n").substr(0, 23), "camera.yaml:21: fps: -3");
   EXPECT_EQ(parse_message(replaced(kRos, "cols: 5", "cols: 4")),
             "camera.yaml:9: distortion_coefficients: holds 5 numbers, and its rows and cols say 4");
   EXPECT_EQ(parse_message(kRos + "fx: 3\n"),
             "camera.yaml:21: fx: a camera file has either camera_matrix or fx, fy, cx and cy; leave one out");
-  EXPECT_EQ(parse_message(kRos + "image_width: 3\n"), "camera.yaml:21: key \"image_width\" is given twice");
+  EXPECT_EQ(parse_message(kRos + "image_width: 3\n"), "camera.yaml:21: image_width: is given twice; leave one out");
   EXPECT_EQ(parse_message("image_width: [\n").substr(0, 33), "camera.yaml:2: is not valid YAML ");
 }
 
@@ -117,7 +122,7 @@ TEST(CameraFile, MessagesSayWhereWhatAndWhatToDo) {
   EXPECT_EQ(parse_message(replaced(kCamera, "cx: 318.6\n", "")),
             "camera.yaml: key \"cx\" is missing; a camera file needs fx, fy, cx, cy, width, height, depth_factor");
   EXPECT_EQ(parse_message(replaced(kCamera, "640", "640.5")), "camera.yaml:5: width: \"640.5\" is not a whole number");
-  EXPECT_EQ(parse_message(kCamera + "fx: 3\n"), "camera.yaml:8: key \"fx\" is given twice");
+  EXPECT_EQ(parse_message(kCamera + "fx: 3\n"), "camera.yaml:8: fx: is given twice; leave one out");
   EXPECT_EQ(parse_message("{{{").substr(0, 32), "camera.yaml:1: is not valid YAML");
   EXPECT_NE(parse_message(std::string("fx: 1\0", 6)), "no error");
 }

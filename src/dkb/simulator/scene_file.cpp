@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +9,7 @@
 #include "dkb/simulator/scene.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
-#include "dkb/util/one_line.h"
-#include "dkb/util/settings.h"
+#include "dkb/util/yaml_reader.h"
 
 namespace dkb::sim {
 namespace {
@@ -20,138 +18,41 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kDegree = 0.017453292519943295;
+const Range kTimes{0, 36000};  // [s]
 
-std::string listed(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& n : names) out += (out.empty() ? "" : ", ") + n;
+std::vector<double> metres(const YamlReader& value, size_t count, const Range& range = {-1000, 1000}) {
+  std::vector<double> out;
+  for (const YamlReader& entry : value.list()) out.push_back(entry.number(range));
+  if (out.size() != count) value.fail(fmt::format("must be a list of {} numbers [m]", count));
   return out;
 }
 
-// A map of the file whose keys are known; every complaint names the file, the line and the whole key.
-class Section {
- public:
-  // `name`: the key that leads here; empty for the file as a whole. `line`: where that stands.
-  Section(const std::string& file, const YAML::Node& node, const std::string& name,
-          const std::vector<std::string>& keys, int line = 1)
-      : file_(file), node_(node), name_(name), line_(line_of(node, line)) {
-    if (!node.IsMap()) fail(node, (name.empty() ? "a scene file" : name) + " must be a map of " + listed(keys));
-    std::vector<std::string> seen;
-    for (const auto& entry : node) {
-      const std::string key = entry.first.IsScalar() ? excerpt(entry.first.Scalar()) : "";
-      if (std::find(keys.begin(), keys.end(), key) == keys.end())
-        fail(entry.first,
-             "unknown key \"" + whole_key(key) + "\"" + did_you_mean(key, keys) + "; the keys are " + listed(keys));
-      if (std::find(seen.begin(), seen.end(), key) != seen.end())
-        fail(entry.first, "key \"" + whole_key(key) + "\" stands twice");
-      seen.push_back(key);
-    }
-  }
-
-  bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
-  YAML::Node child(const std::string& key) const {
-    if (!has(key)) fail(node_, "key \"" + whole_key(key) + "\" is missing");
-    return node_[key];
-  }
-  double number(const std::string& key, double low, double high) const { return checked(child(key), key, low, high); }
-  double number(const std::string& key, double low, double high, double otherwise) const {
-    return has(key) ? number(key, low, high) : otherwise;
-  }
-  int whole(const std::string& key, int low, int high, int otherwise) const {
-    const double v = number(key, low, high, otherwise);
-    if (v != std::floor(v)) fail(node_[key], whole_key(key) + " must be a whole number");
-    return static_cast<int>(v);
-  }
-  bool flag(const std::string& key, bool otherwise) const {
-    if (!has(key)) return otherwise;
-    bool v = false;
-    if (!YAML::convert<bool>::decode(node_[key], v)) fail(node_[key], whole_key(key) + " must be true or false");
-    return v;
-  }
-  std::string choice(const std::string& key, const std::vector<std::string>& names,
-                     const std::string& otherwise) const {
-    if (!has(key) && !otherwise.empty()) return otherwise;
-    const YAML::Node n = child(key);
-    const std::string v = n.IsScalar() ? n.Scalar() : "";
-    if (std::find(names.begin(), names.end(), v) == names.end())
-      fail(n, whole_key(key) + ": unknown \"" + excerpt(v) + "\"" + did_you_mean(v, names) + "; there are " +
-                  listed(names));
-    return v;
-  }
-  std::vector<double> numbers(const std::string& key, size_t count, double low = -1000, double high = 1000) const {
-    const YAML::Node n = child(key);
-    if (!n.IsSequence() || n.size() != count)
-      fail(n, whole_key(key) + " must be a list of " + std::to_string(count) + " numbers [m]");
-    std::vector<double> out;
-    for (const auto& v : n) out.push_back(checked(v, key, low, high));
-    return out;
-  }
-  YAML::Node list(const std::string& key) const {
-    const YAML::Node n = child(key);
-    if (!n.IsSequence() || n.size() == 0) fail(n, whole_key(key) + " must be a list with at least one entry");
-    return n;
-  }
-  [[noreturn]] void fail(const YAML::Node& at, const std::string& what) const {
-    throw InputError(file_ + ":" + std::to_string(line_of(at, line_)) + ": " + what);
-  }
-  // Of what is wrong with the value of a key.
-  [[noreturn]] void refuse(const std::string& key, const std::string& what) const {
-    fail(child(key), whole_key(key) + ": " + what);
-  }
-  Section section(const std::string& key, const std::vector<std::string>& keys) const {
-    return Section(file_, child(key), whole_key(key), keys, line_);
-  }
-  // Of each entry of a list.
-  std::vector<Section> sections(const std::string& key, const std::vector<std::string>& keys) const {
-    std::vector<Section> out;
-    const YAML::Node entries = list(key);
-    for (const auto& node : entries) out.emplace_back(file_, node, whole_key(key), keys, line_of(entries, line_));
-    return out;
-  }
-  int line() const { return line_; }
-
- private:
-  // An entry that is empty stands nowhere.
-  static int line_of(const YAML::Node& node, int otherwise) {
-    return node.Mark().is_null() ? otherwise : node.Mark().line + 1;
-  }
-  std::string whole_key(const std::string& key) const { return name_.empty() ? key : name_ + "." + key; }
-  double checked(const YAML::Node& n, const std::string& key, double low, double high) const {
-    double v = 0;
-    if (!n.IsScalar() || !parse_number(n.Scalar(), &v) || !std::isfinite(v))
-      fail(n, whole_key(key) + " must be a number");
-    if (v < low || v > high)
-      fail(n, fmt::format("{}: {} is out of range; it must be {:.7g} ... {:.7g}", whole_key(key), excerpt(n.Scalar()),
-                          low, high));
-    return v;
-  }
-  std::string file_;
-  YAML::Node node_;
-  std::string name_;
-  int line_;
-};
+Material material_named(const std::string& name) {
+  const auto& names = material_names();
+  return static_cast<Material>(std::find(names.begin(), names.end(), name) - names.begin());
+}
 
 // Returns its height [m].
-double read_room(const Section& top, uint64_t seed, Scene* scene) {
+double read_room(const YamlReader& top, uint64_t seed, Scene* scene) {
   double width = 6, depth = 5, height = 2.6;
   std::string floor = "planks";
   bool furnished = true;
   if (top.has("room")) {
-    const Section room = top.section("room", {"size", "height", "floor", "furnished"});
+    const YamlReader room = top.at("room");
+    room.check_keys({"size", "height", "floor", "furnished"});
     if (room.has("size")) {
-      const std::vector<double> size = room.numbers("size", 2, 2, 50);
+      const std::vector<double> size = metres(room.at("size"), 2, {2, 50});
       width = size[0];
       depth = size[1];
     }
-    height = room.number("height", 2, 10, height);
-    floor = room.choice("floor", {"planks", "carpet", "plaster", "wood"}, floor);
-    furnished = room.flag("furnished", true);
+    room.read("height", &height, {2, 10});
+    room.read("floor", &floor, {"planks", "carpet", "plaster", "wood"});
+    room.read("furnished", &furnished);
   }
-  const auto& names = material_names();
-  const auto material = static_cast<Material>(std::find(names.begin(), names.end(), floor) - names.begin());
   scene->inside = {-width / 2, -depth / 2, width / 2, depth / 2};
   const Footprint& r = scene->inside;
   Furnisher f(&scene->materials, &scene->furnishing, hash64(seed, 0xF00D));
-  f.shell(r.x0, r.y0, r.x1, r.y1, height, material);
+  f.shell(r.x0, r.y0, r.x1, r.y1, height, material_named(floor));
   if (!furnished) return height;
   f.line_wall({r.x0 + 0.62, r.y0}, {1, 0}, width - 1.24, 0.45);
   f.line_wall({r.x1, r.y0 + 0.62}, {0, 1}, depth - 1.24, 0.45);
@@ -160,17 +61,21 @@ double read_room(const Section& top, uint64_t seed, Scene* scene) {
   return height;
 }
 
-void read_objects(const Section& top, uint64_t seed, Scene* scene) {
+void read_objects(const YamlReader& top, uint64_t seed, Scene* scene) {
   if (!top.has("objects")) return;
   Furnisher f(&scene->materials, &scene->furnishing, hash64(seed, 0x0B7E));
-  for (const Section& o : top.sections("objects", {"kind", "position", "yaw", "size", "material"})) {
-    const std::string kind =
-        o.choice("kind", {"box", "ellipsoid", "desk", "shelf", "cabinet", "chair", "plant", "cartons"}, "");
+  for (const YamlReader& o : top.at("objects").list(1)) {
+    o.check_keys({"kind", "position", "yaw", "size", "material"});
+    std::string kind, material = "carton";
+    o.at("kind");  // has no default
+    o.read("kind", &kind, {"box", "ellipsoid", "desk", "shelf", "cabinet", "chair", "plant", "cartons"});
     const bool free = kind == "box" || kind == "ellipsoid";
     for (const char* key : {"size", "material"})
-      if (!free && o.has(key)) o.refuse(key, "belongs to kind box and ellipsoid only; leave it out of kind " + kind);
-    const std::vector<double> p = o.numbers("position", free ? 3 : 2);
-    const double yaw = o.number("yaw", -360, 360, 0) * kDegree;
+      if (!free && o.has(key)) o.at(key).fail("belongs to kind box and ellipsoid only; leave it out of kind " + kind);
+    const std::vector<double> p = metres(o.at("position"), free ? 3 : 2);
+    double yaw = 0;
+    o.read("yaw", &yaw, {-360, 360});
+    yaw *= kDegree;
     if (!free) {
       const Rigid3 at = placed(p[0], p[1], 0, yaw);
       if (kind == "desk") f.desk(at, 1.4, 0.75, Clutter::monitors);
@@ -181,11 +86,9 @@ void read_objects(const Section& top, uint64_t seed, Scene* scene) {
       if (kind == "cartons") f.cartons(at, 0.55, 0.45);
       continue;
     }
-    const std::vector<double> size = o.numbers("size", 3, 0.005, 1000);
-    const std::string material = o.choice("material", material_names(), "carton");
-    const auto kind_of = static_cast<Material>(std::find(material_names().begin(), material_names().end(), material) -
-                                               material_names().begin());
-    const int t = scene->materials.get(kind_of, hash64(seed, static_cast<uint64_t>(o.line() - 1)),
+    const std::vector<double> size = metres(o.at("size"), 3, {0.005, 1000});
+    o.read("material", &material, material_names());
+    const int t = scene->materials.get(material_named(material), hash64(seed, static_cast<uint64_t>(o.line() - 1)),
                                        std::max(size[0], size[1]), size[2]);
     Surfaces s;
     if (kind == "box") {
@@ -202,24 +105,26 @@ void read_objects(const Section& top, uint64_t seed, Scene* scene) {
   }
 }
 
-void read_path(const Section& top, uint64_t seed, double height, Scene* scene) {
+void read_path(const YamlReader& top, uint64_t seed, double height, Scene* scene) {
   std::vector<TimedPose> knots;
-  for (const Section& k : top.sections("path", {"time", "position", "look_at"})) {
-    const double time = k.number("time", 0, 36000);
-    if (!knots.empty() && time <= knots.back().time) k.refuse("time", "must be later than that of the entry before");
-    const std::vector<double> p = k.numbers("position", 3), q = k.numbers("look_at", 3);
+  for (const YamlReader& k : top.at("path").list(1)) {
+    k.check_keys({"time", "position", "look_at"});
+    const double time = k.at("time").number(kTimes);
+    if (!knots.empty() && time <= knots.back().time) k.at("time").fail("must be later than that of the entry before");
+    const std::vector<double> p = metres(k.at("position"), 3), q = metres(k.at("look_at"), 3);
     const Vector3d eye(p[0], p[1], p[2]), d = Vector3d(q[0], q[1], q[2]) - eye;
     const Footprint& in = scene->inside;
     if (eye.x() <= in.x0 || eye.x() >= in.x1 || eye.y() <= in.y0 || eye.y() >= in.y1 || eye.z() <= 0 ||
         eye.z() >= height)
-      k.refuse("position",
-               fmt::format("({:g}, {:g}, {:g}) is outside the room; x must be between {:g} and {:g}, y between "
-                           "{:g} and {:g}, z between 0 and {:g}, its height",
-                           eye.x(), eye.y(), eye.z(), in.x0, in.x1, in.y0, in.y1, height));
-    if (std::hypot(d.x(), d.y()) < 1e-3) k.refuse("look_at", "must not be straight above or below position");
+      k.at("position")
+          .fail(fmt::format("({:g}, {:g}, {:g}) is outside the room; x must be between {:g} and {:g}, y between "
+                            "{:g} and {:g}, z between 0 and {:g}, its height",
+                            eye.x(), eye.y(), eye.z(), in.x0, in.x1, in.y0, in.y1, height));
+    if (std::hypot(d.x(), d.y()) < 1e-3) k.at("look_at").fail("must not be straight above or below position");
     knots.push_back({time, camera_pose(eye, std::atan2(d.y(), d.x()), std::atan2(d.z(), std::hypot(d.x(), d.y())))});
   }
-  const double tremor = top.number("tremor", 0, 10, 1);
+  double tremor = 1;
+  top.read("tremor", &tremor, {0, 10});
   if (knots.size() == 1) knots.push_back({knots[0].time + 1, knots[0].world_from_cam});
   const CameraPath steady = smooth_path(knots, 0.2);
   scene->path = [steady, tremor, seed](double t) {
@@ -231,17 +136,20 @@ void read_path(const Section& top, uint64_t seed, double height, Scene* scene) {
   };
 }
 
-void read_movers(const Section& top, double duration, const SceneRequest& request, Scene* scene) {
+void read_movers(const YamlReader& top, double duration, const SceneRequest& request, Scene* scene) {
   if (!top.has("movers")) return;
-  for (const Section& m : top.sections("movers", {"class", "waypoints"})) {
+  for (const YamlReader& m : top.at("movers").list(1)) {
+    m.check_keys({"class", "waypoints"});
     std::vector<Waypoint> points;
-    for (const Section& w : m.sections("waypoints", {"time", "position"})) {
-      const std::vector<double> p = w.numbers("position", 2);
-      points.push_back({{p[0], p[1]}, w.number("time", 0, 36000)});
+    for (const YamlReader& w : m.at("waypoints").list(1)) {
+      w.check_keys({"time", "position"});
+      const std::vector<double> p = metres(w.at("position"), 2);
+      points.push_back({{p[0], p[1]}, w.at("time").number(kTimes)});
       if (points.size() > 1 && points.back().time <= points[points.size() - 2].time)
-        w.refuse("time", "must be later than that of the entry before");
+        w.at("time").fail("must be later than that of the entry before");
     }
-    const std::string kind = m.choice("class", {"person", "chair"}, "person");
+    std::string kind = "person";
+    m.read("class", &kind, {"person", "chair"});
     const double later = kind == "person" ? request.stand_still : 0;
     for (Waypoint& w : points) w.time += later;
     add_mover(scene, kind, track_along(points, duration, later > 0),
@@ -252,29 +160,25 @@ void read_movers(const Section& top, double duration, const SceneRequest& reques
 }  // namespace
 
 Scene read_scene_file(const std::string& file, const SceneRequest& request) {
-  YAML::Node root;
-  try {
-    root = YAML::Load(read_file(file));
-  } catch (const YAML::Exception& e) {
-    throw InputError(file + ":" + std::to_string(std::max(0, e.mark.line) + 1) + ": not YAML: " + e.msg);
-  }
-  const std::vector<std::string> keys{"frames", "people", "exposure_ms", "tremor", "room", "path", "objects", "movers"};
-  try {
-    const Section top(file, root, "", keys);
-    Scene scene;
-    scene.frames = request.frames > 0 ? request.frames : top.whole("frames", 1, 1000000, 300);
-    scene.exposure = top.number("exposure_ms", 1, 30, 14) * 1e-3;
-    const double duration = scene.frames / request.fps;
-    const double height = read_room(top, request.seed, &scene);
-    read_objects(top, request.seed, &scene);
-    read_path(top, hash64(request.seed, 12), height, &scene);
-    read_movers(top, duration, request, &scene);
-    const int people = request.people >= 0 ? request.people : top.whole("people", 0, 30, 0);
-    if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request);
-    return scene;
-  } catch (const YAML::Exception& e) {
-    throw InputError(file + ":" + std::to_string(std::max(0, e.mark.line) + 1) + ": " + e.msg);
-  }
+  const YamlReader top(read_file(file), file);
+  top.check_keys({"frames", "people", "exposure_ms", "tremor", "room", "path", "objects", "movers"});
+  Scene scene;
+  int people = 0;
+  double exposure_ms = 14;
+  scene.frames = 300;
+  top.read("frames", &scene.frames, {1, 1000000});
+  top.read("people", &people, {0, 30});
+  top.read("exposure_ms", &exposure_ms, {1, 30});
+  if (request.frames > 0) scene.frames = request.frames;
+  if (request.people >= 0) people = request.people;
+  scene.exposure = exposure_ms * 1e-3;
+  const double duration = scene.frames / request.fps;
+  const double height = read_room(top, request.seed, &scene);
+  read_objects(top, request.seed, &scene);
+  read_path(top, hash64(request.seed, 12), height, &scene);
+  read_movers(top, duration, request, &scene);
+  if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request);
+  return scene;
 }
 
 }  // namespace dkb::sim

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dkb/util/settings.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -13,12 +11,10 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/one_line.h"
+#include "dkb/util/yaml_reader.h"
 
 namespace dkb {
 namespace {
-
-constexpr size_t kMaxYamlBytes = size_t{1} << 20;  // a settings file is a page, not a data set
-constexpr int kMaxYamlDepth = 32;
 
 size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<size_t> row(b.size() + 1);
@@ -47,10 +43,6 @@ std::string number_to_text(T value) {
 std::string limit_to_text(double value) {
   return std::abs(value) < 1e15 && value == std::floor(value) ? number_to_text(static_cast<int64_t>(value))
                                                               : number_to_text(value);
-}
-
-std::string place(const std::string& file, const YAML::Mark& mark) {
-  return mark.is_null() ? file : file + ":" + std::to_string(mark.line + 1);
 }
 
 }  // namespace
@@ -204,45 +196,24 @@ void Settings::load_yaml_text(const std::string& text, const std::string& name) 
 
 std::vector<SettingLine> Settings::parse_yaml(const std::string& text, const std::string& name) const {
   std::vector<SettingLine> lines;
-  if (text.size() > kMaxYamlBytes) throw InputError(name + ": is too large for a settings file");
-  if (text.find('\0') != std::string::npos) throw InputError(name + ": is not a text file");
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::Exception& e) {
-    throw InputError(place(name, e.mark) + ": is not valid YAML (" + excerpt(e.msg) + ")");
-  }
-
-  // Every node that is entered has a key of its own that is a known one or a known section, so that aliases cannot make
-  // the walk long.
+  // Every value that is entered has a key of its own that is a known one or a known section, so that aliases cannot
+  // make the walk long.
   std::set<std::string> seen;
-  const std::function<void(const YAML::Node&, const std::string&, int)> walk =
-      [&](const YAML::Node& node, const std::string& prefix, int depth) {
-        const std::string section = prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1);
-        if (node.IsNull()) return;  // a section with all its lines commented out
-        if (!node.IsMap() || depth > kMaxYamlDepth)
-          throw InputError(place(name, node.Mark()) + ": " + (section.empty() ? "" : section + ": ") +
-                           "expected lines of the form `key: value`");
-        for (const auto& item : node) {
-          const YAML::Node &first = item.first, &second = item.second;
-          const std::string where = place(name, first.Mark());
-          if (!first.IsScalar()) throw InputError(where + ": a key must be a word");
-          const std::string key = prefix + first.Scalar();
-          if (!seen.insert(key).second) throw InputError(where + ": key \"" + excerpt(key) + "\" is given twice");
-          if (has_section(key)) {
-            walk(second, key + ".", depth + 1);
-          } else if (bindings_.count(key) != 0 && !second.IsScalar()) {
-            throw InputError(where + ": " + key + ": has no value; it must be " + bindings_.at(key).expected);
-          } else {
-            lines.push_back({key, second.IsScalar() ? second.Scalar() : "", where});
-          }
-        }
-      };
-  try {
-    walk(root, "", 0);
-  } catch (const YAML::Exception& e) {
-    throw InputError(place(name, e.mark) + ": is not valid YAML (" + excerpt(e.msg) + ")");
-  }
+  const std::function<void(const YamlReader&)> walk = [&](const YamlReader& section) {
+    if (section.empty()) return;  // with all its lines commented out
+    for (const auto& [unused, value] : section.items()) {
+      const std::string& key = value.key();
+      if (!seen.insert(key).second) value.fail("is given twice; leave one out");
+      if (has_section(key)) {
+        walk(value);
+      } else if (bindings_.count(key) != 0 && !value.is_text()) {
+        value.fail("has no value; it must be " + bindings_.at(key).expected);
+      } else {
+        lines.push_back({key, value.is_text() ? value.text() : "", value.where()});
+      }
+    }
+  };
+  walk(YamlReader(text, name));
   return lines;
 }
 

@@ -119,13 +119,13 @@ TEST(Settings, YamlMayBeNestedOrDottedAndNamesFileAndLine) {
   };
   EXPECT_EQ(load("seed: 3\nfeatures:\n  coun: 5\n"),
             "a.yaml:3: unknown key \"features.coun\" (did you mean \"features.count\"?)");
-  EXPECT_EQ(load("features: 3"), "a.yaml:1: features: expected lines of the form `key: value`");
-  EXPECT_EQ(load("seed: 1\nseed: 2"), "a.yaml:2: key \"seed\" is given twice");
-  EXPECT_EQ(load("features: {count: 1}\nfeatures.count: 2"), "a.yaml:2: key \"features.count\" is given twice");
+  EXPECT_EQ(load("features: 3"), "a.yaml:1: features: must be lines of the form `key: value`");
+  EXPECT_EQ(load("seed: 1\nseed: 2"), "a.yaml:2: seed: is given twice; leave one out");
+  EXPECT_EQ(load("features: {count: 1}\nfeatures.count: 2"), "a.yaml:2: features.count: is given twice; leave one out");
   EXPECT_EQ(load("seed:\n"), "a.yaml:1: seed: has no value; it must be a whole number, not negative");
   EXPECT_EQ(load("seed: [1, 2]"), "a.yaml:1: seed: has no value; it must be a whole number, not negative");
   EXPECT_EQ(load("seed: x"), "a.yaml:1: seed: \"x\" is not a whole number, not negative");
-  EXPECT_EQ(load("[1, 2]"), "a.yaml:1: expected lines of the form `key: value`");
+  EXPECT_EQ(load("[1, 2]"), "a.yaml:1: must be lines of the form `key: value`");
   EXPECT_EQ(load("a: &x {b: *x}").substr(0, 26), "a.yaml:1: unknown key \"a\"");
   EXPECT_EQ(load("{{{").substr(0, 8), "a.yaml:1");
 }
