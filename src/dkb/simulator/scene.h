@@ -56,9 +56,10 @@ Scene build_scene_around(const std::vector<TimedPose>& poses, const SceneRequest
 void add_walkers(Scene* scene, WalkArea area, int count, double duration, const SceneRequest& request);
 void add_mover(Scene* scene, const std::string& kind, Track track, uint64_t seed);
 
-// A scene from a YAML file; docs/files.md has the format.
+// A scene from a YAML file; docs/files.md has the format. `name` opens messages.
 // Throws InputError with file:line: unknown (misspelt), repeated, missing or ill-typed key, value out of range, not
 // YAML.
+Scene parse_scene(const std::string& text, const std::string& name, const SceneRequest& request);
 Scene read_scene_file(const std::string& file, const SceneRequest& request);
 
 }  // namespace dkb::sim

@@ -159,8 +159,8 @@ void read_movers(const YamlReader& top, double duration, const SceneRequest& req
 
 }  // namespace
 
-Scene read_scene_file(const std::string& file, const SceneRequest& request) {
-  const YamlReader top(read_file(file), file);
+Scene parse_scene(const std::string& text, const std::string& name, const SceneRequest& request) {
+  const YamlReader top(text, name);
   top.check_keys({"frames", "people", "exposure_ms", "tremor", "room", "path", "objects", "movers"});
   Scene scene;
   int people = 0;
@@ -179,6 +179,10 @@ Scene read_scene_file(const std::string& file, const SceneRequest& request) {
   read_movers(top, duration, request, &scene);
   if (people > 0) add_walkers(&scene, WalkArea{}, people, duration, request);
   return scene;
+}
+
+Scene read_scene_file(const std::string& file, const SceneRequest& request) {
+  return parse_scene(read_file(file), file, request);
 }
 
 }  // namespace dkb::sim
