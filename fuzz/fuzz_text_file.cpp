@@ -30,8 +30,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   refused_or_read([&] { dkb::parse_associations(text, "associations.txt", "/"); });
   refused_or_read([&] { dkb::parse_boxes(text, "boxes.txt", 640, 480); });
   refused_or_read([&] { dkb::parse_movers(text, "movers.csv"); });
-  refused_or_read([&] { dkb::sim::parse_scene(text, "scene.yaml", {.frames = 3}); });
-  refused_or_read([&] { dkb::bench::parse_suite({.file = "suite.yaml", .text = text, .published = ""}); });
+  dkb::sim::SceneRequest request;
+  request.frames = 3;
+  refused_or_read([&] { dkb::sim::parse_scene(text, "scene.yaml", request); });
+  dkb::bench::SuiteText suite;
+  suite.file = "suite.yaml", suite.text = text;
+  refused_or_read([&] { dkb::bench::parse_suite(suite); });
   refused_or_read([&] { dkb::bench::parse_published(text, "published.yaml"); });
   return 0;
 }

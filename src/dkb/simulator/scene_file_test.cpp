@@ -17,11 +17,13 @@ TEST(SceneFile, NoMutationDoesMoreThanBeRefused) {
       "objects:\n  - {kind: box, position: [0, 1, 1], yaw: 30, size: [0.5, 0.5, 0.5], material: carton}\n"
       "movers:\n  - {class: person, waypoints: [{time: 0, position: [0, 0]}, {time: 1, position: [1, 0]}]}\n";
   ASSERT_EQ(parse_scene(text, "scene.yaml", {}).frames, 20);
+  SceneRequest request;
+  request.frames = 20;
   Random random(5);
   int refused = 0;
   for (int round = 0; round < 3000; ++round) {
     try {
-      parse_scene(mutated(text, random), "scene.yaml", {.frames = 20});
+      parse_scene(mutated(text, random), "scene.yaml", request);
     } catch (const InputError& e) {
       ++refused;
       EXPECT_EQ(std::string(e.what()).rfind("scene.yaml", 0), 0u) << e.what();
