@@ -21,7 +21,7 @@ namespace dkb::bench {
 namespace fs = std::filesystem;
 namespace {
 
-const Range kMaxFrames{0, 1e7};
+const Range kFrames{0, 1e7};  // 0: all
 constexpr size_t kMaxSequences = 1000, kMaxVariants = 1000;
 
 std::string in_quotes(const std::string& text) {
@@ -70,7 +70,7 @@ SuiteSequence read_sequence(const std::string& name, const YamlReader& reader) {
        {std::pair{"path", &s.path}, std::pair{"camera", &s.camera}, std::pair{"truth", &s.truth},
         std::pair{"get", &s.get}, std::pair{"published", &s.published}})
     reader.read(key, field);
-  reader.read("max_frames", &s.max_frames, kMaxFrames);
+  reader.read("max_frames", &s.max_frames, kFrames);
   if (s.simulated.has_value() == !s.path.empty()) reader.fail("needs either a path or `simulate`");
   return s;
 }
@@ -217,7 +217,7 @@ Suite parse_suite(const SuiteText& text) {
     root.read(key, field);
   check_name(suite.name, root.has("name") ? root.at("name") : root);
   root.read("seeds", &suite.seeds, {1, 1000});
-  root.read("max_frames", &suite.max_frames, kMaxFrames);
+  root.read("max_frames", &suite.max_frames, kFrames);
   root.read("timeout", &suite.timeout, {1, 1e6});
   suite.plotted = words_of(root, "plotted");
   if (root.has("sequences"))

@@ -119,40 +119,42 @@ void YamlReader::check_keys(const std::vector<std::string>& known) const {
       throw InputError(value.where() + ": unknown key " + in_quotes(value.key_) + did_you_mean(name, known) + possible);
 }
 
-bool YamlReader::has(const std::string& name) const {
-  return node_->IsMap() && (*node_)[name].IsDefined();
-}
-
-YamlReader YamlReader::at(const std::string& name, const std::string& remedy) const {
-  if (has(name))
+std::optional<YamlReader> YamlReader::find(const std::string& name) const {
+  if (node_->IsMap())
     for (const auto& item : *node_)
       if (item.first.IsScalar() && item.first.Scalar() == name)
         return YamlReader(item.second, file_, key_of(name), line_of(item.first, line_));
+  return std::nullopt;
+}
+
+YamlReader YamlReader::at(const std::string& name, const std::string& remedy) const {
+  if (std::optional<YamlReader> value = find(name)) return *std::move(value);
   throw InputError(where() + ": key " + in_quotes(key_of(name)) + " is missing" + remedy);
 }
 
 void YamlReader::read(const std::string& name, std::string* field, const std::vector<std::string>& names) const {
-  if (!has(name)) return;
-  const YamlReader value = at(name);
-  *field = value.text();
+  const std::optional<YamlReader> value = find(name);
+  if (!value) return;
+  *field = value->text();
   if (!names.empty() && !holds(names, *field))
-    value.fail(in_quotes(*field) + " is not one of " + listed(names) + did_you_mean(*field, names));
+    value->fail(in_quotes(*field) + " is not one of " + listed(names) + did_you_mean(*field, names));
 }
 
 void YamlReader::read(const std::string& name, double* field, const Range& range) const {
-  if (has(name)) *field = at(name).number(range);
+  if (const auto value = find(name)) *field = value->number(range);
 }
 
 void YamlReader::read(const std::string& name, int* field, const Range& range) const {
-  if (has(name)) *field = static_cast<int>(at(name).whole(range));
+  if (const auto value = find(name)) *field = static_cast<int>(value->whole(range));
 }
 
 void YamlReader::read(const std::string& name, int64_t* field, const Range& range) const {
-  if (has(name)) *field = at(name).whole(range);
+  if (const auto value = find(name)) *field = value->whole(range);
 }
 
 void YamlReader::read(const std::string& name, bool* field) const {
-  if (has(name) && !YAML::convert<bool>::decode(*at(name).node_, *field)) at(name).fail("must be true or false");
+  const auto value = find(name);
+  if (value && !YAML::convert<bool>::decode(*value->node_, *field)) value->fail("must be true or false");
 }
 
 }  // namespace dkb

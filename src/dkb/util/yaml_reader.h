@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,7 +40,7 @@ class YamlReader {
 
   // Refuses what is no map, and keys that are not among `known`.
   void check_keys(const std::vector<std::string>& known) const;
-  bool has(const std::string& name) const;
+  bool has(const std::string& name) const { return find(name).has_value(); }
   // The value of a key that must be there. `remedy` ends the message when it is not.
   YamlReader at(const std::string& name, const std::string& remedy = "") const;
   // Sets the field to the value of the key, when it is there. A text may be anything, or one of `names`.
@@ -52,6 +53,7 @@ class YamlReader {
  private:
   YamlReader(const YAML::Node& node, std::string file, std::string key, int line);
   std::string key_of(const std::string& name) const { return key_.empty() ? name : key_ + "." + name; }
+  std::optional<YamlReader> find(const std::string& name) const;
   int64_t whole(const Range& range) const;
 
   std::shared_ptr<const YAML::Node> node_;
