@@ -24,10 +24,6 @@ namespace {
 const Range kFrames{0, 1e7};  // 0: all
 constexpr size_t kMaxSequences = 1000, kMaxVariants = 1000;
 
-std::string in_quotes(const std::string& text) {
-  return "\"" + excerpt(text) + "\"";
-}
-
 // Names become file names and columns of tables. `reader`: where the name stands.
 void check_name(const std::string& name, const YamlReader& reader) {
   const auto fine = [](char c) {

@@ -27,4 +27,8 @@ inline std::string excerpt(std::string_view text) {
   return text.size() > kLongest ? out + "..." : out;
 }
 
+inline std::string in_quotes(std::string_view text) {
+  return "\"" + excerpt(text) + "\"";
+}
+
 }  // namespace dkb

@@ -21,10 +21,6 @@ int line_of(const YAML::Node& node, int otherwise) {
   return node.IsNull() ? otherwise : node.Mark().line + 1;
 }
 
-std::string in_quotes(const std::string& text) {
-  return "\"" + excerpt(text) + "\"";
-}
-
 bool holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
