@@ -66,7 +66,7 @@ setsid ros2 launch dkb_slam_ros rgbd.launch.py "${arguments[@]}" >"$work/node.lo
 launch=$!
 started+=("$launch")
 check || { tail -20 "$work/node.log"; exit 1; }
-ros2 param describe /dkb_slam features.count tracking.close_depth
+ros2 param describe --no-daemon --spin-time 5 /dkb_slam features.count tracking.close_depth
 kill -INT -- "-$launch"
 wait "$launch" || true
 grep -q "process has finished cleanly" "$work/node.log" || { tail "$work/node.log"; echo "FAILED: the node did not stop cleanly"; exit 1; }

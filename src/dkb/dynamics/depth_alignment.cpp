@@ -24,17 +24,18 @@ constexpr size_t kEnoughCells = 100;
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
+constexpr double kSlowest = 0.033;                        // [s] readout: sensors are read within a frame at 30 Hz
 
-// What the cells say: each a row [n, p x n] of the Jacobian and its distance. Summed in rows of eight floats, which are
-// whole registers.
+// What the cells say: each a row [n, p x n] of the Jacobian, its distance, and how that changes with the readout [m/s].
+// Summed in rows of eight floats, which are whole registers.
 class PlaneSums {
  public:
   // `weighted_slope`: the cell's weight times the variance of its normal's slope.
-  void add(const Eigen::Vector3f& normal, const Eigen::Vector3f& point, float distance, float weight,
+  void add(const Eigen::Vector3f& normal, const Eigen::Vector3f& point, float distance, float by_readout, float weight,
            float weighted_slope) {
     const Eigen::Vector3f lever = point.cross(normal);
     Row row;
-    row << normal[0], normal[1], normal[2], lever[0], lever[1], lever[2], distance, 0;
+    row << normal[0], normal[1], normal[2], lever[0], lever[1], lever[2], distance, by_readout;
     const Eigen::Vector4f place(point[0], point[1], point[2], 1);
     squares_.noalias() += weight * row * row.transpose();
     along_.noalias() += weighted_slope * row * row.transpose();
@@ -44,6 +45,16 @@ class PlaneSums {
   size_t cells() const { return cells_; }
   Matrix6d information() const { return squares_.topLeftCorner<6, 6>().cast<double>(); }
   Vector6d gradient() const { return squares_.col(6).head<6>().cast<double>(); }
+  struct OfReadout {
+    double information = 0, gradient = 0;  // [1/s^2], [1/s]
+  };
+  // What they say of the readout, from the normal equations of [step, readout] with the step eliminated. `information`
+  // is that of the step, by which it would be `step` if the readout were right.
+  OfReadout of_readout(double cells_like_one, const Matrix6d& information, const Vector6d& step) const {
+    const Vector6d both = squares_.col(7).head<6>().cast<double>() / cells_like_one;
+    return {squares_(7, 7) / cells_like_one - both.dot(solve_symmetric(information, both)),
+            squares_(6, 7) / cells_like_one + both.dot(step)};
+  }
   // What the noise of the normals adds to the information. A normal n is off across itself, so that the row of a cell
   // at p is off by A (I - n n^T) A^T times the variance of the slope, with A = [I, [p]x].
   Matrix6d noise() const {
@@ -127,10 +138,12 @@ DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const Mot
     : noise_(noise),
       focal_(focal),
       normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()),
-      asked_(rays.width(), rays.height()) {}
+      asked_(rays.width(), rays.height()),
+      readout_information_(3 / (kSlowest * kSlowest)) {}  // each as likely: the mean square of what 0 is off by
 
 // By least squares over 3 x 3 cells, kReach apart.
-Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const {
+Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y,
+                                            const ReadoutMotion& readout) const {
   constexpr int k = kReach;
   const Image<float>& depth = grid.depth;
   if (x < k || y < k || x + k >= rays.width() || y + k >= rays.height()) return Eigen::Vector3f::Zero();
@@ -142,7 +155,7 @@ Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const M
     for (int u = -1; u <= 1; ++u) {
       const float there = depth(x + k * u, y + k * v);
       if (!(there > 0) || std::abs(there - z) > jump) return Eigen::Vector3f::Zero();
-      const Eigen::Vector3f place = there * rays.ray(x + k * u, y + k * v);
+      const Eigen::Vector3f place = rays.point(x + k * u, y + k * v, there, readout);
       across += static_cast<float>(u) * place;
       down += static_cast<float>(v) * place;
     }
@@ -160,10 +173,14 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
   const Matrix6d prior = inverse(covariance);
   const Rigid3 here_from_there_expected = expected.previous_from_current.inverse();
   const auto spacings_per_unit = static_cast<float>(focal_ / (kReach * rays.cell()));  // of a plane one unit away
+  const double seconds = here.time - there.time;
+  const ReadoutMotion there_readout(there.velocity, readout_), there_rate(there.velocity, 1);
   Rigid3 pose = expected.previous_from_current;
   Matrix6d information;
   double doubt = 1;  // share of the expectation's variance that the robust cost still allows for
   for (int iteration = 0; iteration < kIterations; ++iteration, doubt *= kDoubtLeft) {
+    const Vector6d velocity = seconds > 0 ? Vector6d(tangent_from_rigid3(pose.inverse()) / seconds) : here.velocity;
+    const ReadoutMotion here_readout(velocity, readout_), here_rate(velocity, 1);
     const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
     const Eigen::Vector3f translation = pose.translation.cast<float>();
     PlaneSums sums;
@@ -172,17 +189,19 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
       for (int x = kStride / 2; x < rays.width(); x += kStride) {
         const float depth = here.depth(x, y);
         if (!(depth > 0)) continue;
-        const Eigen::Vector3f point = rotation * (depth * rays.ray(x, y)) + translation;
+        const Eigen::Vector3f seen = rays.point(x, y, depth, here_readout);
+        const Eigen::Vector3f point = rotation * seen + translation;
         int u = 0, v = 0;
-        if (!rays.find_cell(point, &u, &v)) continue;
+        if (!rays.find_cell(point, &u, &v, there_readout)) continue;
         Eigen::Vector3f& normal = normals_(u, v);
         if (asked_(u, v) == 0) {
-          normal = find_normal(there, rays, u, v);
+          normal = find_normal(there, rays, u, v, there_readout);
           asked_(u, v) = 1;
         }
         if (normal.isZero()) continue;
         const float z = there.depth(u, v);
-        const float distance = normal.dot(point - z * rays.ray(u, v));
+        const Eigen::Vector3f surface = rays.point(u, v, z, there_readout);
+        const float distance = normal.dot(point - surface);
         const auto sigma = static_cast<float>(noise_.flat_depth_sigma(z));
         const float variance = 2 * sigma * sigma;
         const float allowed =
@@ -193,7 +212,9 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
         const float trust = (1 - share) * (1 - share), weight = trust / variance;
         // The slope of a plane through nine depths, three each at -1, 0 and 1 spacings: of six squares in all.
         const float slope = sigma / z * spacings_per_unit;
-        sums.add(normal, point, distance, weight, weight * slope * slope / 6);
+        const float by_readout =
+            normal.dot(rays.late(v) * there_rate.of(surface) - rays.late(y) * (rotation * here_rate.of(seen)));
+        sums.add(normal, point, distance, by_readout, weight, weight * slope * slope / 6);
         blocks.add(x, y, distance / std::sqrt(variance), trust);
       }
     if (sums.cells() < kEnoughCells) return std::nullopt;
@@ -207,12 +228,16 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
       return -solve_symmetric(information, gradient);
     };
     const double usual = together_.value_or(1);
+    double hanging_together = usual;
     Vector6d step = solve(usual);
     const bool settled = step.head<3>().norm() < kSmallStep && step.tail<3>().norm() < kSmallTurn;
     if (settled || iteration + 1 == kIterations) {
       // Only now the distances are the surfaces' own, and no longer those of a pose that is off.
       const std::optional<double> factor = blocks.factor();
-      if (factor && *factor > usual) step = solve(*factor);
+      if (factor && *factor > usual) step = solve(hanging_together = *factor);
+      const auto of_readout = sums.of_readout(kTogether * hanging_together, information, step);
+      readout_information_ += std::max(0.0, of_readout.information);
+      readout_ = std::clamp(readout_ - of_readout.gradient / readout_information_, 0.0, kSlowest);
       if (factor) together_ = together_ ? usual + kFrameShare * (*factor - usual) : *factor;
     }
     pose = rigid3_from_tangent(step) * pose;

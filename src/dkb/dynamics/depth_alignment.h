@@ -12,6 +12,9 @@ namespace dkb {
 // Where a depth image was taken, by the surfaces that an earlier one saw: point-to-plane distances with projective
 // association (Blais and Levine, PAMI 1995; Chen and Medioni, IVC 1992) under a robust cost (Tukey's), beside what was
 // expected. What the surfaces leave open stays as it was expected. Deterministic.
+//
+// Rows of a depth image may be read one after the other (a Kinect's are), or all at once. What no motion between two
+// images explains of the rows' shear tells how long that takes: recursive least squares with each step eliminated.
 class DepthAlignment {
  public:
   DepthAlignment(const SensorNoise& noise, double focal, const MotionRays& rays);
@@ -19,11 +22,15 @@ class DepthAlignment {
   // The motion between the two grids' cameras, from `there` to `here`, with its covariance: what was expected and what
   // the surfaces say, each weighed by its own. Cells of `there` whose score says that they move are left out. Nothing
   // when too few surfaces are in both.
+  // The velocity of both is used, as far as readout() goes.
   std::optional<MotionPrior> align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
                                    const MotionPrior& expected);
+  // [s] from the first row of a depth image to the last, as far as the images so far tell; 0 before any.
+  double readout() const { return readout_; }
 
  private:
-  Eigen::Vector3f find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y) const;
+  Eigen::Vector3f find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y,
+                              const ReadoutMotion& readout) const;
 
   SensorNoise noise_;
   double focal_;                    // [px]
@@ -31,6 +38,8 @@ class DepthAlignment {
   Image<uint8_t> asked_;            // 1 where it was
   // How much more the cells of a block vary together than by the sensor's noise: so far, once it is known.
   std::optional<double> together_;
+  double readout_ = 0;          // [s]
+  double readout_information_;  // [1/s^2]
 };
 
 }  // namespace dkb

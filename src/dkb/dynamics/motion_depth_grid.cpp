@@ -76,6 +76,7 @@ MotionRays::MotionRays(const CameraModel& camera, int cell)
       const Eigen::Vector3d ray = camera.unproject(pixel, 1.0);
       x_.push_back(static_cast<float>(ray.x()));
       y_.push_back(static_cast<float>(ray.y()));
+      late_.push_back(late(y));
       r2_max_ = std::max(r2_max_, static_cast<float>(ray.head<2>().squaredNorm()));
     }
   r2_max_ *= 1.02f;  // far outside the image the distortion polynomial folds back
@@ -96,7 +97,18 @@ DKB_KERNEL_BODY static inline void distort(float a, float b, float r2, float rad
   *v = b * radial + p1 * (r2 + 2.0f * b * b) + 2.0f * p2 * a * b;
 }
 
-bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
+// The lens is left out: it moves a row by less than what a row's delay does.
+DKB_KERNEL_BODY static inline float late_at(float y, float z, float per_slope, float middle) {
+  return std::min(std::max(y / std::max(z, kMinDepth) * per_slope + middle, -0.5f), 0.5f);
+}
+
+float MotionRays::late_of(const Eigen::Vector3f& point) const {
+  const auto rows = static_cast<float>(height_);
+  return late_at(point.y(), point.z(), fy_ / rows, cy_ / rows - 0.5f);
+}
+
+bool MotionRays::find_cell(const Eigen::Vector3f& middle, int* x, int* y, const ReadoutMotion& readout) const {
+  const Eigen::Vector3f point = middle + late_of(middle) * readout.of(middle);
   if (!(point.z() > kMinDepth)) return false;
   const float a = point.x() / point.z(), b = point.y() / point.z(), r2 = a * a + b * b;
   if (!(r2 <= r2_max_)) return false;
@@ -111,14 +123,16 @@ bool MotionRays::find_cell(const Eigen::Vector3f& point, int* x, int* y) const {
 }
 
 void MotionRays::project(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
-                         MotionProjection& result, Simd simd) const {
-  rational_ ? project_by<true>(depth, missing, there_from_here, range, result, simd)
-            : project_by<false>(depth, missing, there_from_here, range, result, simd);
+                         MotionProjection& result, Simd simd, const ReadoutMotion& here,
+                         const ReadoutMotion& there) const {
+  rational_ ? project_by<true>(depth, missing, there_from_here, range, result, simd, here, there)
+            : project_by<false>(depth, missing, there_from_here, range, result, simd, here, there);
 }
 
 template <bool rational>
 void MotionRays::project_by(const Image<float>& depth, float missing, const Rigid3& there_from_here, CellRange range,
-                            MotionProjection& result, Simd simd) const {
+                            MotionProjection& result, Simd simd, const ReadoutMotion& here,
+                            const ReadoutMotion& there) const {
   const Eigen::Matrix3f r = there_from_here.matrix3().cast<float>();
   const Eigen::Vector3f t = there_from_here.translation.cast<float>();
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
@@ -133,15 +147,27 @@ void MotionRays::project_by(const Image<float>& depth, float missing, const Rigi
   const float* const xs = x_.data() + range.first;
   const float* const ys = y_.data() + range.first;
   const float* const zs = depth.data() + range.first;
+  const float* const lates = late_.data() + range.first;
+  const float hx = here.turn.x(), hy = here.turn.y(), hz = here.turn.z();
+  const float hu = here.shift.x(), hv = here.shift.y(), hw = here.shift.z();
+  const float gx = there.turn.x(), gy = there.turn.y(), gz = there.turn.z();
+  const float gu = there.shift.x(), gv = there.shift.y(), gw = there.shift.z();
+  const float per_slope = fy_ / static_cast<float>(height_), middle = cy_ / static_cast<float>(height_) - 0.5f;
   int32_t* const cells = result.cell.data();
   float* const depths = result.depth.data();
   // Coordinates are counted from 1 and cut to one cell around the grid: 0 and size + 1 are outside.
   run_vectorised(simd, [=]() DKB_KERNEL_BODY {
     for (size_t i = 0; i < count; ++i) {
       const float z = zs[i] > 0.0f ? zs[i] : missing;
-      const float px = z * (r00 * xs[i] + r01 * ys[i] + r02) + tx;
-      const float py = z * (r10 * xs[i] + r11 * ys[i] + r12) + ty;
-      const float pz = z * (r20 * xs[i] + r21 * ys[i] + r22) + tz;
+      const float x = z * xs[i], y = z * ys[i], early = -lates[i];
+      const float qx = x + early * (hy * z - hz * y + hu), qy = y + early * (hz * x - hx * z + hv);
+      const float qz = z + early * (hx * y - hy * x + hw);
+      const float mx = r00 * qx + r01 * qy + r02 * qz + tx;
+      const float my = r10 * qx + r11 * qy + r12 * qz + ty;
+      const float mz = r20 * qx + r21 * qy + r22 * qz + tz;
+      const float late = late_at(my, mz, per_slope, middle);
+      const float px = mx + late * (gy * mz - gz * my + gu), py = my + late * (gz * mx - gx * mz + gv);
+      const float pz = mz + late * (gx * my - gy * mx + gw);
       const float inverse = 1.0f / std::max(pz, kMinDepth), a = px * inverse, b = py * inverse, r2 = a * a + b * b;
       float u, v;
       distort(a, b, r2, radial_of<rational>(r2, k1, k2, k3, k4, k5, k6), p1, p2, &u, &v);
@@ -181,6 +207,7 @@ void MotionDepthGrid::set_depth(const DepthImage& image, const MotionRays& rays,
 void MotionView::set(const MotionDepthGrid& grid) {
   time = grid.time;
   cam_from_world = grid.cam_from_world;
+  velocity = grid.velocity;
   cells.resize(grid.depth.size());
   for (size_t i = 0; i < cells.size(); ++i)
     cells[i] = {grid.nearest.data()[i], grid.farthest.data()[i], grid.depth.data()[i], grid.score.data()[i]};

@@ -51,6 +51,52 @@ TEST(MotionRays, AgreeWithTheCameraModel) {
   expect_agreement(rational);
 }
 
+// A point that is read in one row of the one image and in another row of the other, each while its camera moves.
+TEST(MotionRays, FollowPointsFromOneReadoutToAnother) {
+  const CameraModel camera = *builtin_camera("fr1");
+  const MotionRays rays(camera, 4);
+  const Rigid3 motion(rotation_from_vector({0.05, -0.1, 0.1}), {0.1, -0.05, -0.2});
+  Vector6d velocity_here, velocity_there;
+  velocity_here << 0.3, -0.2, 0.4, 1.5, -0.8, 0.7;
+  velocity_there << -0.2, 0.3, 0.1, -0.9, 1.2, -0.5;
+  const double readout = 0.03;
+  const Image<float> depth(rays.width(), rays.height(), 1.5f);
+  MotionProjection projection;
+  rays.project(depth, 1.0f, motion, rays.all_cells(), projection, best_simd(), {velocity_here, readout},
+               {velocity_there, readout});
+  int seen = 0, different = 0;
+  for (int y = 0; y < rays.height(); ++y)
+    for (int x = 0; x < rays.width(); ++x) {
+      const size_t i = static_cast<size_t>(y * rays.width() + x);
+      const Eigen::Vector3d at_row = 1.5 * camera.unproject(camera.undistort({4 * x + 1.5, 4 * y + 1.5}), 1.0);
+      const double late_here = readout * ((y + 0.5) / rays.height() - 0.5);
+      const Eigen::Vector3d middle = motion * (rigid3_from_tangent(velocity_here * late_here).inverse() * at_row);
+      // The row that sees it, by iteration.
+      Eigen::Vector3d there = middle;
+      Eigen::Vector2d pixel = camera.distort(camera.project(there));
+      for (int n = 0; n < 20; ++n) {
+        const double late = readout * std::clamp((pixel.y() + 0.5) / camera.height - 0.5, -0.5, 0.5);
+        there = rigid3_from_tangent(velocity_there * late) * middle;
+        pixel = camera.distort(camera.project(there));
+      }
+      int u = -1, v = -1;
+      const bool found = rays.find_cell(
+          (motion.matrix3() * rays.point(x, y, 1.5f, {velocity_here, readout}).cast<double>() + motion.translation)
+              .cast<float>(),
+          &u, &v, {velocity_there, readout});
+      ASSERT_EQ(found, projection.cell[i] >= 0);
+      if (!found) continue;
+      ++seen;
+      ASSERT_LE(std::abs(v * rays.width() + u - projection.cell[i]) % rays.width(), 1);
+      const double right = (pixel.x() + 0.5) / 4 - 0.5 - u, down = (pixel.y() + 0.5) / 4 - 0.5 - v;
+      different += std::max(std::abs(right), std::abs(down)) > 0.65;
+      ASSERT_LT(std::max(std::abs(right), std::abs(down)), 1.25) << x << " " << y;  // rows without the lens
+      EXPECT_NEAR(projection.depth[i], there.z(), 0.004);  // to first order
+    }
+  EXPECT_GT(seen, 10000);
+  EXPECT_LT(different, seen / 50);
+}
+
 TEST(MotionRays, SeeNothingBehindTheCamera) {
   const MotionRays rays(*builtin_camera("fr3"), 4);
   MotionProjection projection;

@@ -144,7 +144,9 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     keep_as_view(*previous_);
     spare_ = std::move(previous_);
   }
+  find_velocity();
   find_pose(step_covariance);
+  find_velocity();
   if (!is_placed(step_covariance)) {
     clear(current_->score, rays_.all_cells());
     clear(still_, rays_.all_cells());
@@ -165,6 +167,14 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   weigh();
   smoothing_.smooth(weighted_, weights_);
   update_scores();
+}
+
+// Of what is before the camera between the frame before and this one.
+void MotionSegmenter::find_velocity() {
+  current_->velocity.setZero();
+  if (!previous_ || !(current_->time > previous_->time)) return;
+  const Rigid3 step = current_->cam_from_world * previous_->cam_from_world.inverse();
+  current_->velocity = tangent_from_rigid3(step) / (current_->time - previous_->time);
 }
 
 // The velocity does not last: what a hand changes it by between slow frames is more than the comparison forgives. The
@@ -221,7 +231,8 @@ void MotionSegmenter::carry_scores(CellRange block) {
     return clear(current_->score, block);
   }
   const Rigid3 before_from_now = previous_->cam_from_world * current_->cam_from_world.inverse();
-  rays_.project(current_->depth, kTooNear, before_from_now, block, projection_, simd_);
+  rays_.project(current_->depth, kTooNear, before_from_now, block, projection_, simd_, readout_of(current_->velocity),
+                readout_of(previous_->velocity));
   const double interval = std::max(0.0, current_->time - previous_->time);
   const auto walked = static_cast<float>(kWalkInDepth * interval);
   const auto keep = static_cast<float>(std::exp(-interval / options_.memory));
@@ -267,7 +278,8 @@ void MotionSegmenter::carry_scores(CellRange block) {
 
 // What one view says of each cell: its surface stands in space that the view saw empty, or it was there already.
 void MotionSegmenter::compare(const ChosenView& chosen, CellRange block) {
-  rays_.project(current_->depth, kTooNear, chosen.there_from_here, block, projection_, simd_);
+  rays_.project(current_->depth, kTooNear, chosen.there_from_here, block, projection_, simd_,
+                readout_of(current_->velocity), readout_of(chosen.view->velocity));
   const std::vector<int32_t>& cells = projection_.cell;
   const std::vector<MotionView::Cell>& view = chosen.view->cells;
   // Views come from far down the memory: some way ahead, they are asked for early.
@@ -304,7 +316,7 @@ void MotionSegmenter::find_vacated() {
   const Image<float>& depth = current_->depth;
   const int width = depth.width(), height = depth.height();
   rays_.project(previous_->depth, kTooNear, current_->cam_from_world * previous_->cam_from_world.inverse(),
-                rays_.all_cells(), projection_, simd_);
+                rays_.all_cells(), projection_, simd_, readout_of(previous_->velocity), readout_of(current_->velocity));
   for (size_t first = 0; first < vacated_.size(); first += kBlockCells) {
     const size_t count = std::min(kBlockCells, vacated_.size() - first);
     const int32_t* const cells = projection_.cell.data() + first;
@@ -428,6 +440,7 @@ void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool g
     return;
   }
   current_->cam_from_world = depth_cam_from_cam(*cam_from_world) * *cam_from_world;
+  find_velocity();
   last_ = Stamped{image_time_, *cam_from_world};
   guessing_ = guessed;
   if (!guessed) told_ = current_->time;

@@ -77,6 +77,8 @@ class MotionSegmenter {
   void move_views(const Rigid3& new_from_old, double after);
   std::optional<double> colour_share() const;
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
+  void find_velocity();
+  ReadoutMotion readout_of(const Vector6d& velocity) const { return {velocity, alignment_.readout()}; }
   void find_pose(const Matrix6d& step_covariance);
   bool is_placed(const Matrix6d& step_covariance) const;
   void choose_views();

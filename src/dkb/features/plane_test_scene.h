@@ -24,13 +24,15 @@ inline CameraModel plane_test_camera() {
   return c;
 }
 
-// What a camera sees of planes, each hiding those behind it, with the sensor's noise.
-inline DepthImage view_of(const std::vector<TestPlane>& planes, const Rigid3& cam_from_world, uint64_t seed,
-                          const CameraModel& c = plane_test_camera()) {
-  const Rigid3 world_from_cam = cam_from_world.inverse();
+// What a camera sees of planes, each hiding those behind it, with the sensor's noise. `cam_from_world(y)` is where it
+// is while row y is read.
+template <class Pose>
+DepthImage view_by_rows(const std::vector<TestPlane>& planes, const Pose& cam_from_world, uint64_t seed,
+                        const CameraModel& c = plane_test_camera()) {
   Random random(seed);
   DepthImage depth(c.width, c.height);
-  for (int y = 0; y < c.height; ++y)
+  for (int y = 0; y < c.height; ++y) {
+    const Rigid3 world_from_cam = Rigid3(cam_from_world(y)).inverse();
     for (int x = 0; x < c.width; ++x) {
       const Eigen::Vector3d ray = world_from_cam.rotation * c.unproject(c.undistort(Eigen::Vector2d(x, y)), 1.0);
       double nearest = 1e9;
@@ -40,7 +42,15 @@ inline DepthImage view_of(const std::vector<TestPlane>& planes, const Rigid3& ca
       }
       depth(x, y) = static_cast<float>(nearest + SensorNoise().flat_depth_sigma(nearest) * random.normal());
     }
+  }
   return depth;
+}
+
+// The same of one that is read at once.
+inline DepthImage view_of(const std::vector<TestPlane>& planes, const Rigid3& cam_from_world, uint64_t seed,
+                          const CameraModel& c = plane_test_camera()) {
+  return view_by_rows(
+      planes, [&](int) { return cam_from_world; }, seed, c);
 }
 
 // Back wall, a wall at an angle on the right, and the floor.

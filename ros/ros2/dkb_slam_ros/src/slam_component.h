@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#if __has_include(<tf2_ros/buffer.hpp>)  // of newer releases, where those below warn
+#include <tf2_ros/buffer.hpp>
+#include <tf2_ros/transform_broadcaster.hpp>
+#include <tf2_ros/transform_listener.hpp>
+#else
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
+#endif
 
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
 #include <dkb_slam_ros/msg/movers.hpp>
