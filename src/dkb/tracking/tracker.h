@@ -108,6 +108,8 @@ class Tracker {
   bool track_from_last(TrackedFrame& frame, const TrackingInput& input);
   bool track_among_suspects(TrackedFrame& frame, const TrackingInput& input);
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
+  // Since the last frame: what any camera may do, and what this one may by its velocity, where that is known.
+  bool possible_motion(const Rigid3& cam_from_world, double timestamp) const;
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame
   std::optional<PosePrediction> predict(const TrackingInput& input) const;

@@ -64,7 +64,7 @@ std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const
   const Vector6d variance = pose.covariance.diagonal();
   const bool known = variance.head<3>().maxCoeff() <= kMaxGuessedPosition * kMaxGuessedPosition &&
                      variance.tail<3>().maxCoeff() <= kMaxGuessedRotation * kMaxGuessedRotation;
-  if (!(bridges || known) || !plausible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
+  if (!(bridges || known) || !possible_motion(pose.cam_from_world, input.timestamp)) return std::nullopt;
   pose.weighs = true;
   pose.told = input.prior != nullptr;
   return pose;

@@ -79,7 +79,10 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
       if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world)) frame.predicted->weighs = false;
     }
   }
-  if (!fit) fit = fit_near(last_->cam_from_world, 3 * usual);
+  if (!fit) {
+    fit = fit_near(last_->cam_from_world, 3 * usual);
+    if (fit && !plausible_motion(fit->cam_from_world, frame.timestamp)) fit.reset();
+  }
   if (!fit && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features, retracted_);
@@ -145,11 +148,18 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
   frame = std::move(by_still);
 }
 
-bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
+bool Tracker::possible_motion(const Rigid3& cam_from_world, double timestamp) const {
   const Rigid3 motion = cam_from_world * last_->cam_from_world.inverse();
   const double seconds = timestamp - last_->timestamp;
   return motion.translation.norm() <= kMaxVelocity * seconds &&
          vector_from_rotation(motion.rotation).norm() <= kMaxAngularVelocity * seconds;
+}
+
+// Somebody before the lens leaves few matches, and some of them may agree on a place where no hand takes a camera.
+bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
+  if (velocity_)
+    if (const auto step = expected_step(timestamp, nullptr)) return pose_after(*step).agrees(cam_from_world);
+  return possible_motion(cam_from_world, timestamp);
 }
 
 }  // namespace dkb
