@@ -433,7 +433,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     // the next frame agrees.
     const bool near = last_ && last_->index + 1 == frame.index && state_ == TrackingState::tracking &&
                       frame.timestamp - last_->timestamp <= kEvenMotion &&
-                      plausible_motion(frame.cam_from_world, frame.timestamp);
+                      possible_motion(frame.cam_from_world, frame.timestamp);
     followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world));
     found_again = followed;
     if (!followed) {

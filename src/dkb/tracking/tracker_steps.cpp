@@ -73,7 +73,7 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
   // fast turn a search around the last place of each point finds just enough wrong ones for a wrong pose.
   if (!fit || 4 * static_cast<size_t>(fit->inliers) < shown.size()) {
     auto other = fit_by_descriptors(shown, features, optics_, kMinMatches, {.seed = seed_});
-    if (other && other->inliers >= kMinMatches && plausible_motion(other->cam_from_world, frame.timestamp) &&
+    if (other && other->inliers >= kMinMatches && possible_motion(other->cam_from_world, frame.timestamp) &&
         (!fit || surface(*other) > surface(*fit))) {
       fit = std::move(other);
       if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world)) frame.predicted->weighs = false;
@@ -155,7 +155,8 @@ bool Tracker::possible_motion(const Rigid3& cam_from_world, double timestamp) co
          vector_from_rotation(motion.rotation).norm() <= kMaxAngularVelocity * seconds;
 }
 
-// Somebody before the lens leaves few matches, and some of them may agree on a place where no hand takes a camera.
+// For what is sought around the last place or from the reference keyframe: somebody before the lens leaves few matches,
+// and some of them may agree on a place where no hand takes a camera.
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
   if (velocity_)
     if (const auto step = expected_step(timestamp, nullptr)) return pose_after(*step).agrees(cam_from_world);

@@ -90,18 +90,6 @@ TEST_F(TrackerTest, IsLostInTheDarkAndRecoversWhenTheViewReturns) {
   EXPECT_LT(distance_between(o.cam_from_world, on_path(13)), 0.015);
 }
 
-// Matches that agree on a place where no hand takes a camera in a thirtieth of a second may be wrong: the next frame
-// has to confirm them, as after a loss.
-TEST_F(TrackerTest, ALeapHasToBeConfirmed) {
-  publish(start(on_path(0), kNoisy));
-  for (int f = 1; f <= 5; ++f) ASSERT_EQ(track(on_path(f), kNoisy).state, TrackingState::tracking);
-  const Rigid3 aside = TestScene::camera_at({0.12, 0.43, 0}, {0, 0.06, 0});
-  EXPECT_EQ(track(aside, kNoisy).state, TrackingState::lost);
-  const TrackedFrame o = track(aside, kNoisy);
-  EXPECT_EQ(o.state, TrackingState::relocalised);
-  EXPECT_LT(distance_between(o.cam_from_world, aside), 0.015);
-}
-
 TEST_F(TrackerTest, AnotherPlaceIsNotMistakenForTheMap) {
   publish(start());
   track(on_path(0));
