@@ -24,7 +24,6 @@ constexpr size_t kEnoughCells = 100;
 constexpr double kSmallStep = 1e-3, kSmallTurn = 0.5e-3;  // [m, rad] a third of what they are off is left after one
 constexpr double kExact = 1e-6;                           // [m, rad] closer than anything is told
 constexpr double kDoubtLeft = 0.25;                       // of the variance, by one iteration
-constexpr double kSlowest = 0.033;                        // [s] readout: sensors are read within a frame at 30 Hz
 
 // What the cells say: each a row [n, p x n] of the Jacobian, its distance, and how that changes with the readout [m/s].
 // Summed in rows of eight floats, which are whole registers.
@@ -139,7 +138,7 @@ DepthAlignment::DepthAlignment(const SensorNoise& noise, double focal, const Mot
       focal_(focal),
       normals_(rays.width(), rays.height(), Eigen::Vector3f::Zero()),
       asked_(rays.width(), rays.height()),
-      readout_information_(3 / (kSlowest * kSlowest)) {}  // each as likely: the mean square of what 0 is off by
+      readout_information_(3 / (kMaxReadout * kMaxReadout)) {}  // each as likely: the mean square of what 0 is off by
 
 // By least squares over 3 x 3 cells, kReach apart.
 Eigen::Vector3f DepthAlignment::find_normal(const MotionDepthGrid& grid, const MotionRays& rays, int x, int y,
@@ -179,7 +178,8 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
   Matrix6d information;
   double doubt = 1;  // share of the expectation's variance that the robust cost still allows for
   for (int iteration = 0; iteration < kIterations; ++iteration, doubt *= kDoubtLeft) {
-    const Vector6d velocity = seconds > 0 ? Vector6d(tangent_from_rigid3(pose.inverse()) / seconds) : here.velocity;
+    Vector6d velocity = Vector6d::Zero();
+    if (seconds > 0) velocity = tangent_from_rigid3(pose.inverse()) / seconds;
     const ReadoutMotion here_readout(velocity, readout_), here_rate(velocity, 1);
     const Eigen::Matrix3f rotation = pose.matrix3().cast<float>();
     const Eigen::Vector3f translation = pose.translation.cast<float>();
@@ -237,7 +237,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
       if (factor && *factor > usual) step = solve(hanging_together = *factor);
       const auto of_readout = sums.of_readout(kTogether * hanging_together, information, step);
       readout_information_ += std::max(0.0, of_readout.information);
-      readout_ = std::clamp(readout_ - of_readout.gradient / readout_information_, 0.0, kSlowest);
+      readout_ = std::clamp(readout_ - of_readout.gradient / readout_information_, 0.0, kMaxReadout);
       if (factor) together_ = together_ ? usual + kFrameShare * (*factor - usual) : *factor;
     }
     pose = rigid3_from_tangent(step) * pose;

@@ -22,7 +22,7 @@ class DepthAlignment {
   // The motion between the two grids' cameras, from `there` to `here`, with its covariance: what was expected and what
   // the surfaces say, each weighed by its own. Cells of `there` whose score says that they move are left out. Nothing
   // when too few surfaces are in both.
-  // The velocity of both is used, as far as readout() goes.
+  // Rows are held against each other by the velocity of `there` and, as that of `here`, by the step itself.
   std::optional<MotionPrior> align(const MotionDepthGrid& here, const MotionDepthGrid& there, const MotionRays& rays,
                                    const MotionPrior& expected);
   // [s] from the first row of a depth image to the last, as far as the images so far tell; 0 before any.

@@ -169,45 +169,22 @@ TEST_F(DepthAlignmentTest, SurfacesThatMovedBeforeAreLeftOut) {
   EXPECT_LT(degrees(error), 0.3);
 }
 
-// A camera that is turned to and fro, and the rows of its depth images, which are read in `readout` seconds.
-struct Turning {
-  Rigid3 cam_from_world(double t) const {
-    return {rotation_from_vector({0.25 * std::sin(5 * t), 0.3 * std::cos(4 * t), 0.1 * std::sin(3 * t)}),
-            {0.05 * std::sin(3 * t), 0.02 * std::cos(5 * t), 0}};
-  }
-  DepthImage view(double t, uint64_t seed) const {
-    const auto of_row = [&](int y) {
-      return cam_from_world(t + readout * ((y + 0.5) / plane_test_camera().height - 0.5));
-    };
-    const std::vector<TestPlane> near{{Eigen::Vector3d(0, 0, 1), 1.5},
-                                      {Eigen::Vector3d(1, 0, 0.4).normalized(), 0.8},
-                                      {Eigen::Vector3d(0, 1, 0), 0.6}};
-    return view_by_rows(near, of_row, seed);
-  }
-  Vector6d velocity(double t) const {  // over the interval before, as a camera in use knows it
-    return tangent_from_rigid3(cam_from_world(t) * cam_from_world(t - kInterval).inverse()) / kInterval;
-  }
-
-  static constexpr double kInterval = 1 / 30.0;  // [s]
-  double readout;
-};
-
 TEST_F(DepthAlignmentTest, TheReadoutOfARollingShutterIsLearnt) {
   for (const double readout : {0.0, 0.015, 0.03}) {
-    const Turning turning{readout};
+    const TurningCamera turning{readout};
     DepthAlignment alignment(SensorNoise(), plane_test_camera().fx, rays_);
     EXPECT_EQ(alignment.readout(), 0);
     double squares = 0;
     int frames = 0;
     MotionDepthGrid there;
     for (int n = 0; n < 90; ++n) {
-      const double t = n * Turning::kInterval;
+      const double t = n * TurningCamera::kInterval;
       MotionDepthGrid here = grid_of(turning.view(t, 100 + static_cast<uint64_t>(n)), rays_);
       here.time = t;
       here.velocity = turning.velocity(t);
       if (n > 0) {
         const Rigid3 true_step = turning.cam_from_world(there.time) * turning.cam_from_world(t).inverse();
-        const Rigid3 expected = rigid3_from_tangent(turning.velocity(there.time) * Turning::kInterval).inverse();
+        const Rigid3 expected = rigid3_from_tangent(turning.velocity(there.time) * TurningCamera::kInterval).inverse();
         const auto found =
             alignment.align(here, there, rays_, {expected, false, axis_covariance(kPositionSd, kRotationSd)});
         ASSERT_TRUE(found) << n;

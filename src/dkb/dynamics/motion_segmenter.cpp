@@ -144,7 +144,6 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
     keep_as_view(*previous_);
     spare_ = std::move(previous_);
   }
-  find_velocity();
   find_pose(step_covariance);
   find_velocity();
   if (!is_placed(step_covariance)) {

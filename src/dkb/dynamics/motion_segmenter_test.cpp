@@ -41,12 +41,11 @@ class World {
     camera.cy = 119.5;
   }
 
-  Rigid3 cam_from_world(double frame) const {
+  Rigid3 cam_from_world(int frame) const {
     if (turn != 0) return Rigid3(rotation_from_vector({0, turn * frame, 0}), Eigen::Vector3d::Zero()).inverse();
     const double t = still_camera ? 0.0 : frame / rate;
-    const Rigid3 world_from_cam(
-        rotation_from_vector(sway * Eigen::Vector3d(0.03 * std::sin(2.0 * t), 0.05 * std::sin(1.5 * t), 0)),
-        {0.15 * std::sin(1.2 * t), 0.05 * std::sin(1.7 * t), 0.1 * std::sin(0.8 * t)});
+    const Rigid3 world_from_cam(rotation_from_vector({0.03 * std::sin(2.0 * t), 0.05 * std::sin(1.5 * t), 0}),
+                                {0.15 * std::sin(1.2 * t), 0.05 * std::sin(1.7 * t), 0.1 * std::sin(0.8 * t)});
     return world_from_cam.inverse();
   }
 
@@ -58,9 +57,9 @@ class World {
     p.image.grey = GreyImage(kWidth, kHeight);
     p.image.depth = DepthImage(kWidth, kHeight);
     p.truth = GreyImage(kWidth, kHeight);
+    const Rigid3 world_from_cam = cam_from_world(frame).inverse();
     Random random(static_cast<uint64_t>(frame) + 17);
-    for (int y = 0; y < kHeight; ++y) {
-      const Rigid3 world_from_cam = cam_from_world(frame + rate * readout * ((y + 0.5) / kHeight - 0.5)).inverse();
+    for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) {
         const Eigen::Vector3d ray = world_from_cam.rotation * camera.unproject(Eigen::Vector2d(x, y), 1.0);
         double nearest = 99;
@@ -76,17 +75,14 @@ class World {
         const double sigma = 0.0012 + 0.0019 * (nearest - 0.4) * (nearest - 0.4);
         if (random.uniform() >= holes) p.image.depth(x, y) = static_cast<float>(nearest + sigma * random.normal());
       }
-    }
     return p;
   }
 
   CameraModel camera;
   bool still_camera = false;
-  double turn = 0;     // [rad] to the right from frame to frame, in the place of the swaying
-  double rate = 30;    // [Hz]
-  double holes = 0;    // share of the pixels without depth
-  double sway = 1;     // of the usual swaying's turns
-  double readout = 0;  // [s] from the first row to the last
+  double turn = 0;   // [rad] to the right from frame to frame, in the place of the swaying
+  double rate = 30;  // [Hz]
+  double holes = 0;  // share of the pixels without depth
 };
 
 Panel box_at(double x, double z = 1.6) {
@@ -167,23 +163,6 @@ TEST(MotionSegmenter, LeavesAStillWorldUnmarked) {
   run(
       World(), 60, [](int) { return std::vector<Panel>{}; },
       [](int f, const MoverMask&, const Figures& figures) { EXPECT_LT(figures.wrong, 0.01) << f; });
-}
-
-// A Kinect reads the rows of its depth image one after the other: in a fast turn outlines are sheared, in each view
-// otherwise.
-TEST(MotionSegmenter, RowsThatAreReadLateAreNoMovers) {
-  World world;
-  world.sway = 12;
-  const std::vector<Panel> things{
-      {-0.9, -0.5, -0.3, -0.2, 1.4}, {0.2, 0.1, 0.8, 0.4, 1.4}, {-0.5, 0.3, -0.1, 0.6, 1.2}};
-  for (const double readout : {0.0, 0.03}) {
-    world.readout = readout;
-    double wrong = 0;
-    run(
-        world, 120, [&](int) { return things; },
-        [&](int f, const MoverMask&, const Figures& figures) { wrong += f < 60 ? 0 : figures.wrong / 60; });
-    EXPECT_LT(wrong, 0.004) << readout;
-  }
 }
 
 TEST(MotionSegmenter, FindsABoxThatComesInAndNothingElse) {

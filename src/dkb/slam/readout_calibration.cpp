@@ -10,12 +10,11 @@ namespace {
 constexpr int kMinMatches = 30;
 // Errors of one point in one frame and in the next go together; MotionNoise has the same figure for poses.
 constexpr double kTogether = 4;
-constexpr double kSlowest = 0.033;  // [s] readout: most sensors are read within a frame's time at 30 Hz, at any rate
 
 // [s] largest readout believed in: no sensor takes longer than a frame. Before anything is seen of it each below is as
 // likely.
 double max_readout(const Camera& camera) {
-  return camera.fps > 0 ? std::min(kSlowest, 1 / camera.fps) : kSlowest;
+  return camera.fps > 0 ? std::min(kMaxReadout, 1 / camera.fps) : kMaxReadout;
 }
 }  // namespace
 
