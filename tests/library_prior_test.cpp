@@ -313,6 +313,20 @@ TEST_F(LibraryPriors, ASuggestionMovesTheMapAndNotOdometry) {
   EXPECT_NEAR(after.odom_from_cam->translation.x(), before.odom_from_cam->translation.x(), 0.02);
 }
 
+TEST_F(LibraryPriors, ASuggestionWaitsForTheMapThatIsBeingMade) {
+  Options options;
+  options.realtime = true;
+  options.set("pipeline.mapper_latency", "0.02");  // what the first frames show is to be in the map by the third
+  for (int run = 0; run < 5; ++run) {              // mapping may be quick by chance
+    Slam slam(world.camera(), options, Detectors::none());
+    for (int i = 0; i < 2; ++i) slam.process(world.frame(i, {.shift = i}));
+    Rigid3 here;
+    here.translation.x() = world.camera_x(1);
+    slam.suggest_pose(here, Matrix6d::Identity() * 0.01);
+    EXPECT_EQ(slam.process(world.frame(2, {.shift = 2})).state, TrackingState::relocalised);
+  }
+}
+
 TEST_F(LibraryPriors, ASuggestionThatIsNoPoseIsRefused) {
   Slam slam(world.camera(), Options(), Detectors::none());
   Rigid3 nowhere;

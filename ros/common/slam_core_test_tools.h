@@ -76,6 +76,13 @@ class Recorder final : public Middleware {
     std::unique_lock lock(mutex);
     return changed.wait_for(lock, 100s, condition);
   }
+  // For a test that failed: what people would have read.
+  std::string told() {
+    const std::lock_guard lock(mutex);
+    std::string text = "state " + last_value("state");
+    for (const std::string& line : logged) text += "; " + line;
+    return text;
+  }
   std::string last_value(const std::string& key) const {
     if (diagnostics.empty()) return "";
     for (const auto& [name, value] : diagnostics.back().values)
@@ -188,7 +195,7 @@ class SlamCoreTest : public testing::Test {
     for (size_t i = from; i < from + count; ++i) {
       const size_t before = out.odometry.size();
       feed(core, i);
-      ASSERT_TRUE(out.wait([&] { return out.odometry.size() > before; })) << "frame " << i;
+      ASSERT_TRUE(out.wait([&] { return out.odometry.size() > before; })) << "frame " << i << ": " << out.told();
     }
   }
   // As it is logged; 0 where it is not.

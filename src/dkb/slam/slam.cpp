@@ -194,7 +194,10 @@ void Slam::suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance
   if (!covariance.allFinite() || !is_symmetric(covariance) || !(spectrum(covariance).values[0] > 0))
     throw InputError("suggested pose: its covariance is not symmetric and positive definite; give variances above 0");
   const Impl::Turn turn(*impl_);
-  if (impl_->pipeline) impl_->pipeline->suggest_pose({world_from_cam.inverse(), covariance});
+  if (!impl_->pipeline) return;
+  // The place is sought in the map, which a real-time run may be about to be given.
+  if (!impl_->failure) impl_->guarded([&] { impl_->pipeline->catch_up(); });
+  impl_->pipeline->suggest_pose({world_from_cam.inverse(), covariance});
 }
 void Slam::explain_keyframes(bool on) {
   const Impl::Turn turn(*impl_);
