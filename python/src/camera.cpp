@@ -34,6 +34,7 @@ constexpr Field kFields[] = {
     {"k6", &Camera::k6, nullptr, false},
     {"fps", &Camera::fps, nullptr, false},
     {"readout", &Camera::readout, nullptr, false},
+    {"depth_time_offset", &Camera::depth_time_offset, nullptr, false},
     {"depth_min", &Camera::depth_min, nullptr, false},
     {"depth_max", &Camera::depth_max, nullptr, false},
 };
@@ -83,7 +84,8 @@ void check_same_view(const Camera& of_frame, const Camera& wanted) {
   std::string of, here;
   for (const Field& field : kFields) {
     const std::string name = field.name;
-    if (name == "depth_factor" || name == "depth_min" || name == "depth_max" || name == "fps" || name == "readout")
+    if (name == "depth_factor" || name == "depth_min" || name == "depth_max" || name == "fps" || name == "readout" ||
+        name == "depth_time_offset")
       continue;  // its depth is in metres already
     const auto value = [&field](const Camera& c) { return field.real != nullptr ? c.*field.real : c.*field.whole; };
     if (value(of_frame) == value(wanted)) continue;
@@ -105,7 +107,8 @@ Axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). De
 
 width, height: [px]; fx, fy, cx, cy: [px]; depth_factor: [units per metre] of integer depth images.
 Optional: k1, k2, p1, p2, k3, k4, k5, k6 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
-readout [s] of a rolling shutter (0 = unknown or none), depth_min, depth_max [m] (depth outside is taken for missing).
+readout [s] of a rolling shutter (0 = unknown or none), depth_time_offset [s] (added to a depth image's stamp: when the
+colour camera saw the same), depth_min, depth_max [m] (depth outside is taken for missing).
 
 Raises InputError naming the field that is missing, unknown or out of range.)");
   camera

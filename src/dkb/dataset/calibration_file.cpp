@@ -29,6 +29,7 @@ const std::vector<std::string> kKeys{"image_width",
                                      "depth_factor",
                                      "fps",
                                      "readout",
+                                     "depth_time_offset",
                                      "depth_min",
                                      "depth_max"};
 const std::vector<std::string> kKeysOfOurs{"width", "height", "fx", "fy", "cx", "cy", "k1",
@@ -110,9 +111,10 @@ Calibration parse_calibration(const std::string& text, const std::string& name) 
   file.read("image_height", &camera.height, kSides);
   read.depth_assumed = !file.has("depth_factor");
   camera.depth_factor = kMillimetres;
-  for (const auto& [key, field] : {std::pair{"depth_factor", &camera.depth_factor}, std::pair{"fps", &camera.fps},
-                                   std::pair{"readout", &camera.readout}, std::pair{"depth_min", &camera.depth_min},
-                                   std::pair{"depth_max", &camera.depth_max}})
+  for (const auto& [key, field] :
+       {std::pair{"depth_factor", &camera.depth_factor}, std::pair{"fps", &camera.fps},
+        std::pair{"readout", &camera.readout}, std::pair{"depth_time_offset", &camera.depth_time_offset},
+        std::pair{"depth_min", &camera.depth_min}, std::pair{"depth_max", &camera.depth_max}})
     file.read(key, field);
   try {
     read_lens(file, camera);

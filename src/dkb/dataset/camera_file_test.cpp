@@ -35,6 +35,16 @@ TEST(CameraFile, ReadsRequiredAndOptionalKeys) {
   EXPECT_EQ(c.k2, 0);
   EXPECT_EQ(c.fps, 15);
   EXPECT_EQ(c.depth_max, 4);
+  EXPECT_EQ(c.depth_time_offset, 0);
+}
+
+TEST(CameraFile, DepthMayShowWhatWasBeforeItsStamp) {
+  EXPECT_EQ(parse_camera(kCamera + "depth_time_offset: -0.018\n", "camera.yaml").depth_time_offset, -0.018);
+  EXPECT_EQ(parse_camera(parse_camera(kCamera + "depth_time_offset: 0.01\n", "c").to_yaml(), "c").depth_time_offset,
+            0.01);
+  EXPECT_NE(parse_message(kCamera + "depth_time_offset: -18\n").find("depth_time_offset"), std::string::npos);
+  EXPECT_EQ(builtin_camera("fr1")->depth_time_offset, -0.018);
+  EXPECT_EQ(builtin_camera("bonn")->depth_time_offset, 0);
 }
 
 // As camera_calibration of ROS writes it.

@@ -58,7 +58,7 @@ DenseMap DenseMapper::build(std::span<const TimedPose> trajectory, uint64_t seed
       mounted ? Eigen::Vector3d(mount.conjugate() * Eigen::Vector3d::UnitZ()) : Eigen::Vector3d(0, -1, 0);
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   for (const auto& view : views_)
-    if (const auto world_from_cam = pose_at(trajectory, view->depth_timestamp)) {
+    if (const auto world_from_cam = pose_at(trajectory, view->depth_time)) {
       placed.push_back({view.get(), world_from_cam->inverse()});
       up += world_from_cam->rotation * up_in_cam;
     }

@@ -20,7 +20,7 @@ struct DepthView {
   static constexpr float kUnitsPerMetre = 4000;
 
   FrameIndex frame = 0;
-  double depth_timestamp = 0;  // [s]
+  double depth_time = 0;  // [s]
   Image<uint16_t> depth;       // [1 / kUnitsPerMetre m] along the optical axis; 0 = none, unsure, or a mover
   ColourImage colour;          // same size
 

@@ -124,7 +124,7 @@ class BlockFuser {
     const auto cx = static_cast<float>(camera_.cx + 0.5), cy = static_cast<float>(camera_.cy + 0.5);
     const auto truncation = static_cast<float>(options_.truncation), max_depth = static_cast<float>(options_.max_depth);
     const auto width = static_cast<float>(camera_.width), height = static_cast<float>(camera_.height);
-    const auto time = static_cast<float>(view.depth_timestamp - views_.front().view->depth_timestamp);
+    const auto time = static_cast<float>(view.depth_time - views_.front().view->depth_time);
     Sums* sums = sums_.data();
     for (int k = 0; k < VoxelBlock::kSide; ++k)
       for (int j = 0; j < VoxelBlock::kSide; ++j) {

@@ -111,21 +111,17 @@ void MotionSegmenter::move_views(const Rigid3& new_from_old, double after) {
   if (last_) last_->cam_from_world = last_->cam_from_world * old_from_new;
 }
 
-// Depth is taken up to 16 ms before or after colour, and a hand-held camera turns by half a degree in that time. The
-// interval since the colour image last committed, as a share of that to this depth image, while motion is even.
-std::optional<double> MotionSegmenter::colour_share() const {
-  if (!last_) return std::nullopt;
-  const double interval = image_time_ - last_->time, to_depth = current_->time - last_->time;
-  if (!(interval > 0) || interval > kEvenMotion || to_depth < interval / 4 || to_depth > 2 * interval)
-    return std::nullopt;
-  return interval / to_depth;
+// Depth is taken at another time than colour, and a hand-held camera turns by a degree until then. The depth camera in
+// the colour camera, while the motion that made `step` in so many seconds goes on.
+Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& step, double seconds) const {
+  const double later = current_->time - image_time_;
+  if (!(seconds > 0) || seconds > kEvenMotion || std::abs(later) > kEvenMotion) return {};
+  return rigid3_from_tangent(later / seconds * tangent_from_rigid3(step));
 }
 
 Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
-  const auto share = colour_share();
-  if (!share) return {};
-  const Rigid3 step = cam_from_world * last_->cam_from_world.inverse();
-  return rigid3_from_tangent((1 / *share - 1) * tangent_from_rigid3(step));
+  if (!last_) return {};
+  return depth_cam_from_cam(cam_from_world * last_->cam_from_world.inverse(), image_time_ - last_->time);
 }
 
 void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
@@ -137,7 +133,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   if (!current_) current_ = take_spare(spare_);
   image_time_ = image.timestamp;
   current_->set_depth(image.depth, rays_, simd_);
-  current_->time = image.depth_timestamp;
+  current_->time = image.depth_time(camera_);
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   if (previous_ && current_->time - previous_->time > kLongAgo) {
@@ -185,11 +181,17 @@ void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
       alignment_.align(*current_, *previous_, rays_,
                        {previous_->cam_from_world * current_->cam_from_world.inverse(), false, step_covariance});
   if (!aligned_step_) return;
-  current_->cam_from_world = aligned_step_->previous_from_current.inverse() * previous_->cam_from_world;
-  const Rigid3 to_depth = current_->cam_from_world * last_->cam_from_world.inverse();
-  if (const auto share = colour_share())
-    depth_from_colour_ = to_depth * rigid3_from_tangent(*share * tangent_from_rigid3(to_depth)).inverse();
-  aligned_step_->previous_from_current = to_depth.inverse() * depth_from_colour_;
+  const Rigid3 step = aligned_step_->previous_from_current.inverse();
+  const double seconds = current_->time - previous_->time;
+  // Nothing told how the camera moved when the first image was taken: as it went on.
+  if (previous_->velocity.isZero(0) && seconds <= kEvenMotion)
+    previous_->cam_from_world =
+        rigid3_from_tangent((previous_->time - last_->time) / seconds * tangent_from_rigid3(step)) *
+        last_->cam_from_world;
+  current_->cam_from_world = step * previous_->cam_from_world;
+  depth_from_colour_ = depth_cam_from_cam(step, seconds);
+  aligned_step_->previous_from_current =
+      last_->cam_from_world * current_->cam_from_world.inverse() * depth_from_colour_;
 }
 
 // Whether the camera is known to be where it sees what views of before saw, to a cell of them: by its surfaces, or by

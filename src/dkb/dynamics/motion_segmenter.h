@@ -75,7 +75,7 @@ class MotionSegmenter {
   };
 
   void move_views(const Rigid3& new_from_old, double after);
-  std::optional<double> colour_share() const;
+  Rigid3 depth_cam_from_cam(const Rigid3& step, double seconds) const;
   Rigid3 depth_cam_from_cam(const Rigid3& cam_from_world) const;
   void find_velocity();
   ReadoutMotion readout_of(const Vector6d& velocity) const { return {velocity, alignment_.readout()}; }

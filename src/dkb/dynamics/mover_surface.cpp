@@ -6,7 +6,7 @@
 namespace dkb {
 namespace {
 
-constexpr int kMinThere = 6;           // points that show that somebody stands
+constexpr int kMinThere = 6;           // points that show that somebody stands, or has left
 constexpr double kNearestPoint = 0.1;  // [m]
 constexpr double kSway = 0.05;         // [m] that who stands still moves by
 
@@ -21,10 +21,10 @@ bool pixel_of(const CameraModel& camera, const Eigen::Vector3d& p, Eigen::Vector
 
 }  // namespace
 
-bool MoverSurface::stands(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
-                          const Rigid3& world_from_cam) const {
+MoverSurface::Points MoverSurface::compare(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                                           const Rigid3& world_from_cam) const {
   const Rigid3 cam_from_world = world_from_cam.inverse();
-  int there = 0, gone = 0;
+  Points points;
   Eigen::Vector2i at;
   for (const Eigen::Vector3d& point : points_in_world) {
     const Eigen::Vector3d p = cam_from_world * point;
@@ -32,10 +32,29 @@ bool MoverSurface::stands(const DepthImage& depth, const CameraModel& camera, co
     const auto measured = static_cast<double>(depth(at.x(), at.y()));
     if (!(measured > 0)) continue;
     const double tolerance = kSway + noise.surface_tolerance(p.z());
-    there += std::abs(measured - p.z()) <= tolerance;
-    gone += measured > p.z() + tolerance;
+    points.there += std::abs(measured - p.z()) <= tolerance;
+    points.beyond += measured > p.z() + tolerance;
+    points.nearer += measured < p.z() - tolerance;
   }
-  return there >= kMinThere && there >= gone;
+  return points;
+}
+
+bool MoverSurface::stands(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                          const Rigid3& world_from_cam) const {
+  const Points p = compare(depth, camera, noise, world_from_cam);
+  return p.there >= kMinThere && p.there >= p.beyond;
+}
+
+bool MoverSurface::has_left(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                            const Rigid3& world_from_cam) const {
+  const Points p = compare(depth, camera, noise, world_from_cam);
+  const int elsewhere = p.beyond + p.nearer;
+  return p.there + elsewhere >= kMinThere && p.there < elsewhere;
+}
+
+void MoverSurface::move(const Rigid3& new_from_old) {
+  position_in_world = new_from_old * position_in_world;
+  for (Eigen::Vector3d& p : points_in_world) p = new_from_old * p;
 }
 
 Box MoverSurface::box_in(const CameraModel& camera, const Rigid3& world_from_cam) const {

@@ -24,8 +24,21 @@ struct MoverSurface {
   // Whether a depth image shows the surface where it was: half and more of what nothing hides, and enough of it.
   bool stands(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
               const Rigid3& world_from_cam) const;
+  // Whether it shows enough of that place, and less than half of the surface there: who hides the place by coming
+  // nearer has left it as well.
+  bool has_left(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                const Rigid3& world_from_cam) const;
+  // To where the same points are in another world.
+  void move(const Rigid3& new_from_old);
   // Bounds [px] of its points in an image.
   Box box_in(const CameraModel& camera, const Rigid3& world_from_cam) const;
+
+ private:
+  struct Points {
+    int there = 0, beyond = 0, nearer = 0;  // what the sensor tells at their pixels, compared with them
+  };
+  Points compare(const DepthImage& depth, const CameraModel& camera, const SensorNoise& noise,
+                 const Rigid3& world_from_cam) const;
 };
 
 }  // namespace dkb

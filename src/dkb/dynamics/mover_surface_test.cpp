@@ -43,6 +43,18 @@ TEST(MoverSurface, StandsForACameraThatMoves) {
   EXPECT_TRUE(person().stands(scene.depth, scene.camera, {}, {Eigen::Quaterniond::Identity(), {0.5, 0, 0}}));
 }
 
+// Who has come nearer has left the place behind him as well.
+TEST(MoverSurface, HasLeftAPlaceThatShowsSomethingElse) {
+  const auto has_left = [](const MoverTestScene& scene, const Rigid3& world_from_cam = {}) {
+    return person().has_left(scene.depth, scene.camera, {}, world_from_cam);
+  };
+  EXPECT_TRUE(has_left(MoverTestScene()));
+  EXPECT_TRUE(has_left(scene_with(1)));
+  EXPECT_FALSE(has_left(scene_with(2)));
+  EXPECT_FALSE(has_left(MoverTestScene(0.0f))) << "no depth tells nothing";
+  EXPECT_FALSE(has_left(MoverTestScene(), {Eigen::Quaterniond::Identity(), {0, 0, 3}})) << "nor does a camera beyond";
+}
+
 TEST(MoverSurface, BehindTheCameraNothingStands) {
   const MoverTestScene scene = scene_with(2);
   EXPECT_FALSE(person().stands(scene.depth, scene.camera, {}, {Eigen::Quaterniond::Identity(), {0, 0, 3}}));

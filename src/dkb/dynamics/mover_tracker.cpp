@@ -28,7 +28,7 @@ constexpr double kClassPenalty = 9.0;       // added to the squared distance whe
 constexpr double kBoxWeight = 2.0;          // times 1 - intersection over union with its last box: added too
 constexpr double kBoxMemory = 0.3;          // [s] which counts less and less until so long ago
 
-constexpr double kHasMoved = 0.5;      // [m] from where it was found: it is a mover, and no fault of the mask
+constexpr double kHasMoved = 0.5;      // [m] from where it was: it is asked whether it has left that place
 constexpr double kBefore = 0.3;        // [m] what is so much nearer than a mover is not part of it
 constexpr double kClaims = 0.1;        // [s] unseen for longer, a mover has no claim to surfaces where it is expected
 constexpr double kMemory = 1.2;        // [s] a mover unseen for longer, and hidden by nothing, is forgotten
@@ -65,7 +65,7 @@ void MoverSighting::move_to(const Rigid3& world_from_cam_found) {
   world_from_cam = world_from_cam_found;
   for (MoverObservation& o : observations) {
     o.position_in_world = found_from_expected * o.position_in_world;
-    for (Eigen::Vector3d& p : o.surface.points_in_world) p = found_from_expected * p;
+    o.surface.move(found_from_expected);
   }
 }
 
@@ -222,7 +222,8 @@ std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage
     t.seen = time_;
     t.box = o.box;
     t.observations = 1;
-    t.first = o.position_in_world;
+    t.before = o.surface;
+    t.before.position_in_world = o.position_in_world;
     tracks_.push_back(std::move(t));
   }
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
@@ -253,7 +254,12 @@ void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, 
     t->surface = {};
     return;
   }
-  t->moved |= t->id > 0 && (o.position_in_world - t->first).norm() > kHasMoved;
+  // Where faults of the mask follow upon each other, their place changes, but what was seen there still stands there.
+  if (!t->moved && t->id > 0 && (o.position_in_world - t->before.position_in_world).norm() > kHasMoved) {
+    t->moved = t->before.has_left(depth, camera_, noise_, world_from_cam_);
+    t->before = o.surface;
+    t->before.position_in_world = o.position_in_world;
+  }
   // The mask leaves who stands still piece by piece.
   if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
   t->surface = o.surface;
@@ -264,9 +270,8 @@ void MoverTracker::rebase(const Rigid3& new_from_old) {
   Covariance rotation = Covariance::Zero();
   rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = new_from_old.matrix3();
   for (Track& t : tracks_) {
-    t.first = new_from_old * t.first;
-    t.surface.position_in_world = new_from_old * t.surface.position_in_world;
-    for (Eigen::Vector3d& p : t.surface.points_in_world) p = new_from_old * p;
+    t.before.move(new_from_old);
+    t.surface.move(new_from_old);
     t.state.head<3>() = new_from_old * t.state.head<3>();
     t.state.tail<3>() = new_from_old.rotation * t.state.tail<3>();
     t.covariance = rotation * t.covariance * rotation.transpose();

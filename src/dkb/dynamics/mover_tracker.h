@@ -55,7 +55,7 @@ class MoverTracker {
     double seen = 0;                 // [s]
     double missed = 0;               // [s] unseen since, though nothing hid it
     bool hidden = false;             // in the frame before
-    Eigen::Vector3d first{0, 0, 0};  // [m] where it was found
+    MoverSurface before;             // as it was seen when it was found, or half a metre ago
     bool moved = false;              // away from there
     Eigen::Vector3d size{0, 0, 0};   // [m] as last seen
     double position_sd = 0;          // [m] the same

@@ -182,6 +182,25 @@ TEST(MoverTracker, WhoStopsIsFollowedThoughNothingMovesUntilHeIsSeenThrough) {
   EXPECT_TRUE(stop_after(0.1, false).empty());  // has never gone anywhere: a fault of the mask, maybe
 }
 
+// Two things that always stood there: the mask is wrong about one after the other.
+TEST(MoverTracker, FaultsOfTheMaskThatFollowUponEachOtherAreNobodyWhoHasMoved) {
+  MoverTracker tracker(MoverTestScene().camera, {});
+  std::vector<Mover> movers;
+  int told = 0;
+  for (int i = 0; i < 60; ++i) {
+    MoverTestScene scene;
+    add_person(-0.35, 2.5, &scene, false);
+    add_person(0.35, 2.5, &scene, false);
+    for (int y = 0; y < 60; ++y)
+      for (int x = 0; x < 80; ++x)
+        if ((x < 40) != (i < 15) || i >= 30) scene.mask.cells(x, y) = 0;
+    movers = show(&tracker, i * kStep, scene);
+    told += static_cast<int>(movers.size());
+  }
+  EXPECT_GT(told, 0) << "as long as the mask says so";
+  EXPECT_TRUE(movers.empty());
+}
+
 TEST(MoverTracker, ABoxWithoutDepthGoesOnWithWhomItIsLeftOf) {
   MoverTracker tracker(MoverTestScene().camera, {});
   for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));

@@ -175,7 +175,7 @@ RgbdFeatures make_rgbd_features(std::vector<Descriptor> descriptors, std::vector
   const CornerDepths depths(image.depth, camera, noise);
   result.descriptors = std::move(descriptors);
   result.keypoints = std::move(as_seen);
-  const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_timestamp));
+  const Rigid3 colour_cam_from_depth_cam = rigid3_from_tangent(velocity * (image.timestamp - image.depth_time(camera)));
   const Eigen::Matrix3d rotation = colour_cam_from_depth_cam.matrix3();
   const Eigen::Matrix3d back = rotation.transpose();
   const bool moved =

@@ -197,6 +197,12 @@ TEST(RgbdFeatures, DepthsAreCarriedToTheColourImagesTime) {
   for (int i = 0; i < 200; ++i)
     pixels.push_back({static_cast<float>(30 + random.below(580)), static_cast<float>(30 + random.below(420))});
   const RgbdFeatures corrected = make(corners_at(pixels), image, camera, velocity);
+  // Or its stamp says later, by what the camera's file tells.
+  CameraModel late = camera;
+  late.depth_time_offset = -0.025;
+  RgbdImage stamped = image;
+  stamped.depth_timestamp = image.timestamp + 0.015;
+  const RgbdFeatures by_offset = make(corners_at(pixels), stamped, late, velocity);
   DepthOptions off;
   off.model_time_offset = false;
   const RgbdFeatures plain = make(corners_at(pixels), image, camera, velocity, off);
@@ -205,6 +211,7 @@ TEST(RgbdFeatures, DepthsAreCarriedToTheColourImagesTime) {
     const float z = truth(static_cast<int>(pixels[i].x()), static_cast<int>(pixels[i].y()));
     ASSERT_GT(corrected.keypoints[i].depth, 0);
     error = std::max(error, static_cast<double>(std::abs(corrected.keypoints[i].depth - z)));
+    EXPECT_NEAR(by_offset.keypoints[i].depth, corrected.keypoints[i].depth, 1e-5);
     error_off += std::abs(plain.keypoints[i].depth - z) / static_cast<double>(pixels.size());
   }
   EXPECT_LT(error, 0.002);      // what rounding to whole pixels costs on the slanted wall

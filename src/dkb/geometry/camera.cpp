@@ -14,6 +14,10 @@ namespace {
 // [s] Colour camera of the first Kinect and its kin. Learnt from TUM fr1_xyz and fr1_rpy it is 19 to 25 ms
 // (ReadoutCalibration); Ringaby and Forssen (ICCV 2011) measured 26 ms with a rig.
 constexpr double kKinectReadout = 0.0235;
+// [s] Its depth images, as TUM's recordings stamp them, show what the colour camera saw so long before: where surfaces
+// seen at different times agree best, by our poses, in freiburg1_xyz, freiburg1_rpy and freiburg3_walking_halfsphere
+// (docs/decisions.md).
+constexpr double kKinectDepthOffset = -0.018;
 
 }  // namespace
 
@@ -160,6 +164,8 @@ void CameraModel::check() const {
                  "greater than 0 units per metre");
   require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
   require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
+  require_option(std::isfinite(depth_time_offset) && std::abs(depth_time_offset) <= 0.1, "depth_time_offset",
+                 depth_time_offset, "-0.1 ... 0.1 s");
   require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");
   require_option(std::isfinite(depth_max) && depth_max > depth_min, "depth_max", depth_max, "greater than depth_min");
 }
@@ -194,10 +200,12 @@ std::optional<CameraModel> builtin_camera(const std::string& name) {
   c.fps = 30;
   if (name == "fr1") {
     c.readout = kKinectReadout;
+    c.depth_time_offset = kKinectDepthOffset;
     c.fx = 517.3, c.fy = 516.5, c.cx = 318.6, c.cy = 255.3;
     c.k1 = 0.2624, c.k2 = -0.9531, c.p1 = -0.0054, c.p2 = 0.0026, c.k3 = 1.1633;
   } else if (name == "fr2") {
     c.readout = kKinectReadout;
+    c.depth_time_offset = kKinectDepthOffset;
     c.fx = 520.9, c.fy = 521.0, c.cx = 325.1, c.cy = 249.7;
     c.k1 = 0.2312, c.k2 = -0.7849, c.p1 = -0.0033, c.p2 = -0.0001, c.k3 = 0.9172;
   } else if (name == "fr3") {

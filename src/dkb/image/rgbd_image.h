@@ -13,10 +13,13 @@ namespace dkb {
 // Cheap to move, expensive to copy; passed as shared_ptr<const RgbdImage> between threads.
 struct RgbdImage {
   double timestamp = 0;        // [s] of the colour image, middle of the exposure
-  double depth_timestamp = 0;  // [s] of the depth image
+  double depth_timestamp = 0;  // [s] of the depth image, as it is stamped
   GreyImage grey;              // always there
   ColourImage colour;          // empty for grey cameras
   DepthImage depth;            // [m], 0 = no data; same size as grey
+
+  // [s] When the colour camera saw what the depth image shows.
+  double depth_time(const Camera& camera) const { return depth_timestamp + camera.depth_time_offset; }
 };
 
 // What a detector is shown of a frame, which must outlive it.
