@@ -116,8 +116,8 @@ class DKB_SLAM_API Slam {
   /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new
   /// map begins, at that place. The pose is in the world of the map, the covariance a right perturbation,
   /// [translation m, rotation rad], camera axes. It takes the place of what tracking knows: while the camera is tracked
-  /// well, that pose is given up, and the frames are lost until one is found. A real-time run waits for the mapping that is
-  /// due by now.
+  /// well, that pose is given up, and the frames are lost until one is found. A real-time run waits for the mapping
+  /// that is due by now.
   /// Throws InputError when a number is not finite or the covariance is not symmetric and positive.
   void suggest_pose(const Rigid3& world_from_cam, const Matrix6d& covariance);
   /// Every frame's result then says which of the keyframe tests said what, with their numbers.
