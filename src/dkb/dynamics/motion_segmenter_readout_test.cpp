@@ -32,60 +32,45 @@ DepthImage view_with_boards(const TurningCamera& turning, double t, uint64_t see
   return depth;
 }
 
+// The share of cells that move after three seconds, though nothing does. `gap` [s] between the stamps
+// of depth and colour, `age` [s] of the depth image at its stamp.
+double moving_share(const CameraModel& camera, const TurningCamera& turning, double gap = 0, double age = 0) {
+  MotionSegmenter segmenter(camera, SensorNoise());
+  double share = 0;
+  int frames = 0;
+  for (int n = 0; n < 150; ++n) {
+    const double t = n * TurningCamera::kInterval;
+    RgbdImage image;
+    image.timestamp = t;
+    image.depth_timestamp = t + gap;
+    image.depth = view_with_boards(turning, t + gap - age, 100 + static_cast<uint64_t>(n));
+    segmenter.observe(image, turning.cam_from_world(t), axis_covariance(0.01, 0.03));
+    const MoverMask mask = segmenter.mask();
+    if (n >= 90) {
+      const auto moving = std::count(mask.cells.data(), mask.cells.data() + mask.cells.size(), uint8_t{255});
+      share += static_cast<double>(moving) / static_cast<double>(mask.cells.size());
+      ++frames;
+    }
+    segmenter.commit(turning.cam_from_world(t));
+  }
+  return share / frames;
+}
+
 // In a fast turn outlines are sheared, in each view otherwise: held against each other as if they had been read at
 // once, things that stand are found in space that was seen empty.
 TEST(MotionSegmenter, RowsThatAreReadLateAreNoMovers) {
-  for (const double readout : {0.0, 0.03}) {
-    const TurningCamera turning{readout};
-    MotionSegmenter segmenter(plane_test_camera(), SensorNoise());
-    double share = 0;
-    int frames = 0;
-    for (int n = 0; n < 150; ++n) {
-      const double t = n * TurningCamera::kInterval;
-      RgbdImage image;
-      image.timestamp = image.depth_timestamp = t;
-      image.depth = view_with_boards(turning, t, 100 + static_cast<uint64_t>(n));
-      segmenter.observe(image, turning.cam_from_world(t), axis_covariance(0.01, 0.03));
-      const MoverMask mask = segmenter.mask();
-      if (n >= 90) {
-        const auto moving = std::count(mask.cells.data(), mask.cells.data() + mask.cells.size(), uint8_t{255});
-        share += static_cast<double>(moving) / static_cast<double>(mask.cells.size());
-        ++frames;
-      }
-      segmenter.commit(turning.cam_from_world(t));
-    }
-    EXPECT_LT(share / frames, 0.002) << readout;  // 0.02 without
-  }
+  for (const double readout : {0.0, 0.03})
+    EXPECT_LT(moving_share(plane_test_camera(), {readout}), 0.002) << readout;  // 0.02 without
 }
 
 // In a turn, an image of 18 ms before, as those of TUM's Kinect are, shows edges elsewhere than the pose of its stamp
 // does.
 TEST(MotionSegmenter, DepthThatIsOlderThanItsStampIsNoMover) {
   constexpr double kAge = 0.018;
-  const TurningCamera turning{0.0};
-  for (const double gap : {0.0, -0.015}) {  // between the stamps of depth and colour
-    CameraModel camera = plane_test_camera();
-    camera.depth_time_offset = -kAge;
-    MotionSegmenter segmenter(camera, SensorNoise());
-    double share = 0;
-    int frames = 0;
-    for (int n = 0; n < 150; ++n) {
-      const double t = n * TurningCamera::kInterval;
-      RgbdImage image;
-      image.timestamp = t;
-      image.depth_timestamp = t + gap;
-      image.depth = view_with_boards(turning, t + gap - kAge, 100 + static_cast<uint64_t>(n));
-      segmenter.observe(image, turning.cam_from_world(t), axis_covariance(0.01, 0.03));
-      const MoverMask mask = segmenter.mask();
-      if (n >= 90) {
-        const auto moving = std::count(mask.cells.data(), mask.cells.data() + mask.cells.size(), uint8_t{255});
-        share += static_cast<double>(moving) / static_cast<double>(mask.cells.size());
-        ++frames;
-      }
-      segmenter.commit(turning.cam_from_world(t));
-    }
-    EXPECT_LT(share / frames, 0.002) << gap;  // 0.18 without the offset
-  }
+  CameraModel camera = plane_test_camera();
+  camera.depth_time_offset = -kAge;
+  for (const double gap : {0.0, -0.015})
+    EXPECT_LT(moving_share(camera, {0.0}, gap, kAge), 0.002) << gap;  // 0.18 without the offset
 }
 
 // Nothing tells how the camera turned when the first image was taken, but the second one does.

@@ -105,6 +105,7 @@ MoverObservation MoverObserver::measure(std::span<const uint32_t> cells) const {
     o.size[static_cast<Eigen::Index>(i)] = high - low;
   }
   o.surface = surface_of(cells);
+  o.surface.position_in_world = o.position_in_world;
   return o;
 }
 

@@ -223,7 +223,6 @@ std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage
     t.box = o.box;
     t.observations = 1;
     t.before = o.surface;
-    t.before.position_in_world = o.position_in_world;
     tracks_.push_back(std::move(t));
   }
   std::sort(movers.begin(), movers.end(), [](const Mover& a, const Mover& b) { return a.id < b.id; });
@@ -258,12 +257,10 @@ void MoverTracker::remember(const MoverObservation& o, const DepthImage& depth, 
   if (!t->moved && t->id > 0 && (o.position_in_world - t->before.position_in_world).norm() > kHasMoved) {
     t->moved = t->before.has_left(depth, camera_, noise_, world_from_cam_);
     t->before = o.surface;
-    t->before.position_in_world = o.position_in_world;
   }
   // The mask leaves who stands still piece by piece.
   if (2 * o.surface.area < t->surface.area && t->surface.stands(depth, camera_, noise_, world_from_cam_)) return;
   t->surface = o.surface;
-  t->surface.position_in_world = o.position_in_world;
 }
 
 void MoverTracker::rebase(const Rigid3& new_from_old) {

@@ -15,8 +15,7 @@ namespace {
 // (ReadoutCalibration); Ringaby and Forssen (ICCV 2011) measured 26 ms with a rig.
 constexpr double kKinectReadout = 0.0235;
 // [s] Its depth images, as TUM's recordings stamp them, show what the colour camera saw so long before: where surfaces
-// seen at different times agree best, by our poses, in freiburg1_xyz, freiburg1_rpy and freiburg3_walking_halfsphere
-// (docs/decisions.md).
+// seen at different times agree best, by our poses, in freiburg1_xyz and freiburg1_rpy (docs/method.md).
 constexpr double kKinectDepthOffset = -0.018;
 
 }  // namespace

@@ -17,7 +17,7 @@ using CameraModel = Camera;
 inline constexpr double kMaxReadout = 0.033;
 
 // Cameras known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names. The readout of
-// TUM's Kinects is ours: see docs/decisions.md.
+// TUM's Kinects, and their depth's time offset, are ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);
 
 // Lengths in an image were chosen by measurement with Kinects of this focal length [px]. What they stand for is an

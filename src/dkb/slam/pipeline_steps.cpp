@@ -365,7 +365,8 @@ std::shared_ptr<const PlaneView> Pipeline::find_planes(const Scene& scene) {
   const RgbdImage& image = scene.extracted.image();
   Rigid3 cam_from_depth_cam;
   if (options_.depth.model_time_offset)
-    cam_from_depth_cam = rigid3_from_tangent(tracker_.velocity() * (image.timestamp - image.depth_time(context_.camera)));
+    cam_from_depth_cam =
+        rigid3_from_tangent(tracker_.velocity() * (image.timestamp - image.depth_time(context_.camera)));
   auto planes = std::make_shared<const PlaneView>(planes_.find(image.depth, scene.mask, cam_from_depth_cam));
   record_.add_time("planes", watch.ms());
   return planes;
