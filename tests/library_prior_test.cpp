@@ -34,7 +34,7 @@ TEST_F(LibraryPriors, APriorGuidesAJumpThatTheMotionModelMisses) {
   const WallWorld repeating(320, 240, period);
   const double jump = repeating.camera_x(period);
   Options options;
-  options.readout.estimate = false;  // a picture of the wall is made at once, and a jump is no motion while it is read
+  options.timing.estimate = false;  // a picture of the wall is made at once, and a jump is no motion while it is read
   for (const bool told : {false, true}) {
     Slam slam(repeating.camera(), options, Detectors::none());
     for (int i = 0; i < 6; ++i) ASSERT_TRUE(slam.process(repeating.frame(i, {})).tracked());

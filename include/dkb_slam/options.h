@@ -105,9 +105,9 @@ class DKB_SLAM_API Options {
     bool final = false;  ///< adjust the whole map once more at the end
   } global_ba;
 
-  struct Readout {
-    bool estimate = true;  ///< learn the rolling shutter's readout where the camera's is unknown
-  } readout;
+  struct Timing {
+    bool estimate = true;  ///< learn the readout and the depth's time offset where the camera does not tell them
+  } timing;
 
   struct Dynamics {
     FilterKind filter = FilterKind::standard;  ///< which features are kept from tracking

@@ -37,8 +37,8 @@ std::optional<Rigid3> pose_at(std::span<const TimedPose> trajectory, double time
 DenseMapper::DenseMapper(const CameraModel& camera, const SensorNoise& noise, const DenseOptions& options)
     : noise_(noise), options_(options), maker_(camera, options) {}
 
-void DenseMapper::add_keyframe(FrameIndex frame, const RgbdImage& image, const MoverMask& movers) {
-  views_.push_back(std::make_shared<const DepthView>(maker_.make(frame, image, movers)));
+void DenseMapper::add_keyframe(FrameIndex frame, const RgbdImage& image, double depth_time, const MoverMask& movers) {
+  views_.push_back(std::make_shared<const DepthView>(maker_.make(frame, image, depth_time, movers)));
 }
 
 void DenseMapper::remove_movers(FrameIndex frame, const MoverMask& movers) {

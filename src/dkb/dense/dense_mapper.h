@@ -27,8 +27,9 @@ class DenseMapper {
  public:
   DenseMapper(const CameraModel& camera, const SensorNoise& noise, const DenseOptions& options);
 
-  // `movers`: where movers are seen in `image`.
-  void add_keyframe(FrameIndex frame, const RgbdImage& image, const MoverMask& movers);
+  // `depth_time` [s]: when the colour camera saw what the depth image shows. `movers`: where movers are seen in
+  // `image`.
+  void add_keyframe(FrameIndex frame, const RgbdImage& image, double depth_time, const MoverMask& movers);
   // Movers of an earlier frame that became known later. Frames that were not added are passed over.
   void remove_movers(FrameIndex frame, const MoverMask& movers);
 

@@ -24,7 +24,8 @@ std::vector<TimedPose> trajectory(int count) {
 DenseMapper mapper_with_views(int count) {
   DenseMapper mapper(testing::scene_camera(), {}, testing::scene_options());
   for (int i = 0; i < count; ++i)
-    mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), testing::scene_pose(i), time_of(i)), {});
+    mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), testing::scene_pose(i), time_of(i)), time_of(i),
+                        {});
   return mapper;
 }
 
@@ -56,7 +57,7 @@ TEST(DenseMapper, AMountTellsWhereUpIsForCamerasThatLookDown) {
     for (int i = 0; i < 8; ++i) {
       const Rigid3 at(testing::scene_pose(i).rotation * tilt, testing::scene_pose(i).translation);
       poses.push_back({time_of(i), at});
-      mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), at, time_of(i)), {});
+      mapper.add_keyframe(i, DenseScene().draw(testing::scene_camera(), at, time_of(i)), time_of(i), {});
     }
     EXPECT_FALSE(mapper.build(poses, 1).grid);
     const Rigid3 mount(base_from_optical * rotation_from_vector(turn), {0.1, 0, 0.4});
@@ -81,7 +82,7 @@ TEST(DenseMapper, ACopyKeepsWhatItHadWhileTheOriginalGoesOn) {
   const DenseMapper copy = mapper;
   const Camera camera = testing::scene_camera();
   mapper.remove_movers(2, {.cell = 4, .cells = Image<uint8_t>((camera.width + 3) / 4, (camera.height + 3) / 4, 255)});
-  mapper.add_keyframe(4, DenseScene().draw(camera, testing::scene_pose(4), time_of(4)), {});
+  mapper.add_keyframe(4, DenseScene().draw(camera, testing::scene_pose(4), time_of(4)), time_of(4), {});
   EXPECT_EQ(mesh_ply(copy.build(trajectory(5), 1).mesh), before);
   EXPECT_NE(mesh_ply(mapper.build(trajectory(5), 1).mesh), before);
 }
@@ -108,7 +109,7 @@ TEST(DenseMapper, DepthTakesItsPoseAtItsOwnTime) {
     const Rigid3 middle(a.rotation.slerp(0.5, b.rotation), 0.5 * (a.translation + b.translation));
     RgbdImage image = DenseScene().draw(testing::scene_camera(), middle, time_of(i));
     image.depth_timestamp += 0.05;
-    mapper.add_keyframe(i, image, {});
+    mapper.add_keyframe(i, image, image.depth_timestamp, {});
   }
   const DenseMap map = mapper.build(trajectory(7), 1);
   std::vector<double> errors;
@@ -131,7 +132,7 @@ TEST(DenseMapper, MaskedMoversLeaveNoTraceWhenKnownInTimeOrLate) {
       for (int y = 0; y < 120; ++y)
         for (int x = 0; x < 160; ++x)
           if (with.depth(x, y) != without.depth(x, y)) mask.cells(x / 4, y / 4) = 255;
-      mapper.add_keyframe(i, with, at_once ? mask : MoverMask{});
+      mapper.add_keyframe(i, with, with.depth_timestamp, at_once ? mask : MoverMask{});
       if (late) mapper.remove_movers(i, mask);
     }
     size_t on_person = 0;

@@ -62,10 +62,11 @@ DepthViewMaker::DepthViewMaker(const CameraModel& camera, const DenseOptions& op
     }
 }
 
-DepthView DepthViewMaker::make(FrameIndex frame, const RgbdImage& image, const MoverMask& movers) const {
+DepthView DepthViewMaker::make(FrameIndex frame, const RgbdImage& image, double depth_time,
+                               const MoverMask& movers) const {
   DepthView view;
   view.frame = frame;
-  view.depth_time = image.depth_time(camera_);
+  view.depth_time = depth_time;
   view.depth = Image<uint16_t>(view_camera_.width, view_camera_.height);
   view.colour = ColourImage(view_camera_.width, view_camera_.height);
   for (size_t i = 0; i < source_.size(); ++i) {

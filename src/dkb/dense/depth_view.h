@@ -21,8 +21,8 @@ struct DepthView {
 
   FrameIndex frame = 0;
   double depth_time = 0;  // [s]
-  Image<uint16_t> depth;       // [1 / kUnitsPerMetre m] along the optical axis; 0 = none, unsure, or a mover
-  ColourImage colour;          // same size
+  Image<uint16_t> depth;  // [1 / kUnitsPerMetre m] along the optical axis; 0 = none, unsure, or a mover
+  ColourImage colour;     // same size
 
   float metres(int x, int y) const { return static_cast<float>(depth(x, y)) * (1.0F / kUnitsPerMetre); }
 };
@@ -46,7 +46,7 @@ class DepthViewMaker {
 
   const ViewCamera& camera() const { return view_camera_; }
   // Depths at jumps and on movers, and those around them, are left out.
-  DepthView make(FrameIndex frame, const RgbdImage& image, const MoverMask& movers) const;
+  DepthView make(FrameIndex frame, const RgbdImage& image, double depth_time, const MoverMask& movers) const;
   // Movers that became known later.
   void remove(const MoverMask& movers, DepthView* view) const;
 

@@ -25,7 +25,7 @@ RgbdImage wall(const CameraModel& camera, float z) {
 
 TEST(DepthView, KeepsDepthToAQuarterMillimetreOnAGridOfSteps) {
   const DepthViewMaker maker(small_camera(), {});
-  const DepthView view = maker.make(3, wall(small_camera(), 1.2345F), {});
+  const DepthView view = maker.make(3, wall(small_camera(), 1.2345F), 0, {});
   ASSERT_EQ(view.depth.width(), 32);
   ASSERT_EQ(view.depth.height(), 24);
   for (size_t i = 0; i < view.depth.size(); ++i) ASSERT_EQ(view.depth.data()[i], 4938);
@@ -45,7 +45,7 @@ TEST(DepthView, LeavesOutStepsAndMoversWithAMargin) {
   mask.cells = Image<uint8_t>(16, 12);
   mask.cells(10, 5) = 255;  // pixels 40 ... 43, 20 ... 23
   const DepthViewMaker maker(small_camera(), options);
-  const DepthView view = maker.make(0, image, mask);
+  const DepthView view = maker.make(0, image, 0, mask);
   EXPECT_EQ(view.depth(20, 20), 0);
   EXPECT_EQ(view.depth(21, 21), 0);
   EXPECT_GT(view.depth(22, 20), 0);
@@ -61,8 +61,8 @@ TEST(DepthView, MoversKnownLaterAreTakenOutLikewise) {
   mask.cells = Image<uint8_t>(16, 12);
   mask.cells(3, 3) = 255;
   const DepthViewMaker maker(small_camera(), {});
-  const DepthView at_once = maker.make(0, wall(small_camera(), 2), mask);
-  DepthView later = maker.make(0, wall(small_camera(), 2), {});
+  const DepthView at_once = maker.make(0, wall(small_camera(), 2), 0, mask);
+  DepthView later = maker.make(0, wall(small_camera(), 2), 0, {});
   EXPECT_NE(later.depth, at_once.depth);
   maker.remove(mask, &later);
   EXPECT_EQ(later.depth, at_once.depth);
@@ -78,7 +78,7 @@ TEST(DepthView, LooksUpDistortedPixels) {
   const int u = static_cast<int>(std::floor(at.x() + 0.5)), v = static_cast<int>(std::floor(at.y() + 0.5));
   ASSERT_NE(u, 10);
   image.grey(u, v) = 7;
-  EXPECT_EQ(DepthViewMaker(camera, options).make(0, image, {}).colour(10, 8).r, 7);
+  EXPECT_EQ(DepthViewMaker(camera, options).make(0, image, 0, {}).colour(10, 8).r, 7);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ SurfaceMesh scene_mesh() {
   const DepthViewMaker maker(testing::scene_camera(), options);
   std::vector<DepthView> views;
   for (int i = 0; i < 6; ++i)
-    views.push_back(maker.make(i, scene.draw(testing::scene_camera(), testing::scene_pose(i), 0.1 * i), {}));
+    views.push_back(maker.make(i, scene.draw(testing::scene_camera(), testing::scene_pose(i), 0.1 * i), 0.1 * i, {}));
   std::vector<PlacedView> placed;
   for (int i = 0; i < 6; ++i) placed.push_back({&views[static_cast<size_t>(i)], testing::scene_pose(i).inverse()});
   return extract_surface(TsdfVolume::fuse(placed, maker.camera(), {}, options));

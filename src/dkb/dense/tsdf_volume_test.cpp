@@ -28,7 +28,7 @@ Views make_views(int count, const std::vector<int>& with_person, const DenseOpti
   for (int i = 0; i < count; ++i) {
     DenseScene scene;
     if (std::find(with_person.begin(), with_person.end(), i) != with_person.end()) scene.person.emplace(-0.4, 2.2);
-    v.views.push_back(maker.make(i, scene.draw(scene_camera(), scene_pose(i), interval * i), {}));
+    v.views.push_back(maker.make(i, scene.draw(scene_camera(), scene_pose(i), interval * i), interval * i, {}));
   }
   for (int i = 0; i < count; ++i) v.placed.push_back({&v.views[static_cast<size_t>(i)], scene_pose(i).inverse()});
   return v;

@@ -124,7 +124,7 @@ Rigid3 MotionSegmenter::depth_cam_from_cam(const Rigid3& cam_from_world) const {
   return depth_cam_from_cam(cam_from_world * last_->cam_from_world.inverse(), image_time_ - last_->time);
 }
 
-void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_world_expected,
+void MotionSegmenter::observe(const RgbdImage& image, double depth_time, const Rigid3& cam_from_world_expected,
                               const Matrix6d& step_covariance) {
   if (image.depth.width() != camera_.width || image.depth.height() != camera_.height)
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
@@ -133,7 +133,7 @@ void MotionSegmenter::observe(const RgbdImage& image, const Rigid3& cam_from_wor
   if (!current_) current_ = take_spare(spare_);
   image_time_ = image.timestamp;
   current_->set_depth(image.depth, rays_, simd_);
-  current_->time = image.depth_time(camera_);
+  current_->time = depth_time;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
   current_->cam_from_world = depth_from_colour_ * cam_from_world_expected;
   if (previous_ && current_->time - previous_->time > kLongAgo) {

@@ -34,10 +34,12 @@ class MotionSegmenter {
   MotionSegmenter(const CameraModel& camera, const SensorNoise& noise, const MotionOptions& options = {},
                   Simd simd = best_simd());
 
+  // `depth_time` [s]: when the colour camera saw what the depth image shows.
   // An error of the pose of some mm and 0.3 degrees does no harm. `step_covariance`: how far the motion since the frame
   // before may be from what is expected (as MotionPrior's). Throws InputError when the depth image is not of the
   // camera's size.
-  void observe(const RgbdImage& image, const Rigid3& cam_from_world_expected, const Matrix6d& step_covariance);
+  void observe(const RgbdImage& image, double depth_time, const Rigid3& cam_from_world_expected,
+               const Matrix6d& step_covariance);
   // What moves in the image last given; nothing in the first frame.
   MoverMask mask();
   // What is known to stand still in the image last given.

@@ -44,7 +44,7 @@ double moving_share(const CameraModel& camera, const TurningCamera& turning, dou
     image.timestamp = t;
     image.depth_timestamp = t + gap;
     image.depth = view_with_boards(turning, t + gap - age, 100 + static_cast<uint64_t>(n));
-    segmenter.observe(image, turning.cam_from_world(t), axis_covariance(0.01, 0.03));
+    segmenter.observe(image, image.depth_time(camera), turning.cam_from_world(t), axis_covariance(0.01, 0.03));
     const MoverMask mask = segmenter.mask();
     if (n >= 90) {
       const auto moving = std::count(mask.cells.data(), mask.cells.data() + mask.cells.size(), uint8_t{255});
@@ -86,7 +86,7 @@ TEST(MotionSegmenter, TheFirstStepIsRightThoughDepthIsOlderThanColour) {
       RgbdImage image;
       image.timestamp = image.depth_timestamp = t;
       image.depth = view_with_boards(turning, t - kAge, 7);
-      segmenter.observe(image, turning.cam_from_world(start), axis_covariance(0.1, 0.3));
+      segmenter.observe(image, image.depth_time(camera), turning.cam_from_world(start), axis_covariance(0.1, 0.3));
       if (t == start) segmenter.commit(turning.cam_from_world(t));
     }
     ASSERT_TRUE(segmenter.aligned_step());

@@ -112,7 +112,7 @@ Figures judge(const MoverMask& mask, const GreyImage& truth) {
 }
 
 MoverMask segment(MotionSegmenter& segmenter, const RgbdImage& image, const Rigid3& expected) {
-  segmenter.observe(image, expected, kStepCovariance);
+  segmenter.observe(image, image.depth_timestamp, expected, kStepCovariance);
   return segmenter.mask();
 }
 
@@ -194,7 +194,7 @@ TEST(MotionSegmenter, SaysNothingWhereALeapLeavesThePoseUnknown) {
   MotionSegmenter segmenter(world.camera, {}, {});
   const auto see = [&](int frame, const Rigid3& expected, const Matrix6d& covariance) {
     const Picture p = world.render(frame, {});
-    segmenter.observe(p.image, expected, covariance);
+    segmenter.observe(p.image, p.image.depth_timestamp, expected, covariance);
     const double wrong = judge(segmenter.mask(), p.truth).wrong;
     segmenter.commit(world.cam_from_world(frame));
     return wrong;
@@ -213,7 +213,7 @@ TEST(MotionSegmenter, SaysNothingWhereALeapLeavesThePoseUnknown) {
 TEST(MotionSegmenter, KnowsNothingOfTheFirstFrame) {
   const World world;
   MotionSegmenter segmenter(world.camera, {}, {});
-  segmenter.observe(world.render(0, {}).image, world.cam_from_world(0), Matrix6d::Identity());
+  segmenter.observe(world.render(0, {}).image, 0, world.cam_from_world(0), Matrix6d::Identity());
   const StillCells still = segmenter.still();
   for (size_t i = 0; i < still.kinds.size(); ++i) ASSERT_EQ(still.kinds.data()[i], StillCells::unknown) << i;
 }
@@ -435,7 +435,7 @@ TEST(MotionSegmenter, WhoStandsInABoxFromTheStartStaysMarked) {
   MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 60; ++f) {
     const Picture p = world.render(f, {box_at(0)});
-    segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
+    segmenter.observe(p.image, p.image.depth_timestamp, world.cam_from_world(f), kStepCovariance);
     const Silhouettes left = without_still(boxed_in(world, p), segmenter.still());
     segmenter.take_bodies(left.body);
     const Figures figures = judge(left.mask, p.truth);
@@ -450,7 +450,7 @@ TEST(MotionSegmenter, WhatStoodThereBeforeABoxCameIsNoPartOfIt) {
   MotionSegmenter segmenter(world.camera, {});
   for (int f = 0; f < 40; ++f) {
     Picture p = world.render(f, {});
-    segmenter.observe(p.image, world.cam_from_world(f), kStepCovariance);
+    segmenter.observe(p.image, p.image.depth_timestamp, world.cam_from_world(f), kStepCovariance);
     if (f >= 30) {  // a detector takes the pillar for a person
       for (size_t i = 0; i < p.truth.size(); ++i) p.truth.data()[i] = p.image.depth.data()[i] < 2.6f ? 255 : 0;
       const Silhouettes boxed = boxed_in(world, p);

@@ -77,8 +77,8 @@ void each_setting(Public& p, Internal& o, const Visit& visit) {
   visit("loop.min_inliers", p.loop.min_inliers, o.loop_closing.loop.min_inliers,
         "[points] of the map that agree with a loop", at_least(10));
   visit("global_ba.final", p.global_ba.final, o.final_ba, "adjust the whole map once more at the end");
-  visit("readout.estimate", p.readout.estimate, o.estimate_readout,
-        "learn the rolling shutter's readout where the camera's is unknown");
+  visit("timing.estimate", p.timing.estimate, o.estimate_timing,
+        "learn the rolling shutter's readout and the depth's time offset where the camera's file does not tell them");
 
   visit("dynamics.filter", p.dynamics.filter, o.dynamics.filter, "which features are kept from tracking",
         Names<FilterKind>{{"none", FilterKind::none},

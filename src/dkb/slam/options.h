@@ -37,7 +37,7 @@ struct SlamOptions {
   AdaptiveKeyframeOptions adaptive_keyframes;
   MappingOptions mapping;
   LoopStageOptions loop_closing;
-  bool estimate_readout = true;   // of the rolling shutter, when the camera's file does not tell it
+  bool estimate_timing = true;    // readout and depth_time_offset, where the camera's file does not tell them
   bool final_ba = false;          // adjust the whole map once more at the end
   bool smooth_trajectory = true;  // let the poses of the final trajectory smooth each other
   DynamicsOptions dynamics;

@@ -90,7 +90,7 @@ TEST(Options, DefaultsOfTheHeaderAreThoseOfTheStages) {
   header.mapping = {};
   header.loop = {};
   header.global_ba = {};
-  header.readout = {};
+  header.timing = {};
   header.dynamics = {};
   header.dense = {};
   header.pipeline = {};

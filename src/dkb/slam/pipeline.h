@@ -22,7 +22,7 @@
 #include "dkb/slam/odometry_frame.h"
 #include "dkb/slam/options.h"
 #include "dkb/slam/prior_calibration.h"
-#include "dkb/slam/readout_calibration.h"
+#include "dkb/slam/timing_calibration.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
 #include "dkb/slam/stamp_doubt.h"
@@ -113,7 +113,7 @@ class Pipeline {
   std::unique_ptr<KeyframeDecider> decider_;
   SceneStage scenes_;
   PointEvidence evidence_;
-  ReadoutCalibration readout_;
+  TimingCalibration timing_;
   PriorCalibration priors_;
   MoverStage movers_;
   OdometryFrame odometry_;
@@ -125,7 +125,6 @@ class Pipeline {
   StampDoubt stamp_doubt_;
   FrameIndex next_frame_ = 0;
   int64_t last_stamp_ns_ = 0;
-  Camera camera_at_readout_;  // as calibrated by now
   int frames_before_map_ = 0;
   int frames_without_map_ = 0;    // of those that only localise
   int frames_without_depth_ = 0;  // in a row

@@ -41,12 +41,12 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       decider_(make_decider(context)),
       scenes_(context.camera, options_.noise, options_.dynamics, context.detectors, options_.pipeline.threaded,
               options_.pipeline.realtime),
-      readout_(optics_of(context), options_.estimate_readout && options_.depth.model_rolling_shutter),
+      timing_(optics_of(context), options_.estimate_timing && options_.depth.model_rolling_shutter,
+              options_.estimate_timing && options_.depth.model_time_offset),
       movers_(context.camera, options_.noise, options_.pipeline.threaded),
       odometry_(options_.base_from_cam),
       rate_(context.camera.fps),
       stamp_doubt_(context.camera.fps),
-      camera_at_readout_(context.camera),
       next_keyframe_(map.keyframe_count()),
       mapping_(LocalMapper(optics_of(context), options_.mapping, map), options_.pipeline.threaded),
       loop_(optics_of(context), options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
@@ -174,6 +174,7 @@ ExtractedFrame Pipeline::extract(const Frame& frame) {
 
 Expectation Pipeline::expect(const Frame& frame) const {
   Expectation expected;
+  expected.depth_time = frame.image()->depth_time(timing_.camera());
   const auto& last = tracker_.last_frame();
   if (!last) return expected;
   expected.step = tracker_.expected_step(frame.image()->timestamp, frame.prior() ? &*frame.prior() : nullptr);
@@ -221,13 +222,12 @@ void Pipeline::look_for_movers(const Scene& scene, const Expectation& expected) 
 TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
   const Frame& frame = scene.extracted.frame;
   const RgbdImage& image = *frame.image();
-  camera_at_readout_.readout = readout_.readout();
-  ExtractedFeatures features(usable.orb, image, camera_at_readout_, undistort_, options_.noise, options_.depth);
+  ExtractedFeatures features(usable.orb, image, timing_.camera(), undistort_, options_.noise, options_.depth);
   features.motion = usable.motion;
   ImageAppearance appearance(image.depth, context_.camera, options_.noise, extractor_.pyramid(), extractor_.brief());
   std::optional<ExtractedFeatures> start;
   if (start_)
-    start.emplace(start_->usable.orb, start_->scene.extracted.image(), camera_at_readout_, undistort_, options_.noise,
+    start.emplace(start_->usable.orb, start_->scene.extracted.image(), timing_.camera(), undistort_, options_.noise,
                   options_.depth);
   std::optional<PosePrediction> before;  // where the images showed the camera in the frame before
   if (const auto& last = tracker_.last_frame(); last && last->tracked() && last->index + 1 == next_frame_)
@@ -251,7 +251,7 @@ TrackedFrame Pipeline::track(const Scene& scene, const UsableFeatures& usable) {
                      before->covariance + (seen ? inverse(seen->information) : tracked.covariance)});
     if (!doubt.empty()) note(Event::Kind::warning, std::move(doubt));
   }
-  if (!readout_.known()) readout_.add(tracked, tracker_.velocity(), tracker_.positions(tracked.points));
+  if (!timing_.known()) timing_.add(tracked, image.depth, tracker_.velocity(), tracker_.positions(tracked.points));
   return tracked;
 }
 
@@ -366,7 +366,7 @@ std::shared_ptr<const PlaneView> Pipeline::find_planes(const Scene& scene) {
   Rigid3 cam_from_depth_cam;
   if (options_.depth.model_time_offset)
     cam_from_depth_cam =
-        rigid3_from_tangent(tracker_.velocity() * (image.timestamp - image.depth_time(context_.camera)));
+        rigid3_from_tangent(tracker_.velocity() * (image.timestamp - image.depth_time(timing_.camera())));
   auto planes = std::make_shared<const PlaneView>(planes_.find(image.depth, scene.mask, cam_from_depth_cam));
   record_.add_time("planes", watch.ms());
   return planes;
@@ -414,7 +414,7 @@ void Pipeline::insert_keyframe(const Scene& scene, const UsableFeatures& usable,
     const RgbdImage& image = scene.extracted.image();
     unite(movers, silhouettes(image.depth, scene.boxes, context_.camera, options_.noise).mask, image.depth.width(),
           image.depth.height());
-    dense_->add_keyframe(tracked.index, image, movers);
+    dense_->add_keyframe(tracked.index, image, image.depth_time(timing_.camera()), movers);
     record_.add_time("dense_keyframe", watch.ms());
   }
   record_.set_map(tracker_.map());  // this frame hangs on the new keyframe

@@ -82,7 +82,7 @@ MoverMask SceneStage::ask_prompt_detectors(const Frame& frame, std::vector<Detec
 Segmentation SceneStage::segment_motion(const SegmentationTask& task) {
   const Stopwatch watch;
   Segmentation made;
-  motion_->observe(*task.frame.image(), task.cam_from_world_expected, task.step_covariance);
+  motion_->observe(*task.frame.image(), task.depth_time, task.cam_from_world_expected, task.step_covariance);
   if (segments_motion_) made.mask = motion_->mask();
   made.ms = watch.ms();
   return made;
@@ -120,7 +120,7 @@ void SceneStage::begin(FrameIndex index, const Frame& frame, std::vector<DueDete
   segments_motion_ = segments_motion_asked_ || (!rival_ && detector_failing());
   if (segmenting_) {
     const Matrix6d covariance = expected.step ? expected.step->covariance : Matrix6d::Identity();
-    segmentation_task_ = {frame, expected.cam_from_world, covariance};
+    segmentation_task_ = {frame, expected.depth_time, expected.cam_from_world, covariance};
     segmenting_->begin();
   }
   if (carrying_) {

@@ -25,6 +25,7 @@ struct DynamicsOptions {
 // What tracking knows before it looks at a frame.
 struct Expectation {
   Rigid3 cam_from_world;
+  double depth_time = 0;                                   // [s] when the colour camera saw what the depth image shows
   std::optional<MotionPrior> step;                         // since the frame before; nothing without one
   std::vector<Eigen::Vector3d> keyframe_points_in_camera;  // for `multiview`: points of earlier keyframes
 
@@ -38,6 +39,7 @@ struct Segmentation {
 };
 struct SegmentationTask {
   Frame frame;
+  double depth_time;
   Rigid3 cam_from_world_expected;
   Matrix6d step_covariance;
 };
