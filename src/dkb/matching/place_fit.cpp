@@ -32,7 +32,6 @@ std::optional<PlaceFit> fit_by_descriptors(const std::vector<Candidate>& known, 
   if (!pose.ok) return std::nullopt;
   PlaceFit fit;
   fit.cam_from_world = pose.pose;
-  fit.covariance = pose.covariance;
   fit.inliers = pose.inliers;
   fit.points.assign(features.size(), kNoPoint);
   for (size_t i = 0; i < matches.size(); ++i)

@@ -121,7 +121,6 @@ RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const Pos
   if (best.inliers < 3) return result;
 
   Rigid3 pose = best.pose;
-  Matrix6d covariance = Matrix6d::Zero();
   result.inlier = errors.inliers(pose);
   PoseOptions refine;
   refine.min_inliers = 3;
@@ -129,13 +128,12 @@ RansacPose estimate_absolute_pose(const CameraModel& camera, std::span<const Pos
     const PoseEstimate estimate = optimise_pose(camera, pose, only(observations, result.inlier), refine);
     if (!estimate.ok) break;
     pose = estimate.cam_from_world;
-    covariance = estimate.covariance;
     const std::vector<uint8_t> before = std::exchange(result.inlier, errors.inliers(pose));
     if (result.inlier == before) break;
   }
   result.inliers = static_cast<int>(std::count(result.inlier.begin(), result.inlier.end(), 1));
   result.ok = result.inliers >= options.min_inliers;
-  if (result.ok) result.pose = pose, result.covariance = covariance;
+  if (result.ok) result.pose = pose;
   return result;
 }
 

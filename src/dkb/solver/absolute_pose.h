@@ -21,9 +21,8 @@ struct RansacOptions {
 
 struct RansacPose {
   bool ok = false;
-  Rigid3 pose;                             // cam_from_world; identity where not ok
-  Matrix6d covariance = Matrix6d::Zero();  // as PoseEstimate::covariance; zero where not ok
-  std::vector<uint8_t> inlier;             // per correspondence
+  Rigid3 pose;                  // cam_from_world; identity where not ok
+  std::vector<uint8_t> inlier;  // per correspondence
   int inliers = 0;
   int iterations = 0;
 };

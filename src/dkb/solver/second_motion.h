@@ -25,13 +25,16 @@ inline double surface_around(double depth) {
 // Each match is of one of two motions (expectation maximisation), with Student's t of pose_optimiser for its errors and
 // a cost for each of its nearest neighbours that is of the other one (Potts). It starts from what is near against what
 // is far, since only what is near can turn and shift a camera that sees more of the room than of him. Two motions are
-// believed where they take enough off the cost of one. The camera's is the one with the most surface. All
-// is linear about the pose.
+// believed where they take enough off the cost of one: so much that it makes up for how much less the camera's is
+// `expected` than the one motion was, by what the camera did before (null: nothing is known of that). Blur and a
+// shutter in a fast turn look like two motions, but no hand shifts a camera by a decimetre between two frames. The
+// camera's is the one with the most surface. All is linear about the pose.
 //
 // Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
 // where fewer than `min_still` observations would be of the camera's, or an eighth of either, or where of the
 // camera's neither half nor `min_still` have a depth of their own. Deterministic.
 std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
-                                                  std::span<const PoseObservation> observations, int min_still);
+                                                  std::span<const PoseObservation> observations, int min_still,
+                                                  const PosePrior* expected = nullptr);
 
 }  // namespace dkb

@@ -59,8 +59,8 @@ struct BodyInRoom {
   double error(const PoseEstimate& pose) const {
     return (centre_in_world(pose.cam_from_world) - centre_in_world(cam_from_world)).norm();
   }
-  std::optional<std::vector<uint8_t>> look() const {
-    return second_motion(camera, estimate().cam_from_world, observations, 20);
+  std::optional<std::vector<uint8_t>> look(const PosePrior* expected = nullptr) const {
+    return second_motion(camera, estimate().cam_from_world, observations, 20, expected);
   }
   // Shares of the room's and of the body's matches that are said to move.
   std::pair<double, double> moving(const std::vector<uint8_t>& moves) const {
@@ -120,6 +120,35 @@ TEST(SecondMotion, IsNotToldByPointsWithoutDepth) {
   for (size_t i = 0; i < scene.observations.size(); ++i)
     if (!scene.of_body[i] && i % 10 != 0) scene.observations[i].depth = 0;
   EXPECT_FALSE(scene.look());
+}
+
+// What is expected of the camera to `sd` [m, rad].
+PosePrior expectation(const Rigid3& cam_from_world, double sd) {
+  return {cam_from_world, Matrix6d::Identity() / (sd * sd)};
+}
+
+TEST(SecondMotion, ThatIsFaintIsNotBelievedOfACameraThatCannotHaveMovedLikeThat) {
+  int alone = 0, as_it_is = 0, along_with_him = 0;
+  for (uint64_t seed = 1; seed <= 100; ++seed) {
+    const BodyInRoom scene({.body = 60, .moved = {0.005, -0.002, 0}, .seed = seed});
+    const PosePrior of_camera = expectation(scene.cam_from_world, 0.0005);
+    const PosePrior of_both = expectation(scene.estimate().cam_from_world, 0.0001);
+    alone += scene.look().has_value();
+    as_it_is += scene.look(&of_camera).has_value();
+    along_with_him += scene.look(&of_both).has_value();
+  }
+  EXPECT_GT(alone, 80);
+  EXPECT_GE(as_it_is, alone - 2);
+  EXPECT_LT(along_with_him, 10);
+}
+
+// Whoever has taken the camera along for some frames has made its velocity as well.
+TEST(SecondMotion, ThatIsPlainIsBelievedThoughItIsNotExpected) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const BodyInRoom scene({.seed = seed});
+    const PosePrior along_with_him = expectation(scene.estimate().cam_from_world, 0.00001);
+    EXPECT_TRUE(scene.look(&along_with_him)) << seed;
+  }
 }
 
 TEST(SecondMotion, LeavesEnoughForThePose) {

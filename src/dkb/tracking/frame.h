@@ -42,7 +42,7 @@ struct PosePrediction {
   // Whether what the images say alone may be of the same pose.
   bool allows(const PosePrior& by_observations) const;
   // Whether a pose by the images may be the same one.
-  bool agrees(const Rigid3& found_cam_from_world, const Matrix6d& found_covariance) const;
+  bool agrees(const Rigid3& found_cam_from_world) const;
 };
 
 // What the frames after it need to know of one. The pose hangs on a keyframe, since the world may move under the

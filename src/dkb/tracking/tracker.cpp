@@ -434,7 +434,7 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
     const bool near = last_ && last_->index + 1 == frame.index && state_ == TrackingState::tracking &&
                       frame.timestamp - last_->timestamp <= kEvenMotion &&
                       possible_motion(frame.cam_from_world, frame.timestamp);
-    followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world, frame.covariance));
+    followed = near || (expected != nullptr && expected->agrees(frame.cam_from_world));
     found_again = followed;
     if (!followed) {
       finish(frame);

@@ -110,7 +110,7 @@ class Tracker {
   bool track_expected(const PosePrediction& expected, TrackedFrame& frame);
   // Since the last frame: what any camera may do, and what this one may by its velocity, where that is known.
   bool possible_motion(const Rigid3& cam_from_world, double timestamp) const;
-  bool plausible_motion(const PlaceFit& found, double timestamp) const;
+  bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);

@@ -74,8 +74,8 @@ bool PosePrediction::allows(const PosePrior& by_observations) const {
   return may_be_one(cam_from_world, by_observations.cam_from_world, covariance + inverse(by_observations.information));
 }
 
-bool PosePrediction::agrees(const Rigid3& found_cam_from_world, const Matrix6d& found_covariance) const {
-  Matrix6d sum = covariance + found_covariance;
+bool PosePrediction::agrees(const Rigid3& found_cam_from_world) const {
+  Matrix6d sum = covariance;
   sum.diagonal().head<3>().array() += kFoundPositionSd * kFoundPositionSd;
   sum.diagonal().tail<3>().array() += kFoundRotationSd * kFoundRotationSd;
   return may_be_one(cam_from_world, found_cam_from_world, sum);
@@ -148,7 +148,7 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   std::sort(nearby.begin(), nearby.end());
   if (nearby.size() > kKeyframesNearby) nearby.resize(kKeyframesNearby);
   const auto right = [&](const std::optional<PoseProposal>& found) {
-    return found && found->verified && expected.agrees(found->fit.cam_from_world, found->fit.covariance);
+    return found && found->verified && expected.agrees(found->fit.cam_from_world);
   };
   if (nearby.empty()) return std::nullopt;
   for (const double radius : widening_radii(expected.covariance)) {

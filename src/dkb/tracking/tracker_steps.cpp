@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the last frame to this one.
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <utility>
 
+#include "dkb/geometry/decompositions.h"
 #include "dkb/matching/pose_observation.h"
 #include "dkb/solver/second_motion.h"
 #include "dkb/tracking/tracker.h"
@@ -78,18 +77,17 @@ bool Tracker::track_from_last(TrackedFrame& frame, const TrackingInput& input) {
     if (other && other->inliers >= kMinMatches && possible_motion(other->cam_from_world, frame.timestamp) &&
         (!fit || surface(*other) > surface(*fit))) {
       fit = std::move(other);
-      if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world, fit->covariance))
-        frame.predicted->weighs = false;
+      if (frame.predicted && !frame.predicted->agrees(fit->cam_from_world)) frame.predicted->weighs = false;
     }
   }
   if (!fit) {
     fit = fit_near(last_->cam_from_world, 3 * usual);
-    if (fit && !plausible_motion(*fit, frame.timestamp)) fit.reset();
+    if (fit && !plausible_motion(fit->cam_from_world, frame.timestamp)) fit.reset();
   }
   if (!fit && map_.view().live_keyframe(last_->reference) != nullptr) {
     // Without the motion: the camera cannot be far from what it saw last.
     auto near = relocaliser_.propose_from(map_.view(), last_->reference, features, retracted_);
-    if (near && plausible_motion(near->fit, frame.timestamp)) fit = std::move(near->fit);
+    if (near && plausible_motion(near->fit.cam_from_world, frame.timestamp)) fit = std::move(near->fit);
   }
   return fit && track_local_map(fit->cam_from_world, radius_local_map(), options_.min_inliers, fit->points, frame);
 }
@@ -109,8 +107,7 @@ bool Tracker::track_among_suspects(TrackedFrame& frame, const TrackingInput& inp
 // is expected and most of what matches agrees with them. Down a blank corridor they are what holds the camera.
 bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame) {
   const auto agrees = [&](const PoseEstimate& pose) {
-    return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() &&
-           expected.agrees(pose.cam_from_world, pose.covariance);
+    return 2 * static_cast<size_t>(pose.inliers) > pose.inlier.size() && expected.agrees(pose.cam_from_world);
   };
   refresh_candidates(last_->points, frame.timestamp);  // of no matches there would be none
   for (const double radius : widening_radii(expected.covariance)) {
@@ -130,16 +127,17 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     matched.push_back(f);
     observations.push_back(pose_observation(frame.features->keypoints[f], frame.matched_in_world[f], optics_));
   }
-  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers);
+  std::optional<PosePrior> expected;
+  if (const auto step = velocity_ ? expected_step(frame.timestamp, nullptr) : std::nullopt) {
+    const PosePrediction pose = pose_after(*step);
+    expected = {pose.cam_from_world, inverse(pose.covariance)};
+  }
+  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers,
+                                   expected ? &*expected : nullptr);
   if (!moves) return;
   TrackedFrame by_still = frame;
   by_still.inliers = static_cast<int>(std::count(moves->begin(), moves->end(), 0));
-  // The surfaces that tell the step are his as well: the motion so far weighs in their place.
-  by_still.predicted.reset();
-  if (const auto step = velocity_ ? expected_step(frame.timestamp, nullptr) : std::nullopt) {
-    by_still.predicted = pose_after(*step);
-    by_still.predicted->weighs = true;
-  }
+  if (by_still.predicted) by_still.predicted->weighs = false;  // the surfaces that it comes from are his as well
   for (size_t i = 0; i < matched.size(); ++i) {
     by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
     by_still.outlier[matched[i]] = (*moves)[i];
@@ -154,11 +152,6 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     if (followed[f]->moves || squared_error(pair, by_still.cam_from_world, *by_still.features) <= kChi2TwoDof95)
       by_still.odometry[f] = followed[f];
   }
-  if (std::getenv("DSTEP"))
-    fprintf(stderr, "LOM %d: %zu matched, still %d, moved %ld, inliers %d -> %d, moved by %.1f mm\n", (int)frame.index,
-            matched.size(), (int)std::count(moves->begin(), moves->end(), 0),
-            (long)std::count(moves->begin(), moves->end(), 1), frame.inliers, by_still.inliers,
-            1e3 * (by_still.cam_from_world * frame.cam_from_world.inverse()).translation.norm());
   frame = std::move(by_still);
 }
 
@@ -171,11 +164,10 @@ bool Tracker::possible_motion(const Rigid3& cam_from_world, double timestamp) co
 
 // For what is sought around the last place or from the reference keyframe: somebody before the lens leaves few matches,
 // and some of them may agree on a place where no hand takes a camera.
-bool Tracker::plausible_motion(const PlaceFit& found, double timestamp) const {
+bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
   if (velocity_)
-    if (const auto step = expected_step(timestamp, nullptr))
-      return pose_after(*step).agrees(found.cam_from_world, found.covariance);
-  return possible_motion(found.cam_from_world, timestamp);
+    if (const auto step = expected_step(timestamp, nullptr)) return pose_after(*step).agrees(cam_from_world);
+  return possible_motion(cam_from_world, timestamp);
 }
 
 }  // namespace dkb
