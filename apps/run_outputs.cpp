@@ -106,6 +106,7 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
     j["keyframe_rules"][rule] = it == s.keyframe_rules.end() ? 0 : it->second;
   }
   j["keyframe_tests"] = s.keyframe_tests;
+  j["timing"] = {{"readout", s.readout}, {"depth_time_offset", s.depth_time_offset}};
   j["dynamic"] = {{"features_removed", s.features_removed}, {"points_retracted", s.points_retracted}};
   // Boxes of a file, masks and motion tell of every frame.
   const bool prompt = s.detector != "none" && s.detector_latency_frames == 0 && s.detector_rate_hz == 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `dkb-slam run`, as its users start it.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -51,6 +52,21 @@ TEST(RunCommand, EverySecondOrThirdFrameIsEnough) {
   }
 }
 
+TEST(RunCommand, LearnsHowLateDepthImagesAreStamped) {
+  for (const double late : {0.0, 0.02}) {
+    const TempFolder folder;
+    copy_sequence(folder.path(), kSequenceFrames, false);
+    std::string pairs;
+    for (const auto& row : rows_of(folder / "associations.txt"))
+      pairs += fmt::format("{} {} {:.6f} {}\n", row[0], row[1], std::stod(row[2]) + late, row[3]);
+    write_text(folder / "associations.txt", pairs);
+    const SlamRun run(folder.path(), folder / "out");
+    ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+    EXPECT_NEAR(run.stats.at("timing").at("depth_time_offset"), -late, 0.005);
+    EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.005);
+  }
+}
+
 TEST(RunCommand, WritesEveryFileOfTheContract) {
   const TempFolder temp;
   const SlamRun run(sequence(), temp / "out", {"--dump-features"});
@@ -98,6 +114,7 @@ TEST(RunCommand, WritesEveryFileOfTheContract) {
   EXPECT_EQ(s.at("keyframe_tests").at("decisions"), kSequenceFrames - 1);
   EXPECT_GE(s.at("keyframe_tests").at("visibility"), s.at("keyframe_rules").at("adaptive"));
   EXPECT_TRUE(s.at("dynamic").contains("features_removed"));
+  EXPECT_GT(s.at("timing").at("readout"), 0);
   EXPECT_TRUE(s.at("detector").contains("kind"));
   EXPECT_FALSE(s.contains("realtime")) << "a run of a dataset leaves nothing out";
 

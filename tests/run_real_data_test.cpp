@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "dkb/geometry/camera.h"
 #include "dkb/util/test_data.h"
 #include "e2e_support.h"
 
@@ -22,6 +23,22 @@ TEST(RunRealData, FollowsEveryFrameOfAHandHeldKinect) {
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   EXPECT_EQ(run.stats.at("tracked"), 60);
   EXPECT_LT(ape_of(dataset, run.out / "trajectory.txt"), 0.02);
+}
+
+// With a camera file that knows neither, as most do.
+TEST(RunRealData, LearnsWhenAKinectSeesWhatItsImagesShow) {
+  const std::string name = "rgbd_dataset_freiburg1_xyz";
+  const fs::path dataset = outside_data(name);
+  if (dataset.empty()) GTEST_SKIP() << no_outside_data(name);
+  const TempFolder temp;
+  Camera camera = *builtin_camera("fr1");
+  camera.readout = camera.depth_time_offset = 0;
+  write_text(temp / "camera.yaml", camera.to_yaml());
+  const SlamRun run(dataset, temp / "out", {"--camera", temp / "camera.yaml"});
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_NEAR(run.stats.at("timing").at("depth_time_offset"), -0.018, 0.006);
+  EXPECT_NEAR(run.stats.at("timing").at("readout"), 0.0235, 0.006);
+  EXPECT_LT(ape_of(dataset, run.out / "trajectory.txt"), 0.0046);
 }
 
 // Between slow frames a hand changes its velocity by more than a search for points forgives.

@@ -63,6 +63,7 @@ struct Statistics {
   int keyframes_culled = 0;                   ///< taken out because others show the same
   std::map<std::string, int> keyframe_rules;  ///< keyframes by the rule that made them
   std::map<std::string, int> keyframe_tests;  ///< how often each test of the rule spoke for a keyframe
+  double readout = 0, depth_time_offset = 0;  ///< [s] the camera's, or as learnt by now (Options::timing)
   long features_removed = 0;                  ///< features that the filter kept from tracking
   std::string detector = "none";              ///< kinds, joined by +
   double detector_rate_hz = 0;                ///< answers of the slow detector per second of the sequence

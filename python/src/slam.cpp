@@ -286,6 +286,8 @@ py::dict statistics(const PySlam& slam) {
   d["features_removed"] = s.features_removed;
   d["keyframe_rules"] = s.keyframe_rules;
   d["keyframe_tests"] = s.keyframe_tests;
+  d["readout"] = s.readout;
+  d["depth_time_offset"] = s.depth_time_offset;
   d["detector"] = s.detector;
   d["detector_rate_hz"] = s.detector_rate_hz;
   d["detector_inference"] = s.detector_inference;
