@@ -160,6 +160,8 @@ void Pipeline::collect_times() {
     s.points_fused = report.points_fused;
     s.points_retracted = report.points_retracted;
     s.keyframes_culled = report.keyframes_culled;
+    s.readout = timing_.camera().readout;
+    s.depth_time_offset = timing_.camera().depth_time_offset;
     s.detector = scenes_.detector_kind();
     s.detector_rate_hz = scenes_.detector_rate_hz();
     s.detector_latency_frames = scenes_.detector_latency();

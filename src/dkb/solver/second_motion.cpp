@@ -226,9 +226,9 @@ uint8_t of_most_surface(const TwoMotions& both, const std::vector<Match>& matche
 
 }  // namespace
 
-std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
-                                                  std::span<const PoseObservation> observations, int min_still,
-                                                  const PosePrior* expected) {
+std::optional<SecondMotion> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
+                                          std::span<const PoseObservation> observations, int min_still,
+                                          const PosePrior* expected) {
   const std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
   if (matches.size() < std::max(static_cast<size_t>(min_still), 2 * kNeighbours)) return std::nullopt;
   std::vector<Labels> ways = near_and_far(matches);
@@ -248,19 +248,24 @@ std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, con
     measured += both->label[i] == of_camera && observations[matches[i].observation].depth > 0;
   const double still = both->count(of_camera);
   if (still < min_still || measured < std::min(still / 2, static_cast<double>(min_still))) return std::nullopt;
-  const auto unexpected = [&](const Vector6d& motion) {
+  const auto squared_distance = [&](const Vector6d& motion) {
     if (expected == nullptr) return 0.0;
     const Vector6d d = tangent_from_rigid3(cam_from_world * expected->cam_from_world.inverse()) - motion;
-    return (kStudentFreedom + 6) * std::log1p(d.dot(expected->information * d) / kStudentFreedom);
+    return d.dot(expected->information * d);
+  };
+  const auto unexpected = [&](const Vector6d& motion) {
+    return (kStudentFreedom + 6) * std::log1p(squared_distance(motion) / kStudentFreedom);
   };
   const Labels one(matches.size(), 0);
   const Vector6d motion_of_one = problem.fit({one, 0}, Vector6d::Zero(), 4);
   const double cost_of_one = problem.cost({one, 0}, motion_of_one) + unexpected(motion_of_one);
   const double cost_of_two = both->cost + kMoves * both->count(1 - of_camera) + unexpected(both->motion[of_camera]);
   if (cost_of_two >= cost_of_one) return std::nullopt;
-  std::vector<uint8_t> moves(observations.size(), 0);
-  for (size_t i = 0; i < matches.size(); ++i) moves[matches[i].observation] = both->label[i] != of_camera;
-  return moves;
+  SecondMotion second{std::vector<uint8_t>(observations.size(), 0), 0};
+  for (size_t i = 0; i < matches.size(); ++i) second.moves[matches[i].observation] = both->label[i] != of_camera;
+  if (expected != nullptr)
+    second.expected_weight = (kStudentFreedom + 6) / (kStudentFreedom + squared_distance(both->motion[of_camera]));
+  return second;
 }
 
 }  // namespace dkb

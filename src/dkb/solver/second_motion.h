@@ -18,6 +18,11 @@ inline double surface_around(double depth) {
   return depth * depth;
 }
 
+struct SecondMotion {
+  std::vector<uint8_t> moves;  // per observation: 1 = it moves by the motion that is not the camera's
+  double expected_weight = 0;  // of what is expected of the camera, beside what shows its motion: Student's t again
+};
+
 // Whether two motions explain what one pose explains badly: somebody whose points the map holds as still walks off, and
 // a pose between his motion and the camera's keeps most matches within their limits. One match more or less that does
 // not fit says little then, but a body is many that fit each other.
@@ -30,11 +35,10 @@ inline double surface_around(double depth) {
 // shutter in a fast turn look like two motions, but no hand shifts a camera by a decimetre between two frames. The
 // camera's is the one with the most surface. All is linear about the pose.
 //
-// Returns, per observation, 1 = it moves by the motion that is not the camera's; nothing where one motion will do, or
-// where fewer than `min_still` observations would be of the camera's, or an eighth of either, or where of the
-// camera's neither half nor `min_still` have a depth of their own. Deterministic.
-std::optional<std::vector<uint8_t>> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
-                                                  std::span<const PoseObservation> observations, int min_still,
-                                                  const PosePrior* expected = nullptr);
+// Nothing where one motion will do, or where fewer than `min_still` observations would be of the camera's, or an eighth
+// of either, or where of the camera's neither half nor `min_still` have a depth of their own. Deterministic.
+std::optional<SecondMotion> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
+                                          std::span<const PoseObservation> observations, int min_still,
+                                          const PosePrior* expected = nullptr);
 
 }  // namespace dkb

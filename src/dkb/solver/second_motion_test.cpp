@@ -60,7 +60,9 @@ struct BodyInRoom {
     return (centre_in_world(pose.cam_from_world) - centre_in_world(cam_from_world)).norm();
   }
   std::optional<std::vector<uint8_t>> look(const PosePrior* expected = nullptr) const {
-    return second_motion(camera, estimate().cam_from_world, observations, 20, expected);
+    auto second = second_motion(camera, estimate().cam_from_world, observations, 20, expected);
+    if (!second) return std::nullopt;
+    return std::move(second->moves);
   }
   // Shares of the room's and of the body's matches that are said to move.
   std::pair<double, double> moving(const std::vector<uint8_t>& moves) const {
@@ -149,6 +151,18 @@ TEST(SecondMotion, ThatIsPlainIsBelievedThoughItIsNotExpected) {
     const PosePrior along_with_him = expectation(scene.estimate().cam_from_world, 0.00001);
     EXPECT_TRUE(scene.look(&along_with_him)) << seed;
   }
+}
+
+TEST(SecondMotion, SaysHowMuchTheExpectationWeighs) {
+  const BodyInRoom scene({});
+  const Rigid3 between = scene.estimate().cam_from_world;
+  const auto weight = [&](const PosePrior* expected) {
+    return second_motion(scene.camera, between, scene.observations, 20, expected).value().expected_weight;
+  };
+  const PosePrior right = expectation(scene.cam_from_world, 0.01), wrong = expectation(between, 0.00001);
+  EXPECT_GT(weight(&right), 1.0);  // 10 / (4 + d^2)
+  EXPECT_LT(weight(&wrong), 0.01);
+  EXPECT_EQ(weight(nullptr), 0.0);
 }
 
 TEST(SecondMotion, LeavesEnoughForThePose) {

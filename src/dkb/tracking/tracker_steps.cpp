@@ -132,15 +132,21 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     const PosePrediction pose = pose_after(*step);
     expected = {pose.cam_from_world, inverse(pose.covariance)};
   }
-  const auto moves = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers,
-                                   expected ? &*expected : nullptr);
-  if (!moves) return;
+  const auto second = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers,
+                                    expected ? &*expected : nullptr);
+  if (!second) return;
+  const std::vector<uint8_t>& moves = second->moves;
   TrackedFrame by_still = frame;
-  by_still.inliers = static_cast<int>(std::count(moves->begin(), moves->end(), 0));
-  if (by_still.predicted) by_still.predicted->weighs = false;  // the surfaces that it comes from are his as well
+  by_still.inliers = static_cast<int>(std::count(moves.begin(), moves.end(), 0));
+  // The surfaces that tell the step are his as well. The motion so far holds what the rest leaves open.
+  by_still.predicted.reset();
+  if (expected)
+    by_still.predicted = {.cam_from_world = expected->cam_from_world,
+                          .covariance = inverse(second->expected_weight * expected->information),
+                          .weighs = true};
   for (size_t i = 0; i < matched.size(); ++i) {
-    by_still.points[matched[i]] = (*moves)[i] ? kNoPoint : frame.matched[matched[i]];
-    by_still.outlier[matched[i]] = (*moves)[i];
+    by_still.points[matched[i]] = moves[i] ? kNoPoint : frame.matched[matched[i]];
+    by_still.outlier[matched[i]] = moves[i];
   }
   // So are some of the points that are followed from frame to frame: those that fit are the room's.
   const auto followed =
