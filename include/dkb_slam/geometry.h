@@ -52,8 +52,7 @@ struct DKB_SLAM_API Camera {
   double depth_factor = 5000.0;           ///< [units per metre] of integer depth images, > 0
   double fps = 0;                         ///< [1/s] nominal frame rate; 0 = as the first five stamps say
   double readout = 0.0;                   ///< [s] rolling shutter, first to last row's exposure; 0 = unknown or none
-  double depth_time_offset =
-      0.0;  ///< [s] added to a depth image's stamp: when the colour camera saw the same; 0 = unknown or none
+  double depth_time_offset = 0.0;         ///< [s] to add to depth stamps: when the colour camera saw it; 0 = unknown
   double depth_min = 0.2, depth_max = 10.0;  ///< [m] depth outside is taken for missing
 
   /// A camera that is known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Throws InputError naming the
