@@ -12,7 +12,7 @@ namespace dkb {
 namespace {
 
 // [s] Colour camera of the first Kinect and its kin. Learnt from TUM fr1_xyz and fr1_rpy it is 19 to 25 ms
-// (ReadoutCalibration); Ringaby and Forssen (ICCV 2011) measured 26 ms with a rig.
+// (TimingCalibration); Ringaby and Forssen (ICCV 2011) measured 26 ms with a rig.
 constexpr double kKinectReadout = 0.0235;
 // [s] Its depth images, as TUM's recordings stamp them, show what the colour camera saw so long before: where surfaces
 // seen at different times agree best, by our poses, in freiburg1_xyz and freiburg1_rpy (docs/method.md).
