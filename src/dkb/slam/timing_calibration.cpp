@@ -32,7 +32,7 @@ struct DelayEquations {
   }
 };
 
-// [1/px] Of the depth where a corner lies [m/px], along columns and rows; nothing where the surface is not flat there.
+// [m/px] Of the depth where a corner lies, along columns and rows; nothing where the surface is not flat there.
 std::optional<Eigen::Vector2d> slope_at(const DepthImage& depth, const Eigen::Vector2f& pixel,
                                         const SensorNoise& noise) {
   const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
@@ -50,9 +50,9 @@ TimingCalibration::TimingCalibration(const Optics& optics, bool learn_readout, b
     : optics_(optics) {
   const double most = longest(optics.camera), usual = 12 / (most * most);  // of what is as likely anywhere in `most`
   Camera& camera = optics_.camera;
-  readout_ = {camera.readout > 0 || !learn_readout, 0, most, most / 2, usual};
-  depth_offset_ = {camera.depth_time_offset != 0 || !learn_depth_offset, -most, most, 0, usual};
-  if (!readout_.known) camera.readout = readout_.value;
+  readout_ = {camera.readout > 0 || !learn_readout, 0, most, usual};
+  depth_offset_ = {camera.depth_time_offset != 0 || !learn_depth_offset, -most, most, usual};
+  if (!readout_.known) camera.readout = most / 2;
 }
 
 void TimingCalibration::add(const TrackedFrame& frame, const DepthImage& depth, const Vector6d& velocity,
@@ -94,18 +94,16 @@ void TimingCalibration::add(const TrackedFrame& frame, const DepthImage& depth, 
   }
   if (matches < kMinMatches) return;
   if (!(spectrum(pose_pose).values[0] > 0)) return;
-  const auto learn = [&](const DelayEquations& told, Delay& delay) {
+  const auto learn = [&](const DelayEquations& told, Delay& delay, double& value) {
     if (delay.known) return;
     const Vector6d explained = solve_symmetric(pose_pose, told.with_pose);
     const double gradient = (told.gradient - explained.dot(pose_gradient)) / kTogether;
     delay.information += std::max(0.0, told.square - explained.dot(told.with_pose)) / kTogether;
     delay.information = std::min(delay.information, 1 / (kSurest * kSurest));
-    delay.value = std::clamp(delay.value + gradient / delay.information, delay.smallest, delay.largest);
+    value = std::clamp(value + gradient / delay.information, delay.smallest, delay.largest);
   };
-  learn(rows, readout_);
-  learn(depths, depth_offset_);
-  camera.readout = readout_.known ? camera.readout : readout_.value;
-  camera.depth_time_offset = depth_offset_.known ? camera.depth_time_offset : depth_offset_.value;
+  learn(rows, readout_, camera.readout);
+  learn(depths, depth_offset_, camera.depth_time_offset);
 }
 
 }  // namespace dkb

@@ -32,10 +32,9 @@ class TimingCalibration {
            const std::vector<std::optional<Eigen::Vector3d>>& positions);
 
  private:
-  struct Delay {
+  struct Delay {  // its value is the camera's
     bool known;
     double smallest, largest;  // [s] that are believed in; beforehand each between is as likely
-    double value;              // [s]
     double information;        // [1/s^2]
   };
 

@@ -112,6 +112,8 @@ class Tracker {
   bool possible_motion(const Rigid3& cam_from_world, double timestamp) const;
   bool plausible_motion(const Rigid3& cam_from_world, double timestamp) const;
   PosePrediction pose_after(const MotionPrior& step) const;  // since the last frame
+  // By the velocity alone; nothing where none is known.
+  std::optional<PosePrediction> pose_by_velocity(double timestamp) const;
   std::optional<PosePrediction> predict(const TrackingInput& input) const;
   void go_on_unseen(const std::optional<PosePrediction>& prediction, const MotionPrior* told, TrackedFrame& frame);
   double reach_px(double radius, const Matrix6d& covariance) const;

@@ -56,6 +56,12 @@ PosePrediction Tracker::pose_after(const MotionPrior& step) const {
   return {whole.previous_from_current.inverse(), whole.covariance};
 }
 
+std::optional<PosePrediction> Tracker::pose_by_velocity(double timestamp) const {
+  const auto step = velocity_ ? expected_step(timestamp, nullptr) : std::nullopt;
+  if (!step) return std::nullopt;
+  return pose_after(*step);
+}
+
 std::optional<PosePrediction> Tracker::predict(const TrackingInput& input) const {
   if (input.step == nullptr || !last_ || last_->index + 1 != input.index || state_ == TrackingState::lost)
     return std::nullopt;

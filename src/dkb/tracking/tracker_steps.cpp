@@ -128,10 +128,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     observations.push_back(pose_observation(frame.features->keypoints[f], frame.matched_in_world[f], optics_));
   }
   std::optional<PosePrior> expected;
-  if (const auto step = velocity_ ? expected_step(frame.timestamp, nullptr) : std::nullopt) {
-    const PosePrediction pose = pose_after(*step);
-    expected = {pose.cam_from_world, inverse(pose.covariance)};
-  }
+  if (const auto pose = pose_by_velocity(frame.timestamp)) expected = {pose->cam_from_world, inverse(pose->covariance)};
   const auto second = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers,
                                     expected ? &*expected : nullptr);
   if (!second) return;
@@ -171,8 +168,7 @@ bool Tracker::possible_motion(const Rigid3& cam_from_world, double timestamp) co
 // For what is sought around the last place or from the reference keyframe: somebody before the lens leaves few matches,
 // and some of them may agree on a place where no hand takes a camera.
 bool Tracker::plausible_motion(const Rigid3& cam_from_world, double timestamp) const {
-  if (velocity_)
-    if (const auto step = expected_step(timestamp, nullptr)) return pose_after(*step).agrees(cam_from_world);
+  if (const auto expected = pose_by_velocity(timestamp)) return expected->agrees(cam_from_world);
   return possible_motion(cam_from_world, timestamp);
 }
 
