@@ -241,14 +241,16 @@ TEST_F(PeopleByNetwork, StayOutInRealTime) {
 // What the tests above could not tell from right wiring would make them worthless.
 TEST(PeopleControl, WithoutAFilterTheyBendPosesAndMap) {
   const TempFolder temp;
-  const PeopleRun run(temp / "out", people_detector("nothing"));
+  // Delays that were learnt among people would take up some of their pull.
+  const std::string stamped = "timing.estimate=false";
+  const PeopleRun run(temp / "out", people_detector("nothing"), {"--set", stamped});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
-  EXPECT_GT(run.ape, 0.015) << "[m]; half as much again as a filter may leave";
-  EXPECT_GT(run.online_ape, 0.015);
+  EXPECT_GT(run.ape, 0.02) << "[m]; twice what a filter may leave";
+  EXPECT_GT(run.online_ape, 0.02);
   EXPECT_GT(run.features.leak, 0.2);
   EXPECT_GE(run.map_points_on_people, 40) << "twice what a filter may leave";
   EXPECT_EQ(run.movers.found, 0U);
-  const PeopleRun off(temp / "off", people_detector("boxes"), {"--filter", "none"});
+  const PeopleRun off(temp / "off", people_detector("boxes"), {"--filter", "none", "--set", stamped});
   EXPECT_EQ(read_text(off.out / "features.csv"), read_text(run.out / "features.csv")) << "boxes nobody asked for";
 }
 
