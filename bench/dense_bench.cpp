@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How good the dense map of a simulated sequence is: distance of the mesh to the true still surfaces, and how much of
-// it belongs to people. And pictures of meshes.
+// it belongs to people; which cells of the grid beside it (occupancy.pgm) are free though something stands in them. And
+// pictures of meshes.
 //
 //   dkb-slam simulate --scene crowd --out crowd && dkb-slam run crowd --dense --out run ...
 //   dense_bench run/dense.ply run/trajectory.txt crowd     (the simulator draws scene crowd again, seed 1)
@@ -13,11 +14,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <nanoflann.hpp>
+#include <sstream>
 #include <unordered_set>
 
 #include "dkb/dataset/image_codecs.h"
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/dense/dense_options.h"
 #include "dkb/dense/surface_mesh.h"
 #include "dkb/simulator/simulator.h"
 #include "dkb/util/files.h"
@@ -94,7 +98,66 @@ Rigid3 truth_from_run(const Trajectory& estimated, const Simulator& simulator) {
   return registration(pairs);
 }
 
-void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::string& scene) {
+// What run --dense wrote of a grid. Cells are counted as in the image: row 0 is the largest y.
+OccupancyGrid read_grid(const std::filesystem::path& folder) {
+  OccupancyGrid grid;
+  std::istringstream image(read_file(folder / "occupancy.pgm"));
+  std::string magic;
+  int width = 0, height = 0, largest = 0;
+  image >> magic >> width >> height >> largest;
+  image.get();
+  grid.cells = Image<uint8_t>(width, height);
+  image.read(reinterpret_cast<char*>(grid.cells.data()), static_cast<std::streamsize>(grid.cells.size()));
+  std::string yaml = read_file(folder / "occupancy.yaml");
+  std::replace_if(
+      yaml.begin(), yaml.end(), [](char c) { return c == '[' || c == ']' || c == ','; }, ' ');
+  const auto after = [&](const std::string& key) {
+    return std::istringstream(yaml.substr(yaml.find(key) + key.size()));
+  };
+  after("resolution:") >> grid.cell;
+  after("origin:") >> grid.origin_x >> grid.origin_y;
+  Eigen::Vector3d t;
+  Eigen::Quaterniond q;
+  after("\nfloor_from_world:") >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
+  grid.floor_from_world = Rigid3(q, t);
+  return grid;
+}
+
+void measure_grid(const OccupancyGrid& grid, const Points& still, const Points& people,
+                  const Rigid3& world_from_truth) {
+  constexpr int kStands = 20;    // points of a surface, 6 mm apart, that stand in a cell
+  constexpr double kRim = 0.05;  // [m] by which heights that count as an obstacle's are more or fewer
+  const DenseOptions options;
+  const auto count = [&](const Points& points, double rim) {
+    Image<int> cells(grid.cells.width(), grid.cells.height());
+    for (const Eigen::Vector3f& p : points.at) {
+      const Eigen::Vector3d q = grid.floor_from_world * (world_from_truth * p.cast<double>());
+      const int x = static_cast<int>(std::floor((q.x() - grid.origin_x) / grid.cell));
+      const int y = cells.height() - 1 - static_cast<int>(std::floor((q.y() - grid.origin_y) / grid.cell));
+      const bool high = q.z() > options.obstacle_low - rim && q.z() < options.obstacle_high + rim;
+      if (high && cells.contains(x, y)) ++cells(x, y);
+    }
+    return cells;
+  };
+  const Image<int> inside = count(still, -kRim), around = count(still, kRim), persons = count(people, kRim);
+  int solid = 0, solid_free = 0, occupied = 0, nothing = 0, person = 0;
+  for (size_t i = 0; i < grid.cells.size(); ++i) {
+    const uint8_t cell = grid.cells.data()[i];
+    if (inside.data()[i] >= kStands) ++solid, solid_free += cell == OccupancyGrid::kFree;
+    if (cell != OccupancyGrid::kOccupied) continue;
+    ++occupied;
+    if (around.data()[i] > 0) continue;
+    ++nothing;
+    person += persons.data()[i] > 0;
+  }
+  fmt::print(
+      "{} cells that something stands in, {} of them free; {} occupied, {} of them by nothing that stands still, "
+      "{} by people\n",
+      solid, solid_free, occupied, nothing, person);
+}
+
+void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::string& scene,
+             const std::filesystem::path& folder) {
   SimulatorOptions options;
   options.scene = scene;
   const Simulator simulator(options);
@@ -134,6 +197,8 @@ void measure(const SurfaceMesh& mesh, const Trajectory& estimated, const std::st
              1e3 * percentile(errors, 0.5), 1e3 * percentile(errors, 0.9), 1e3 * percentile(errors, 0.99));
   fmt::print("{:.3f}% more than {:.0f} cm from any still surface; {:.3f}% people\n",
              100 * static_cast<double>(ghosts) / count, 100 * kGhost, 100 * static_cast<double>(person) / count);
+  if (std::filesystem::exists(folder / "occupancy.pgm"))
+    measure_grid(read_grid(folder), still.points, people.points, truth_from_world.inverse());
 }
 
 // The mesh in its colours under a lamp at the eye.
@@ -194,7 +259,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   const dkb::SurfaceMesh mesh = dkb::read_mesh(argv[1]);
-  if (std::string(argv[3]) != "-") dkb::measure(mesh, dkb::read_trajectory(argv[2]), argv[3]);
+  if (std::string(argv[3]) != "-")
+    dkb::measure(mesh, dkb::read_trajectory(argv[2]), argv[3], std::filesystem::path(argv[1]).parent_path());
   if (argc == 4) return 0;
   const auto vector = [&](int at) {
     return Eigen::Vector3f(std::stof(argv[at]), std::stof(argv[at + 1]), std::stof(argv[at + 2]));

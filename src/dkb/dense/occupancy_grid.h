@@ -13,9 +13,10 @@
 
 namespace dkb {
 
-// Occupied: at least three vertices of the mesh between obstacle_low and obstacle_high above the floor; or a drop: no
-// vertex within obstacle_low of the floor, and at least three rays below it that end deeper than obstacle_low.
-// Free: seen through below obstacle_high by some view, or floor, and not occupied. Empty when nothing was seen.
+// Occupied: something was measured between obstacle_low and obstacle_high above the floor, over 0.2 s at least, and was
+// not seen through more often since (unknown when for less); or a drop: more rays, and at least three, are below the
+// floor than end on it. Free: seen through between these heights by some view, or floor, and not occupied. Empty when
+// there is no mesh. `views` by increasing time.
 OccupancyGrid make_occupancy_grid(const SurfaceMesh& mesh, std::span<const PlacedView> views, const ViewCamera& camera,
                                   const Rigid3& floor_from_world, const DenseOptions& options);
 

@@ -302,7 +302,7 @@ void Options::check() const {
                  features.fast_threshold, "at least features.fast_threshold_min");
   require_option(dense.truncation >= 2 * dense.voxel && dense.truncation <= 20 * dense.voxel, "dense.truncation",
                  dense.truncation, "2 ... 20 times dense.voxel");
-  // A wall of coarser voxels has not the vertices in every cell that make it an obstacle.
+  // Rays of a view would pass between the points of a wall whose cells are as narrow as what lies between these.
   require_option(dense.grid_cell >= 2 * dense.voxel, "dense.grid_cell", dense.grid_cell,
                  "at least 2 times dense.voxel");
   require_option(dense.obstacle_high > dense.obstacle_low, "dense.obstacle_high", dense.obstacle_high,
