@@ -28,7 +28,7 @@ struct TrackingOptions {
   int initial_points = 100;  // features with depth that the first frame of a map needs, >= 10
   int min_inliers = 20;      // inliers of the final pose; fewer: lost, >= 6
   double close_depth = 6.0;  // [m] depths below make map points at once, > 0
-  double new_map_after = 1;  // [s] lost in a row, each frame good enough to start a map, until one is; 0 = never
+  double new_map_after = 1;  // [s] lost in frames good enough to start a map, until one is; 0 = never
 };
 
 // A map point where a pose puts it.
@@ -119,6 +119,7 @@ class Tracker {
   double reach_px(double radius, const Matrix6d& covariance) const;
   std::vector<double> widening_radii(const Matrix6d& covariance) const;
   std::optional<PoseProposal> find_near(const PosePrediction& expected, const MatchableFeatures& features) const;
+  std::optional<PoseProposal> find_where_lost(const TrackedFrame& frame) const;
   bool relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected);
   bool confirm_relocalisation(TrackedFrame& frame, const TrackingInput& input);
   Rigid3 express_anew(PosedFrame& frame) const;
@@ -157,10 +158,11 @@ class Tracker {
   std::optional<VelocityFilter> velocity_;   // nothing while nobody knows it
   double last_seen_ = 0;                     // [s] when the images told the pose last
   std::optional<PosePrediction> suggested_;  // by the user
-  std::optional<double> lost_since_;         // [s] the first frame in a row that could have started a map
-  std::vector<Candidate> candidates_;        // from the view, then of provisional points; either by increasing id
-  size_t from_view_ = 0;                     // of these, the first
-  std::optional<double> candidates_made_;    // [s] nothing = the view is newer
+  std::optional<double> lost_since_;   // [s] by frames that could have started a map; later for those that could not
+  std::optional<double> lost_at_;      // [s] the last frame of those in a row that showed nothing of the map
+  std::vector<Candidate> candidates_;  // from the view, then of provisional points; either by increasing id
+  size_t from_view_ = 0;               // of these, the first
+  std::optional<double> candidates_made_;  // [s] nothing = the view is newer
 };
 
 }  // namespace dkb

@@ -169,10 +169,35 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
   return std::nullopt;
 }
 
+// A camera that was lost a moment ago still looks at what it saw last, if it may not have gone farther since than
+// cameras that show the same are apart. What vouches for a frame that is followed is enough there; the next frame
+// confirms it.
+std::optional<PoseProposal> Tracker::find_where_lost(const TrackedFrame& frame) const {
+  if (state_ != TrackingState::lost || !last_) return std::nullopt;
+  const double seconds = frame.timestamp - last_->timestamp;
+  const PosePrediction near{last_->cam_from_world,
+                            last_->covariance + seconds * seconds * VelocityFilter{}.covariance(0, seconds)};
+  if (3 * std::sqrt(near.covariance.diagonal().head<3>().maxCoeff()) > kMaxViewDistance) return std::nullopt;
+  const auto right = [&](const PlaceFit& fit) {
+    return fit.inliers >= options_.min_inliers && near.agrees(fit.cam_from_world);
+  };
+  auto shown =
+      fit_by_descriptors(points_shown_last(), frame.matchable(), optics_, options_.min_inliers, {.seed = seed_});
+  if (shown && right(*shown)) {
+    PoseProposal found;
+    found.fit = std::move(*shown);
+    return found;
+  }
+  if (map_.view().live_keyframe(last_->reference) == nullptr) return std::nullopt;
+  auto found = relocaliser_.propose_from(map_.view(), last_->reference, frame.matchable(), retracted_);
+  if (found && right(found->fit)) return found;
+  return std::nullopt;
+}
+
 void Tracker::suggest(const PosePrediction& pose) {
   reset_motion();
   unconfirmed_.reset();
-  lost_since_.reset();
+  lost_since_.reset(), lost_at_.reset();
   suggested_ = pose;
 }
 

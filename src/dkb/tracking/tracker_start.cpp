@@ -19,8 +19,11 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
   int with_depth = 0;
   for (size_t f = 0; f < frame.features->size(); ++f)
     with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
+  const double since_last = lost_at_ ? frame.timestamp - *lost_at_ : 0;
+  lost_at_ = frame.timestamp;
   if (with_depth < options_.initial_points) {
-    lost_since_.reset();  // what cannot start a map says nothing of whether the old one is in sight
+    // What cannot start a map says nothing of whether the old one is in sight: its time does not count.
+    if (lost_since_) *lost_since_ += since_last;
     return false;
   }
   // Nothing followed from the map's first frame: the map begins again, without what that frame made.
