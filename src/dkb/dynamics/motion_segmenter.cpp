@@ -130,8 +130,15 @@ void MotionSegmenter::observe(const RgbdImage& image, double depth_time, const R
     throw InputError("motion segmentation: the depth image is " + std::to_string(image.depth.width()) + " x " +
                      std::to_string(image.depth.height()) + ", the camera " + std::to_string(camera_.width) + " x " +
                      std::to_string(camera_.height) + "; give images of the camera's size");
-  if (!current_) current_ = take_spare(spare_);
   image_time_ = image.timestamp;
+  aligned_step_.reset();
+  has_depth_ = std::any_of(image.depth.data(), image.depth.data() + image.depth.size(), [](float z) { return z > 0; });
+  if (!has_depth_) {
+    if (current_) spare_ = std::move(current_);
+    if (previous_) depth_from_colour_ = previous_->cam_from_world * cam_from_world_expected.inverse();
+    return;
+  }
+  if (!current_) current_ = take_spare(spare_);
   current_->set_depth(image.depth, rays_, simd_);
   current_->time = depth_time;
   depth_from_colour_ = depth_cam_from_cam(cam_from_world_expected);
@@ -175,7 +182,6 @@ void MotionSegmenter::find_velocity() {
 // The velocity does not last: what a hand changes it by between slow frames is more than the comparison forgives. The
 // surfaces of the frame before tell where the camera is.
 void MotionSegmenter::find_pose(const Matrix6d& step_covariance) {
-  aligned_step_.reset();
   if (!previous_ || !(current_->time > previous_->time)) return;
   aligned_step_ =
       alignment_.align(*current_, *previous_, rays_,
@@ -392,10 +398,12 @@ MoverMask MotionSegmenter::mask() {
   MoverMask result;
   result.cell = rays_.cell();
   result.cells = Image<uint8_t>(rays_.width(), rays_.height());
+  const MotionDepthGrid* const known = has_depth_ ? current_.get() : previous_.get();
+  if (known == nullptr || image_time_ - known->time > kLongAgo) return result;
   const auto threshold = static_cast<float>(options_.threshold);
-  rays_.project(current_->depth, kTooNear, depth_from_colour_, rays_.all_cells(), projection_, simd_);
+  rays_.project(known->depth, kTooNear, depth_from_colour_, rays_.all_cells(), projection_, simd_);
   run_vectorised(simd_, [threshold, count = result.cells.size(), cells = projection_.cell.data(),
-                         score = current_->score.data(), marked = result.cells.data()]() DKB_KERNEL_BODY {
+                         score = known->score.data(), marked = result.cells.data()]() DKB_KERNEL_BODY {
     DKB_INDEPENDENT_STEPS
     for (size_t i = 0; i < count; ++i) {
       const int32_t cell = cells[i];
@@ -408,6 +416,7 @@ MoverMask MotionSegmenter::mask() {
 
 StillCells MotionSegmenter::still() const {
   StillCells still{rays_.cell(), {}};
+  if (!has_depth_) return still;
   const Image<float>& scores = score();
   still.kinds = Image<uint8_t>(scores.width(), scores.height());
   run_vectorised(simd_, [n = scores.size(), score = scores.data(), there = still_.data(),
@@ -435,9 +444,15 @@ void MotionSegmenter::take_bodies(const MoverMask& bodies) {
 }
 
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool guessed) {
-  if (!current_) return;
+  if (!current_ && !previous_) return;
   if (!cam_from_world) {
     reset();
+    return;
+  }
+  if (!current_) {
+    last_ = Stamped{image_time_, *cam_from_world};
+    guessing_ = guessed;
+    if (!guessed) told_ = previous_->time;
     return;
   }
   current_->cam_from_world = depth_cam_from_cam(*cam_from_world) * *cam_from_world;

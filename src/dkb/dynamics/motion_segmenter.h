@@ -35,8 +35,9 @@ class MotionSegmenter {
                   Simd simd = best_simd());
 
   // `depth_time` [s]: when the colour camera saw what the depth image shows.
-  // An error of the pose of some mm and 0.3 degrees does no harm. `step_covariance`: how far the motion since the frame
-  // before may be from what is expected (as MotionPrior's). Throws InputError when the depth image is not of the
+  // An image without any depth tells nothing: what moved in the one before it, not long ago, is where it would be seen
+  // now. An error of the pose of some mm and 0.3 degrees does no harm. `step_covariance`: how far the motion since the
+  // frame before may be from what is expected (as MotionPrior's). Throws InputError when the depth image is not of the
   // camera's size.
   void observe(const RgbdImage& image, double depth_time, const Rigid3& cam_from_world_expected,
                const Matrix6d& step_covariance);
@@ -106,6 +107,7 @@ class MotionSegmenter {
   Rigid3 depth_from_colour_;     // of the image last given: cameras at the stamps of its depth and colour
   std::optional<Stamped> last_;  // colour image last committed
   double image_time_ = 0;
+  bool has_depth_ = true;  // the image last given
   double told_ = 0;        // [s] depth stamp of the last image committed with a pose that images told
   bool guessing_ = false;  // the pose committed last was a guess
   std::optional<MotionPrior> aligned_step_;

@@ -9,11 +9,13 @@ namespace dkb {
 
 // One frame, as in DKB section 3: features, what moves, pose, keyframe decision. Mapping happens beside it.
 FrameResult Pipeline::process(const Frame& given) {
-  const Frame frame = priors_.calibrated(given);
+  const Frame frame = repeated_depth_.left_out(priors_.calibrated(given));
   last_stamp_ns_ = frame.stamp_ns();
   rate_.add(last_stamp_ns_);
   if (std::string doubt = stamp_doubt_.add(last_stamp_ns_); !doubt.empty())
     note(Event::Kind::warning, std::move(doubt));
+  if (std::string warning = repeated_depth_.take_warning(); !warning.empty())
+    note(Event::Kind::warning, std::move(warning));
   if (load_) shed_load();
   FrameResult result;
   const Stopwatch whole;

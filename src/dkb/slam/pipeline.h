@@ -23,6 +23,7 @@
 #include "dkb/slam/options.h"
 #include "dkb/slam/prior_calibration.h"
 #include "dkb/slam/timing_calibration.h"
+#include "dkb/slam/repeated_depth.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
 #include "dkb/slam/stamp_doubt.h"
@@ -123,6 +124,7 @@ class Pipeline {
   // What the next frame needs of the one before.
   FrameRate rate_;
   StampDoubt stamp_doubt_;
+  RepeatedDepth repeated_depth_;
   FrameIndex next_frame_ = 0;
   int64_t last_stamp_ns_ = 0;
   int frames_before_map_ = 0;
