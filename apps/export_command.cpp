@@ -57,9 +57,7 @@ void run_export(const ExportArguments& arguments) {
     return;
   }
   const Trajectory trajectory = read_poses(fs::is_directory(results) ? results / "trajectory.txt" : results);
-  write_file_atomically(out, arguments.format == "tum"     ? trajectory_to_text(trajectory)
-                             : arguments.format == "kitti" ? trajectory_to_kitti(trajectory)
-                                                           : trajectory_to_euroc(trajectory));
+  write_file_atomically(out, trajectory_to_text(trajectory, trajectory_format_named(arguments.format, "--format")));
   tell(stdout, "{}\n", with_left_out(arguments.out, trajectory.size(), results));
 }
 

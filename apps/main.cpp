@@ -76,7 +76,8 @@ int run_command_line(int argc, char** argv) {
     std::reverse(words.begin(), words.end());  // as CLI11 wants them
     app.parse(words);
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
+    const bool help = e.get_exit_code() == 0;  // or the version
+    if (help && !dkb::asks_for_unknown_command(app)) return app.exit(e);
     print_error(dkb::usage_error(app, e));
     return kBadInput;
   } catch (const dkb::InterruptedError& e) {

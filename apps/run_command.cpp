@@ -26,7 +26,9 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
                    "key=value, any setting of config.yaml, or experiment.NAME=value; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--out", args->out, "Folder for the results (default: dkb-out/NAME-TIME)");
-  command->add_option("--seed", args->seed, "Seed of every source of randomness")
+  command
+      ->add_option("--seed", args->seed,
+                   "Seed of the few random draws; results hardly ever depend on it. Runs that differ: --skip-pairs")
       ->transform(whole_number<uint64_t>())
       ->each(given(&RunArguments::has_seed));
   DetectorChoice& detection = args->detection;
@@ -46,9 +48,12 @@ void add_options(CLI::App* command, const std::shared_ptr<RunArguments>& args) {
       ->transform(whole_number(1, 10000));
   command->add_option("--boxes", detection.boxes, "For --detector file: stamp class x y w h [score] per line");
   command->add_option("--masks", detection.masks, "Folder of masks STAMP.png, above 0 = mover");
-  command->add_option("--filter", args->filter, "default, paper, box, epipolar, multiview, none");
+  command->add_option("--filter", args->filter,
+                      "default, paper, box, epipolar, multiview, none; default alone writes rows of movers.csv");
   command->add_option("--disable", args->disable, "Parts to switch off, by comma: dr, kf, ba, loop");
-  command->add_option("--skip-pairs", reading.skip_pairs, "Pairs left out at the beginning, before all else")
+  command
+      ->add_option("--skip-pairs", reading.skip_pairs,
+                   "Pairs left out at the beginning, before all else: 0, 1, 2 ... give runs that differ")
       ->transform(whole_number<int64_t>());
   command->add_option("--start", reading.start, "[s] after the first pair");
   command->add_option("--end", reading.end, "[s] after the first pair");

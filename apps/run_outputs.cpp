@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 
 #include "dkb/dataset/trajectory_file.h"
 #include "dkb/map/point_cloud.h"
+#include "dkb/sources/source_registry.h"
 #include "dkb/util/files.h"
 #include "dkb/util/plural.h"
 #include "dkb/util/stamps.h"
@@ -23,6 +25,33 @@
 
 namespace dkb {
 namespace {
+
+// What every run writes, and what only some do.
+constexpr const char* kAlways[] = {
+    "trajectory.txt", "trajectory_online.txt", "keyframes.txt", "config.yaml", "stats.json", "report.html"};
+constexpr const char* kSometimes[] = {"map.dkb",        "map.ply",      "dense.ply",    "occupancy.pgm",
+                                      "occupancy.yaml", "session.dkbs", "features.csv", "detections.txt",
+                                      "debug.log",      "movers.csv",   "cv_orb.json"};
+
+// A new folder: of runs that start in one second each has its own.
+std::filesystem::path default_output(const std::filesystem::path& source) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  localtime_r(&now, &parts);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
+  const std::filesystem::path all = "dkb-out";
+  make_output_folder(all);
+  const std::string name = source_name(source) + "-" + stamp;
+  for (int i = 1;; ++i) {
+    const std::filesystem::path own = all / (i == 1 ? name : fmt::format("{}-{}", name, i));
+    std::error_code error;
+    if (std::filesystem::create_directory(own, error)) return own;
+    if (!error) continue;
+    make_output_folder(own);  // says why it cannot be
+    return own;
+  }
+}
 
 double peak_rss_mb() {
   std::ifstream status("/proc/self/status");
@@ -129,6 +158,30 @@ std::string stats_json(const Statistics& s, const RunFacts& facts) {
 
 }  // namespace
 
+std::string source_name(const std::filesystem::path& source) {
+  if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
+  const std::filesystem::path whole =
+      std::filesystem::absolute(source).lexically_normal();  // "." and ".." are no names
+  const std::filesystem::path name = whole.filename().empty() ? whole.parent_path().filename() : whole.filename();
+  return (std::filesystem::is_regular_file(source) ? name.stem() : name).string();
+}
+
+std::filesystem::path make_results_folder(const std::string& out, const std::filesystem::path& source) {
+  const std::filesystem::path folder = out.empty() ? default_output(source) : std::filesystem::path(out);
+  std::error_code none;
+  if (std::filesystem::equivalent(folder, source, none))
+    throw InputError("--out " + folder.string() + ": is the folder of the source; choose another");
+  make_output_folder(folder);
+  const auto refuse = [&](const char* name) {
+    if (std::filesystem::is_directory(folder / name, none))
+      throw InputError((folder / name).string() +
+                       ": is a folder, where runs write a file; remove it, or choose another --out");
+  };
+  for (const char* name : kAlways) refuse(name);
+  for (const char* name : kSometimes) refuse(name);
+  return folder;
+}
+
 double seconds_since_process_start() {
   std::ifstream stat("/proc/self/stat");
   std::string line;
@@ -168,8 +221,7 @@ void write_statistics(const std::filesystem::path& folder, const Slam& slam, con
 
 void remove_earlier_outputs(const std::filesystem::path& folder, const std::set<std::string>& written) {
   std::error_code ignored;
-  for (const std::string name : {"map.dkb", "map.ply", "dense.ply", "occupancy.pgm", "occupancy.yaml", "session.dkbs",
-                                 "features.csv", "detections.txt", "debug.log", "movers.csv", "cv_orb.json"}) {
+  for (const std::string name : kSometimes) {
     if (!written.contains(name)) std::filesystem::remove(folder / name, ignored);
     std::filesystem::remove(folder / (name + kUnfinished), ignored);
   }

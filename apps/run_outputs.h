@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dkb/dataset/trajectory_file.h"
+#include "dkb/util/errors.h"
 #include "dkb/util/timing.h"
 #include "dkb_slam/slam.h"
 
@@ -27,6 +28,25 @@ struct RunFacts {
   bool writes_map = true;
   std::optional<int> dropped;  // of `skipped`, in real time: those for which there was no time
 };
+
+// Of a folder, a recording or the kind of a device, without the way there.
+std::string source_name(const std::filesystem::path& source);
+
+// The folder of a run's results: `out`, or a new one below dkb-out that is named by the source and the time. It exists
+// then, and files can be written there: throws InputError, also where a folder has the name of a file that runs write.
+std::filesystem::path make_results_folder(const std::string& out, const std::filesystem::path& source);
+
+// Does work that writes results, after a run that began well: what then cannot be written is no bad input.
+template <class Work>
+void write_results(const Work& work) {
+  try {
+    work();
+  } catch (const OutputError&) {
+    throw;
+  } catch (const InputError& e) {
+    throw OutputError(e.what());
+  }
+}
 
 // Seconds since this process was started, by the kernel's account.
 double seconds_since_process_start();

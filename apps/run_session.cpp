@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iterator>
@@ -39,33 +38,6 @@
 namespace dkb {
 namespace fs = std::filesystem;
 namespace {
-
-std::string source_name(const fs::path& source) {
-  if (is_live(source.string())) return source.string().substr(0, source.string().find(':'));
-  const fs::path whole = fs::absolute(source).lexically_normal();  // "." and ".." are no names
-  const fs::path name = whole.filename().empty() ? whole.parent_path().filename() : whole.filename();
-  return (fs::is_regular_file(source) ? name.stem() : name).string();
-}
-
-// A new folder: of runs that start in one second each has its own.
-fs::path default_output(const fs::path& source) {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  localtime_r(&now, &parts);
-  char stamp[32];
-  std::strftime(stamp, sizeof stamp, "%Y%m%d-%H%M%S", &parts);
-  const fs::path all = "dkb-out";
-  make_output_folder(all);
-  const std::string name = source_name(source) + "-" + stamp;
-  for (int i = 1;; ++i) {
-    const fs::path own = all / (i == 1 ? name : fmt::format("{}-{}", name, i));
-    std::error_code error;
-    if (fs::create_directory(own, error)) return own;
-    if (!error) continue;
-    make_output_folder(own);  // says why it cannot be
-    return own;
-  }
-}
 
 // Where the setting that a message begins with was given, to stand before the message; empty for a default.
 std::string place_of(const RunArguments& args, const std::string& message) {
@@ -243,12 +215,9 @@ RunSession::RunSession(const RunArguments& args)
   slam_->localize_only(args.localize);
   slam_->explain_keyframes(args.debug_log || args.viewer.on || args.viewer.record);
   made_.note(args.out.empty() ? "dkb-out" : args.out);
-  out_ = args.out.empty() ? default_output(args.source) : fs::path(args.out);
+  out_ = make_results_folder(args.out, args.source);
   if (args.out.empty()) made_.add(out_);
-  std::error_code none;
-  if (fs::equivalent(out_, args.source, none))
-    throw InputError("--out " + out_.string() + ": is the folder of the source; choose another");
-  make_output_folder(out_);
+  lock_.emplace(out_);
   if (!args.quiet) tell(stdout, "{}, results in {}\n", recording_->description(), out_.string());
 
   facts_.writes_map = !args.localize;
@@ -286,7 +255,8 @@ int RunSession::run() {
   const double seconds = wall.ms() / 1000 - (viewer_ ? viewer_->paused_s() : 0);
   progress_->finish();
   source_->stop();
-  if (!failure_ || slam_->statistics().tracked > 0) attempt([&] { write(seconds); });
+  if (!failure_ || slam_->statistics().tracked > 0) attempt([&] { write_results([&] { write(seconds); }); });
+  lock_.reset();  // a page that is served on does not hold it
   warn_of_unused();
   warnings_.finish();
   if (failure_) std::rethrow_exception(failure_);

@@ -14,6 +14,7 @@
 #include "dkb/detection/boxes_file.h"
 #include "dkb/detection/mask_folder.h"
 #include "dkb/evaluation/trajectory_error.h"
+#include "dkb/util/folder_lock.h"
 #include "dkb/util/log.h"
 #include "dkb/util/new_folder.h"
 #include "dkb/util/timing.h"
@@ -97,6 +98,7 @@ class RunSession {
   std::optional<Slam> slam_;
   NewFolders made_;
   std::filesystem::path out_;
+  std::optional<FolderLock> lock_;  // of it
   std::optional<FrameFiles> files_;
   std::optional<PacedSource> paced_;  // in real time
   Source* source_ = nullptr;          // that frames are taken from

@@ -63,6 +63,14 @@ std::string in_plain_words(const std::string& text) {
 
 }  // namespace
 
+bool asks_for_unknown_command(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  const std::vector<std::string> rest = app.remaining(true);
+  return !command->get_subcommands([](const CLI::App*) { return true; }).empty() && !rest.empty() &&
+         !rest.front().starts_with('-');
+}
+
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* command = &app;
   std::string path = "dkb-slam ";
@@ -73,6 +81,8 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<const CLI::App*> below = command->get_subcommands([](const CLI::App*) { return true; });
   const std::vector<std::string> rest = app.remaining(true);
   const std::string help = "; see " + path + "--help";
+  std::string commands;
+  for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
 
   const auto is_option = [](const std::string& word) { return word.size() > 1 && word[0] == '-'; };
   const auto option = std::find_if(rest.begin(), rest.end(), is_option);
@@ -86,12 +96,11 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   if (!below.empty() && !rest.empty()) {
     std::vector<std::string> known;
     for (const CLI::App* c : below) known.push_back(c->get_name());
-    return "unknown command \"" + rest.front() + "\"" + did_you_mean(rest.front(), known) + help;
+    const std::string near = did_you_mean(rest.front(), known);
+    return "unknown command \"" + rest.front() + "\"" + (near.empty() ? "; commands: " + commands : near) + help;
   }
   if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !below.empty()) {
-    std::string commands;
-    for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
     return "a command is missing: " + commands + help;
   }
   return in_plain_words(error.what()) + help;

@@ -6,6 +6,9 @@
 
 namespace dkb {
 
+// Whether a command is named that does not exist, which asking for help hides.
+bool asks_for_unknown_command(const CLI::App& app);
+
 // What is wrong with the command line, in one line, with the nearest name when one is misspelt.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error);
 

@@ -3,15 +3,18 @@
 
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 
 #include "dkb/evaluation/trajectory_error.h"
 #include "dkb/util/test_data.h"
@@ -156,6 +159,32 @@ SlamRun::SlamRun(const fs::path& dataset, const fs::path& out_folder, const std:
   arguments.insert(arguments.end(), more.begin(), more.end());
   finished = run_program(arguments, -1, environment);
   if (fs::exists(out / "stats.json")) stats = nlohmann::json::parse(read_text(out / "stats.json"));
+}
+
+void pause_ms(int ms) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(ms));
+}
+
+Endless::Endless(const std::filesystem::path& folder) : folder_(folder) {
+  copy_sequence(folder, 20, true);
+  pipe_ = folder / rows_of(folder / "associations.txt")[10][1];
+  std::filesystem::remove(pipe_);
+  if (mkfifo(pipe_.c_str(), 0600) != 0) throw std::runtime_error("no named pipes here");
+}
+
+std::vector<std::string> Endless::run(const std::filesystem::path& out) const {
+  return {"run", folder_.string(), "--out", out.string(), "--detector", "none"};
+}
+
+void Endless::let_go() const {
+  const int fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK);
+  if (fd >= 0) close(fd);
+}
+
+int Endless::hold_up(Program& program) const {
+  int fd = -1;
+  while (fd < 0 && !program.ended()) fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK), pause_ms(5);
+  return fd;
 }
 
 int shell(std::string line) {

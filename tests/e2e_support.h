@@ -59,6 +59,22 @@ std::string no_outside_data(const std::string& name);
 // `own_images`, else links to them.
 void copy_sequence(const std::filesystem::path& folder, int frames, bool own_images);
 
+void pause_ms(int ms);
+
+// A sequence whose tenth image is a named pipe: a run cannot get past it.
+class Endless {
+ public:
+  explicit Endless(const std::filesystem::path& folder);
+  std::vector<std::string> run(const std::filesystem::path& out) const;
+  // Whoever reads the pipe finds an empty file.
+  void let_go() const;
+  // Waits until the run reads the pipe, which it finds open and empty as long as the returned file is open.
+  int hold_up(Program& program) const;
+
+ private:
+  std::filesystem::path folder_, pipe_;
+};
+
 // The exit code of a shell's line, in which `@` stands for the program.
 int shell(std::string line);
 // What such a line prints to standard error where that is a terminal.

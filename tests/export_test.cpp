@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -13,6 +14,8 @@
 #include "dkb/map/map_file.h"
 #include "dkb/recordings/message_stream.h"
 #include "dkb/recordings/ros_messages.h"
+#include "dkb_slam/slam.h"
+#include "dkb_slam/source.h"
 #include "e2e_support.h"
 
 namespace dkb::test {
@@ -71,6 +74,7 @@ TEST_F(Export, ColmapsModelPutsItsPointsWhereItsImagesSeeThem) {
     int id = 0, camera_id = 0;
     double w, x, y, z, tx, ty, tz;
     std::string name;
+    EXPECT_EQ(images[i].find(" -0 "), std::string::npos) << images[i];
     ASSERT_TRUE(head >> id >> w >> x >> y >> z >> tx >> ty >> tz >> camera_id >> name) << images[i];
     EXPECT_TRUE(fs::exists(folder / "colmap" / "images" / name));
     EXPECT_TRUE(fs::exists(folder / "colmap" / "masks" / (name + ".png")));
@@ -93,7 +97,9 @@ TEST_F(Export, ColmapsModelPutsItsPointsWhereItsImagesSeeThem) {
 
 TEST_F(Export, NerfstudiosPosesAreTheKeyframesWithTheAxesOfOpengl) {
   ASSERT_EQ(export_map("nerfstudio", {"--images", sequence().string()}).exit_code, 0);
-  const auto model = nlohmann::json::parse(read_text(folder / "nerfstudio" / "transforms.json"));
+  const std::string text = read_text(folder / "nerfstudio" / "transforms.json");
+  EXPECT_FALSE(std::regex_search(text, std::regex("-0\\.0[,\\s]")));
+  const auto model = nlohmann::json::parse(text);
   std::map<std::string, std::vector<double>> keyframes;
   for (const auto& row : rows_of(run.out / "keyframes.txt")) {
     for (int i = 1; i < 8; ++i) keyframes[row[0]].push_back(std::stod(row[static_cast<size_t>(i)]));
@@ -276,6 +282,35 @@ TEST_F(Export, ResultsBecomeARecordingWithPosesCloudAndPictures) {
   EXPECT_EQ(counts["/features_image/compressed"], kSequenceFrames);
   EXPECT_EQ(counts["/map_points"], 1);
   EXPECT_EQ(counts["/path"], 1);
+}
+
+TEST_F(Export, TheLibraryWritesTheBytesOfTheProgram) {
+  const auto source = open_folder(sequence());
+  Slam slam(source->camera(), Options(), Detectors::none());
+  std::vector<std::string> stamps;
+  for (SourceFrame next = source->next(); next.state == SourceState::frame; next = source->next()) {
+    slam.process(next.frame);
+    stamps.push_back(next.stamp);
+  }
+  slam.finish();
+  const fs::path tum = folder / "tum";
+  save_trajectory(tum, slam.trajectory(), 0, TrajectoryFormat::tum, stamps);
+  EXPECT_EQ(read_text(tum), read_text(run.out / "trajectory.txt"));
+  save_trajectory(tum, slam.trajectory());
+  EXPECT_EQ(read_text(tum), read_text(run.out / "trajectory.txt")) << "its stamps have six decimals";
+  save_trajectory(tum, slam.keyframes());
+  EXPECT_EQ(read_text(tum), read_text(run.out / "keyframes.txt"));
+}
+
+// It has no stamps: its first eight numbers would be taken for a row.
+TEST_F(Export, KittisFilesAreNoTrajectories) {
+  const std::string kitti = (folder / "kitti").string(), tum = (folder / "tum").string();
+  ASSERT_EQ(run_program({"export", run.out.string(), "--format", "kitti", "--out", kitti}).exit_code, 0);
+  const Finished done = run_program({"export", kitti, "--format", "tum", "--out", tum});
+  EXPECT_EQ(done.exit_code, 2);
+  EXPECT_NE(done.err.find("kitti:1: 12 numbers a row, as in a KITTI file: it has no stamps"), std::string::npos)
+      << done.err;
+  EXPECT_FALSE(fs::exists(tum));
 }
 
 TEST_F(Export, AnEmptyTrajectoryIsRefused) {

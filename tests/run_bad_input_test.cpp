@@ -288,6 +288,13 @@ TEST(RunBadInput, UsageIsToldInPlainWords) {
   const std::string folder = sequence().string();
   const std::pair<std::vector<std::string>, std::string> cases[] = {
       {{"simulate", "--out", "x", "--size", "640"}, "--size: one value is given; give 2; see dkb-slam simulate --help"},
+      {{"compare", "--help"}, "unknown command \"compare\"; commands: run, live, "},
+      {{"map", "infos", "--help"}, "unknown command \"infos\" (did you mean \"info\"?); see dkb-slam map --help"},
+      {{"rum", "--help"}, "unknown command \"rum\" (did you mean \"run\"?); see dkb-slam --help"},
+      {{"run", folder, "--detector", "foo"}, "--detector: there is no detector \"foo\"; detectors: auto, none, "},
+      {{"run", folder, "--disable", "foo"}, "--disable: there is no part \"foo\"; parts: dr, kf, ba, loop"},
+      {{"run", folder, "--classes", "person"},
+       "--classes: --detector auto has no network; leave it out, or name a network with --model\n"},
       {{"run", folder, "--out"}, "--out: its value is missing; see dkb-slam run --help"},
       {{"run", folder, "--camera", "fr1", "--camera", "fr2"}, "--camera: is given 2 times; give it once; see"},
       {{"map", "export", "m.dkb", "--format", "pyl", "--out", "x"},

@@ -4,14 +4,12 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <thread>
 
 #include "dkb/dataset/image_codecs.h"
 #include "e2e_support.h"
@@ -20,38 +18,6 @@ namespace dkb::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-void pause_ms(int ms) {
-  std::this_thread::sleep_for(std::chrono::milliseconds(ms));
-}
-
-// A sequence whose tenth image is a named pipe: a run cannot get past it.
-class Endless {
- public:
-  explicit Endless(const fs::path& folder) : folder_(folder) {
-    copy_sequence(folder, 20, true);
-    pipe_ = folder / rows_of(folder / "associations.txt")[10][1];
-    fs::remove(pipe_);
-    if (mkfifo(pipe_.c_str(), 0600) != 0) throw std::runtime_error("no named pipes here");
-  }
-  std::vector<std::string> run(const fs::path& out) const {
-    return {"run", folder_.string(), "--out", out.string(), "--detector", "none"};
-  }
-  // Whoever reads the pipe finds an empty file.
-  void let_go() const {
-    const int fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK);
-    if (fd >= 0) close(fd);
-  }
-  // Waits until the run reads the pipe, which it finds open and empty as long as the returned file is open.
-  int hold_up(Program& program) const {
-    int fd = -1;
-    while (fd < 0 && !program.ended()) fd = open(pipe_.c_str(), O_WRONLY | O_NONBLOCK), pause_ms(5);
-    return fd;
-  }
-
- private:
-  fs::path folder_, pipe_;
-};
 
 bool wait_for_first_frame(Program& program) {
   while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause_ms(5);
@@ -220,6 +186,48 @@ TEST(RunEnding, AFolderThatWasUsedBeforeHoldsNothingOfTheEarlierRun) {
   EXPECT_FALSE(fs::exists(out / "map.ply"));
 }
 
+// As a second run of the same folder would mix its files with those of the first.
+TEST(RunEnding, ASecondRunIntoTheSameFolderIsRefusedAtItsStart) {
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  Program first(endless.run(temp / "out"));
+  ASSERT_TRUE(wait_for_first_frame(first));
+  const Finished second =
+      run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none"});
+  EXPECT_EQ(second.exit_code, 2);
+  EXPECT_EQ(second.err, "error: " + (temp / "out").string() +
+                            ": another run is writing its results there; wait for it, or choose another folder\n");
+  kill(first.pid(), SIGKILL);
+  first.wait();
+  EXPECT_EQ(SlamRun(sequence(), temp / "out", {"--max-frames", "6"}).finished.exit_code, 0) << "a crash leaves no lock";
+  for (const auto& entry : fs::directory_iterator(temp / "out"))
+    EXPECT_EQ(entry.path().filename().string().find("lock"), std::string::npos) << entry.path();
+}
+
+TEST(RunEnding, AFolderInThePlaceOfAResultIsRefusedBeforeTheRun) {
+  const TempFolder temp;
+  fs::create_directories(temp / "out" / "trajectory.txt");
+  const Finished run =
+      run_program({"run", sequence().string(), "--out", (temp / "out").string(), "--detector", "none"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err, "error: " + (temp / "out" / "trajectory.txt").string() +
+                         ": is a folder, where runs write a file; remove it, or choose another --out\n");
+  EXPECT_FALSE(fs::exists(temp / "out" / "movers.csv"));
+}
+
+TEST(RunEnding, AFolderThatVanishesWhileTheRunGoesOnIsAFailureAndNoBadInput) {
+  const TempFolder temp;
+  const Endless endless(temp / "endless");
+  Program program(endless.run(temp / "out"));
+  ASSERT_TRUE(wait_for_first_frame(program));
+  fs::remove_all(temp / "out");
+  kill(program.pid(), SIGINT);
+  while (!program.ended()) endless.let_go(), pause_ms(5);
+  const Finished run = program.wait();
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_NE(run.err.find("trajectory.txt: cannot be written"), std::string::npos) << run.err;
+}
+
 TEST(RunEnding, RunsThatStartTogetherHaveFoldersOfTheirOwn) {
   const TempFolder temp;
   const std::string run = "@ run " + sequence().string() + " --detector none --max-frames 3 --quiet";
@@ -305,14 +313,15 @@ TEST(RunEnding, AFolderInThePlaceOfTheSessionIsABadInput) {
 
 TEST(RunEnding, WarningsOfTheEndAreToldEvenWhenResultsCannotBeWritten) {
   const TempFolder temp;
-  fs::create_directories(temp / "out" / "trajectory.txt");
+  fs::create_directories(temp / "out");
+  fs::create_symlink(temp / "none" / "trajectory.txt", temp / "out" / "trajectory.txt");
   const double first = std::stod(rows_of(sequence() / "rgb.txt").at(0).at(0));
   // Poses too far apart to tell of the motion between them.
   write_text(temp / "wheels.txt",
              std::to_string(first - 100) + " 0 0 0 0 0 0 1\n" + std::to_string(first + 100) + " 0 0 0 0 0 0 1\n");
   const Finished run = run_program({"run", sequence().string(), "--detector", "none", "--max-frames", "12", "--out",
                                     (temp / "out").string(), "--prior-file", (temp / "wheels.txt").string()});
-  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_EQ(run.exit_code, 1) << run.err;
   EXPECT_NE(run.err.find("tells of no frame's motion"), std::string::npos) << run.err;
 }
 

@@ -41,8 +41,12 @@ std::vector<bool> chosen(const std::vector<std::string>& names, const std::vecto
   for (const Item& item : items) known.push_back(item.name);
   for (const std::string& name : names) {
     const auto at = std::find(known.begin(), known.end(), name);
-    if (at == known.end())
-      throw InputError(fmt::format("--{}: the suite has no {} \"{}\"{}", what, what, name, did_you_mean(name, known)));
+    if (at == known.end()) {
+      std::string all;
+      for (const std::string& other : known) all += (all.empty() ? "; it has " : ", ") + other;
+      const std::string near = did_you_mean(name, known);
+      throw InputError(fmt::format("--{}: the suite has no {} \"{}\"{}", what, what, name, near.empty() ? all : near));
+    }
     take[static_cast<size_t>(at - known.begin())] = true;
   }
   return take;

@@ -57,8 +57,9 @@ void write_colmap(const MapFile& file, const std::vector<KeyframeId>& keyframes,
   for (PointId id : map.points_of(keyframes)) number.emplace(id, static_cast<int64_t>(number.size()) + 1);
   for (KeyframeId id : keyframes) {
     const Keyframe& k = *map.keyframe(id);
-    const Eigen::Quaterniond& q = k.cam_from_world.rotation;
-    const Eigen::Vector3d& t = k.cam_from_world.translation;
+    const Eigen::Vector4d q =
+        (k.cam_from_world.rotation.coeffs().array() + 0.0).matrix();  // x, y, z, w; turns -0 into 0
+    const Eigen::Vector3d t = (k.cam_from_world.translation.array() + 0.0).matrix();
     images += fmt::format("{} {:.12g} {:.12g} {:.12g} {:.12g} {:.9g} {:.9g} {:.9g} 1 {}\n", id + 1, q.w(), q.x(), q.y(),
                           q.z(), t.x(), t.y(), t.z(), picture_name(k));
     for (size_t f = 0; f < k.points.size(); ++f) {
@@ -103,6 +104,7 @@ void write_nerfstudio(const MapFile& file, const std::vector<KeyframeId>& keyfra
     Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
     pose.topLeftCorner<3, 3>() = world_from_cam.matrix3() * Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
     pose.topRightCorner<3, 1>() = world_from_cam.translation;
+    pose.array() += 0.0;  // turns -0 into 0
     nlohmann::ordered_json frame;
     frame["file_path"] = "images/" + picture_name(k);
     if (has_masks) frame["mask_path"] = "masks/" + picture_name(k);

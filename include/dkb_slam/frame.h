@@ -149,7 +149,7 @@ struct FrameResult {
   Rigid3 world_from_odom;  ///< takes the jumps; world_from_cam = world_from_odom * odom_from_cam
   int inliers = 0;         ///< map points that the pose rests on
   int reference_keyframe = -1;          ///< the keyframe that shows most of them
-  std::vector<Mover> movers;            ///< seen in this frame, by id
+  std::vector<Mover> movers;            ///< seen in this frame, by id; told by FilterKind::standard alone
   std::vector<Detection> detections;    ///< boxes of the detectors, carried to this image
   MoverMask mask;                       ///< where movers are in this image
   std::vector<FeatureReport> features;  ///< every feature that was extracted, people's included

@@ -17,6 +17,7 @@
 namespace dkb {
 
 /// Which features are kept from tracking: one family per way that published systems answer it, on the same back end.
+/// Movers (FrameResult::movers) are told by `standard` alone.
 enum class FilterKind {
   none,       ///< nothing is removed
   box,        ///< every feature in a box of a movable class (as Crowd-SLAM does)
@@ -57,7 +58,8 @@ struct Setting {
 /// check() and Slam's constructor judge them. docs/settings.md is the same list as a table.
 class DKB_SLAM_API Options {
  public:
-  uint64_t seed = 1;  ///< of every source of randomness
+  /// Of the random draws in finding a lost camera, loops and the floor; results hardly ever depend on it.
+  uint64_t seed = 1;
 
   struct Features {
     int count = 900;             ///< [features] wanted per image, 1 ... 8000

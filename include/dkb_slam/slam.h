@@ -48,6 +48,22 @@ struct TrajectoryFrame {
   int map = 0;            ///< 0 = the first map; maps that were never joined have worlds of their own
 };
 
+/// How a file of a trajectory is written; docs/files.md says more.
+enum class TrajectoryFormat {
+  tum,    ///< `stamp tx ty tz qx qy qz qw`
+  kitti,  ///< the first three rows of each pose's matrix, without stamps
+  euroc   ///< a csv of stamps in [ns], positions and quaternions wxyz
+};
+
+/// Writes what Slam::trajectory(), online_trajectory() or keyframes() gave, by a temporary file and a rename: the poses
+/// of the map of this number by stamp, as `dkb-slam run` and `export` write them; that map may have no pose yet.
+/// `stamps`: of each frame by its number, as the file shall have it, as SourceFrame::stamp gives it; without them
+/// stamps have six decimals or, where these do not suffice, nine. Throws InputError, and leaves a file that is there as
+/// it is, when it cannot, or when a frame has no stamp in `stamps`.
+DKB_SLAM_API void save_trajectory(const std::filesystem::path& path, const std::vector<TrajectoryFrame>& trajectory,
+                                  int map = 0, TrajectoryFormat format = TrajectoryFormat::tum,
+                                  const std::vector<std::string>& stamps = {});
+
 /// What has happened since the world began.
 struct Statistics {
   int frames = 0, tracked = 0, lost = 0;      ///< accepted; with a pose; without one although there is a map
@@ -112,7 +128,9 @@ class DKB_SLAM_API Slam {
   /// While paused, frames are answered with state `paused` and change nothing. Their FrameResult::frame is that of the
   /// last frame that was accepted, 0 before the first.
   void pause(bool on);
-  /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it.
+  /// While on, the map is not changed: no keyframes, no new map, and what tracking learns of points stays with it. It
+  /// may be on before there is a map, since load_map() may follow and a reset() leaves it as it is: frames are
+  /// `initialising` until then, and after 30 of them a warning says so.
   void localize_only(bool on);
   /// Somebody knows where the camera is, roughly: the next frames are sought there first, until one is found or a new
   /// map begins, at that place. The pose is in the world of the map, the covariance a right perturbation,

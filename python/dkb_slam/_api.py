@@ -32,11 +32,12 @@ class Slam(_core.Slam):
     detect_every, detect_latency: [frames] from one image that the network is asked for to the next, and until its
         answer counts; 0 = by its size. Without a network: a function of one's own is asked every so many frames, on a
         thread of its own, in the place of every frame on the thread that calls process().
-    filter: "default", "paper", "box", "epipolar", "multiview" or "none": which features are rejected.
+    filter: "default", "paper", "box", "epipolar", "multiview" or "none": which features are rejected. "default" alone
+        tells of movers.
     disable: parts to switch off, by comma: dr, kf, ba, loop.
     settings: any setting of docs/settings.md by its key, {"features.count": 1200}.
     config: YAML file of settings, as `config_yaml()` gives it.
-    seed: of every source of randomness.
+    seed: of the random draws in finding a lost camera, loops and the floor; results hardly ever depend on it.
     threads: 1 = everything on the thread that calls process(); the same bytes.
     realtime: never wait for mapping; results may differ from run to run.
     dense: keep what dense_map() needs.
@@ -104,26 +105,39 @@ def open(source: PathLike, camera: Union[_core.Camera, PathLike, None] = None, *
 TrajectoryLike = Union[_core.Slam, PathLike, Tuple[Any, Any]]
 
 
-def _trajectory(given: TrajectoryLike) -> Any:
-    return given.trajectory() if isinstance(given, _core.Slam) else given
+def _trajectory(given: Optional[TrajectoryLike], name: str) -> Any:
+    if not isinstance(given, _core.Slam):
+        return given
+    stamps_ns, poses = given.trajectory()
+    if len(stamps_ns) == 0:
+        frames = given.statistics()["frames"]
+        raise _core.InputError(f"{name}: it has no poses (" + ("none of its %d frames was tracked" % frames
+                               if frames else "no frame was processed") + ")")
+    return stamps_ns, poses
 
 
 def evaluate(truth: TrajectoryLike, estimate: TrajectoryLike, *, max_diff: float = 0.02, rpe_delta: str = "1f",
-             rpe_all_pairs: bool = False, time_offset: float = 0.0, scale: bool = False) -> dict[str, Any]:
+             rpe_all_pairs: bool = False, time_offset: float = 0.0, scale: bool = False,
+             align: Optional[str] = None) -> dict[str, Any]:
     """Scores a trajectory against the truth: the dict of `dkb-slam eval --json`.
 
     truth, estimate: files in TUM format, (stamps_ns, poses) with rising stamps, or a Slam. max_diff: [s] between
     matched stamps. rpe_delta: "N" and f, m or s: stretch of the relative error in frames, metres or seconds, from
-    every pose on with rpe_all_pairs. time_offset: [s] added to the stamps of the estimate. scale: align by a similarity.
+    every pose on with rpe_all_pairs. time_offset: [s] added to the stamps of the estimate. align: what brings the
+    estimate into the world of the truth, "se3", the default, "sim3", which scale=True is short for, "origin" (by the
+    first pose alone) or "none".
 
     Keys: matched, ape.translation_m.{rmse, mean, median, std, min, max}, ape.rotation_deg, and rpe likewise, defined as
     in evo. ape.rotation_determined is false, and ape.rotation_deg None, where a path on a line or in one place leaves
     the rotation of the alignment free; ape.rotation_sd_deg is that rotation's standard error. wrong_scale is there where
     the estimate is of another size than the truth. Rows of a file of the truth with nan are left out. Raises InputError
-    when a file is wrong or fewer than two stamps match.
+    when a file is wrong, there is no pose, or fewer than two stamps match.
     """
-    return json.loads(_core._evaluate_json(_trajectory(truth), _trajectory(estimate), max_diff, rpe_delta,
-                                           rpe_all_pairs, time_offset, scale))
+    if align is not None and scale and align != "sim3":
+        raise _core.InputError(f'scale: align="{align}" does not scale; leave one of them out')
+    return json.loads(_core._evaluate_json(_trajectory(truth, "truth"), _trajectory(estimate, "estimate"), max_diff,
+                                           rpe_delta, rpe_all_pairs, time_offset,
+                                           align or ("sim3" if scale else "se3")))
 
 
 class Plot:
@@ -149,4 +163,4 @@ def plot_trajectory(trajectory: TrajectoryLike, truth: Optional[TrajectoryLike] 
 
     trajectory, truth: files in TUM format, (stamps_ns, poses) or a Slam. Raises InputError when there is no pose.
     """
-    return Plot(_core._plot_svg(_trajectory(trajectory), _trajectory(truth), title))
+    return Plot(_core._plot_svg(_trajectory(trajectory, "trajectory"), _trajectory(truth, "truth"), title))

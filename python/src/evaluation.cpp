@@ -50,15 +50,16 @@ Evaluation evaluated(const py::object& truth, const py::object& estimate, const 
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
-  module.def("_evaluate_json", [](const py::object& truth, const py::object& estimate, double max_diff,
-                                  const std::string& rpe_delta, bool all_pairs, double time_offset, bool scale) {
-    return evaluation_json(evaluated(truth, estimate,
-                                     {.max_difference = max_diff,
-                                      .time_offset = time_offset,
-                                      .rpe_delta = parse_rpe_delta(rpe_delta),
-                                      .rpe_all_pairs = all_pairs,
-                                      .alignment = scale ? Alignment::sim3 : Alignment::se3}));
-  });
+  module.def("_evaluate_json",
+             [](const py::object& truth, const py::object& estimate, double max_diff, const std::string& rpe_delta,
+                bool all_pairs, double time_offset, const std::string& align) {
+               return evaluation_json(evaluated(truth, estimate,
+                                                {.max_difference = max_diff,
+                                                 .time_offset = time_offset,
+                                                 .rpe_delta = parse_rpe_delta(rpe_delta),
+                                                 .rpe_all_pairs = all_pairs,
+                                                 .alignment = alignment_named(align, "align")}));
+             });
   module.def("_plot_svg", [](const py::object& estimate, const py::object& truth, const std::string& title) {
     if (truth.is_none()) return trajectory_svg(trajectory_of(estimate, "trajectory").poses, title);
     return evaluation_svg(evaluated(truth, estimate, {}), title);

@@ -311,6 +311,14 @@ recording gives the same frames every time. Pairs that cannot be read are left o
 one reason in a row the first is told, then how many more.)")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__", &PySource::next)
+      .def(
+          "__len__",
+          [](const PySource& source) {
+            if (!source.size()) throw py::type_error("source: how many frames there are is not known; size is None");
+            return *source.size();
+          },
+          "size, where that is known, however many were read; raises TypeError where it is not.")
+      .def("__bool__", [](const PySource&) { return true; })  // whatever its length
       .def("__enter__", [](const py::object& self) { return self; })
       .def("__exit__", [](PySource& source, const py::args&) { source.close(); })
       .def("close", &PySource::close, "close()\n\nEnds it and its threads; from any thread.")

@@ -83,7 +83,10 @@ void bind_dense(py::module_& module) {
           },
           py::arg("path"),
           "save(path)\n\nWrites path.pgm and path.yaml, which ROS' map_server reads, as `dkb-slam run --dense` does. "
-          "Raises InputError when it cannot.");
+          "Raises InputError when it cannot.")
+      .def("__repr__", [](const OccupancyGrid& g) {
+        return fmt::format("OccupancyGrid({} x {} cells of {:g} m)", g.cells.width(), g.cells.height(), g.cell);
+      });
   py::class_<DenseMap>(module, "DenseMap", "The dense map of the still world: people and what they moved are left out.")
       .def_property_readonly(
           "vertices",
@@ -103,6 +106,18 @@ void bind_dense(py::module_& module) {
       .def(
           "to_ply", [](const DenseMap& map) { return py::bytes(mesh_ply(map.mesh)); },
           "to_ply() -> bytes\n\nThe mesh as a Stanford PLY file.")
+      .def(
+          "save",
+          [](const DenseMap& map, const py::object& path) {
+            const std::filesystem::path file = path_of(path, "path");
+            if (file.extension() != ".ply")
+              throw InputError(file.string() + ": the mesh is a PLY file; give a name that ends in .ply");
+            const Unlocked released;
+            write_file_atomically(file, mesh_ply(map.mesh));
+          },
+          py::arg("path"),
+          "save(path)\n\nWrites to_ply(), as `dkb-slam run --dense` does; the name must end in .ply. Raises InputError "
+          "when it cannot.")
       .def("__repr__", [](const DenseMap& map) {
         return fmt::format("DenseMap({} vertices, {} triangles, {})", map.mesh.vertices.size(),
                            map.mesh.triangles.size(), map.grid ? "with a grid" : "no grid");

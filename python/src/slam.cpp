@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "bindings.h"
-#include "dkb/dataset/trajectory_file.h"
+#include "dkb/dataset/trajectory_formats.h"
 
 namespace dkb::python {
 namespace {
@@ -145,13 +145,12 @@ class PySlam final : public Closable {
     const Unlocked other_threads;
     task(path);
   }
-  void save_trajectory(const std::string& path, int map, bool online) const {
+  void save_trajectory(const std::string& path, int map, bool online, const std::string& format) const {
+    const TrajectoryFormat as = trajectory_format_named(format, "format");
     run([&](Slam& slam) {
       check_map(slam, map);
       const auto [frames, stamps] = stamped_trajectory(slam, online);
-      const auto by_map = trajectories_by_map(frames, stamps);
-      const bool there = static_cast<size_t>(map) < by_map.size();  // it may have no pose yet
-      write_trajectory(path, there ? by_map[static_cast<size_t>(map)] : Trajectory());
+      dkb::save_trajectory(path, frames, map, as, stamps);
     });
   }
   std::vector<Event> take_events() {
@@ -353,7 +352,9 @@ fails.)")
           "pause(on=True)\n\nWhile paused, frames are answered with state \"paused\" and change nothing.")
       .def(
           "localize_only", [](PySlam& s, bool on) { s.feed([on](Slam& slam) { slam.localize_only(on); }); },
-          py::arg("on") = true, "localize_only(on=True)\n\nWhile on, the map is not changed.")
+          py::arg("on") = true,
+          "localize_only(on=True)\n\nWhile on, the map is not changed. It may be on before there is a map, since "
+          "load_map() may\nfollow: frames are \"initialising\" until then, and after 30 of them a SlamWarning says so.")
       .def(
           "suggest_pose",
           [](PySlam& s, const py::object& pose, const py::object& covariance) {
@@ -386,12 +387,13 @@ perturbation, [translation m, rotation rad], camera axes. Raises InputError for 
           "Raises InputError, and leaves all as it is, when the file is broken or of another camera.")
       .def(
           "save_trajectory",
-          [](const PySlam& s, const py::object& path, int map, bool online) {
-            s.save_trajectory(path_of(path, "path"), map, online);
+          [](const PySlam& s, const py::object& path, int map, bool online, const std::string& format) {
+            s.save_trajectory(path_of(path, "path"), map, online, format);
           },
-          py::arg("path"), py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
-          "save_trajectory(path, *, map=0, online=False)\n\nWrites what trajectory() gives in TUM format, as "
-          "`dkb-slam run` does:\nstamp [s], position [m], quaternion xyzw. From any thread.")
+          py::arg("path"), py::kw_only(), py::arg("map") = 0, py::arg("online") = false, py::arg("format") = "tum",
+          "save_trajectory(path, *, map=0, online=False, format=\"tum\")\n\nWrites what trajectory() gives, as "
+          "`dkb-slam run` does: stamp [s], position [m],\nquaternion xyzw; \"kitti\" and \"euroc\" as `dkb-slam export "
+          "--format` does. From any thread.")
       .def("trajectory", &trajectory, py::kw_only(), py::arg("map") = 0, py::arg("online") = false,
            R"(trajectory(*, map=0, online=False) -> (stamps_ns, poses)
 

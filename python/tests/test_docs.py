@@ -3,7 +3,8 @@
 import re
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "python.md"
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "python.md"
 
 
 def test_the_page_works_as_printed(sequence, tmp_path, monkeypatch, capsys):
@@ -17,3 +18,11 @@ def test_the_page_works_as_printed(sequence, tmp_path, monkeypatch, capsys):
     assert session["poses"].shape == (40, 4, 4) and Path("trajectory.txt").exists()
     assert "initialising None" in capsys.readouterr().out
     assert session["score"]["ape"]["translation_m"]["rmse"] < 0.02
+
+
+def test_the_readmes_block_is_complete(sequence):
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(encoding="utf-8"), re.M | re.S)
+    assert len(blocks) == 1
+    session = {}
+    exec(blocks[0].replace("path/to/sequence", str(sequence)), session)
+    assert session["poses"].shape == (40, 4, 4)

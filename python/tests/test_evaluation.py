@@ -47,6 +47,37 @@ def test_all_pairs_and_an_offset_are_those_of_eval(slam, sequence, command_line,
     assert dkb_slam.evaluate(tmp_path / "hidden.txt", (stamps, poses))["matched"] >= 39
 
 
+def test_alignments_are_those_of_eval(slam, sequence, command_line, tmp_path):
+    truth = sequence / "groundtruth.txt"
+    slam.save_trajectory(tmp_path / "trajectory.txt")
+    for align in ("se3", "sim3", "origin", "none"):
+        command_line("eval", truth, tmp_path / "trajectory.txt", "--json", tmp_path / "score.json", "--align", align)
+        score = dkb_slam.evaluate(truth, tmp_path / "trajectory.txt", align=align)
+        assert score == json.loads((tmp_path / "score.json").read_text()) and score["align"] == align
+    assert dkb_slam.evaluate(truth, slam, scale=True) == dkb_slam.evaluate(truth, slam, align="sim3", scale=True)
+    with pytest.raises(dkb_slam.InputError, match='align: "se2" is none of se3, sim3, origin and none'):
+        dkb_slam.evaluate(truth, slam, align="se2")
+    with pytest.raises(dkb_slam.InputError, match="scale: align=.origin. does not scale"):
+        dkb_slam.evaluate(truth, slam, align="origin", scale=True)
+
+
+def test_an_estimate_without_a_pose_is_told_as_such(sequence):
+    truth, source = sequence / "groundtruth.txt", dkb_slam.open(sequence)
+    slam = dkb_slam.Slam(source.camera)
+    with pytest.raises(dkb_slam.InputError, match=r"^estimate: it has no poses \(no frame was processed\)$"):
+        dkb_slam.evaluate(truth, slam)
+    slam.localize_only()
+    for frame in source:
+        slam.process(frame)
+        if frame.index == 2:
+            break
+    for call in (lambda: dkb_slam.evaluate(truth, slam), slam.plot, lambda: slam.plot(truth)):
+        with pytest.raises(dkb_slam.InputError, match=r"it has no poses \(none of its 3 frames was tracked\)$"):
+            call()
+    with pytest.raises(dkb_slam.InputError, match="^the estimate has no poses"):
+        dkb_slam.evaluate(truth, (np.zeros(0, np.int64), np.zeros((0, 4, 4))))
+
+
 def test_what_cannot_be_scored_is_one_line(slam, sequence):
     stamps, poses = slam.trajectory()
     with pytest.raises(dkb_slam.InputError, match="^0 of 40 estimated"):

@@ -175,7 +175,7 @@ def test_the_stubs_name_what_there_is():
     def names(body):
         found = {n.name for n in body if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
         found |= {n.target.id for n in body if isinstance(n, ast.AnnAssign)}
-        return {n for n in found if not re.fullmatch("__(init|iter|next|enter|exit)__", n)}
+        return {n for n in found if not re.fullmatch("__(init|iter|next|enter|exit|len|bool)__", n)}
 
     public = {n for n in dir(_core) if not re.fullmatch("__(?!version).*__", n)}
     assert names(stub.body) == public

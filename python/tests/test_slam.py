@@ -40,6 +40,11 @@ def test_a_run_writes_the_bytes_of_the_command_line(sequence, command_line, tmp_
     for mine, theirs in (("final.txt", "trajectory.txt"), ("online.txt", "trajectory_online.txt"),
                          ("map.dkb", "map.dkb")):
         assert (tmp_path / mine).read_bytes() == (tmp_path / "cli" / theirs).read_bytes(), mine
+    command_line("export", tmp_path / "cli", "--format", "euroc", "--out", tmp_path / "theirs.csv")
+    slam.save_trajectory(tmp_path / "mine.csv", format="euroc")
+    assert (tmp_path / "mine.csv").read_bytes() == (tmp_path / "theirs.csv").read_bytes()
+    with pytest.raises(dkb_slam.InputError, match='format: there is no "tmu"'):
+        slam.save_trajectory(tmp_path / "mine.csv", format="tmu")
 
 
 def test_arrays_of_any_layout_give_the_bytes_of_frames(frames, camera):
@@ -322,10 +327,15 @@ def test_dense_map_has_the_still_world(sequence, tmp_path):
     dense = slam.dense_map()
     assert dense.vertices.shape == dense.colours.shape and len(dense.vertices) > 100
     assert dense.triangles.max() < len(dense.vertices) and dense.to_ply().startswith(b"ply")
+    dense.save(tmp_path / "dense.ply")
+    assert (tmp_path / "dense.ply").read_bytes() == dense.to_ply()
+    with pytest.raises(dkb_slam.InputError, match="dense.obj: the mesh is a PLY file; give a name that ends in .ply"):
+        dense.save(tmp_path / "dense.obj")
     if dense.grid is not None:
         dense.grid.save(tmp_path / "floor")
         assert (tmp_path / "floor.pgm").read_bytes().endswith(dense.grid.cells.tobytes())
         assert "image: floor.pgm" in (tmp_path / "floor.yaml").read_text()
+        assert repr(dense.grid) == "OccupancyGrid({1} x {0} cells of 0.1 m)".format(*dense.grid.cells.shape)
         assert dense.grid.cells.dtype == np.uint8 and dense.grid.floor_from_world.shape == (4, 4)
     with pytest.raises(dkb_slam.InputError):
         dkb_slam.Slam(slam.camera).dense_map()

@@ -35,7 +35,7 @@ def images(folder):
 
 def test_frames_come_with_their_arrays(sequence, camera):
     source = dkb_slam.open(sequence)
-    assert source.size == 40 and source.camera == camera and "associations.txt" in repr(source)
+    assert source.size == len(source) == 40 and source and source.camera == camera and "associations.txt" in repr(source)
     frame = next(source)
     assert frame.rgb.shape == (480, 640, 3) and frame.rgb.dtype == np.uint8 and frame.grey.shape == (480, 640)
     assert frame.depth.dtype == np.float32 and 0 < np.median(frame.depth[frame.depth > 0]) < 10

@@ -190,7 +190,10 @@ TEST_F(ChooseCamera, KnowsFolderNamesAsWords) {
 TEST_F(ChooseCamera, RefusalsNameTheFile) {
   EXPECT_NE(test::input_error_of([&] { choose_camera("/no/none.yaml", folder("a")); }).find("/no/none.yaml"),
             std::string::npos);
-  EXPECT_NE(test::input_error_of([&] { choose_camera("fr4", folder("a")); }).find("did you mean"), std::string::npos);
+  EXPECT_EQ(test::input_error_of([&] { choose_camera("fr9", folder("a")); }),
+            "fr9: neither a camera file nor a built-in camera (fr1, fr2, fr3, bonn)");
+  EXPECT_NE(test::input_error_of([&] { choose_camera("bon", folder("a")); }).find("did you mean \"bonn\"?"),
+            std::string::npos);
   EXPECT_NE(test::input_error_of([&] { choose_camera("", folder("a")); }).find("--camera"), std::string::npos);
 }
 

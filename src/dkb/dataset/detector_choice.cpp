@@ -61,10 +61,18 @@ void refuse_option(const DetectorChoice& choice, const std::string& option, cons
 }
 
 void check_no_network(const DetectorChoice& choice) {
-  if (!choice.model.empty()) refuse_option(choice, "--model", "network");
-  if (!choice.labels.empty()) refuse_option(choice, "--labels", "network");
-  if (!choice.classes.empty()) refuse_option(choice, "--classes", "network");
-  if (choice.inference != DetectorChoice().inference) refuse_option(choice, "--inference", "network");
+  const char* option = !choice.model.empty()                            ? "--model"
+                       : !choice.labels.empty()                         ? "--labels"
+                       : !choice.classes.empty()                        ? "--classes"
+                       : choice.inference != DetectorChoice().inference ? "--inference"
+                                                                        : nullptr;
+  if (option == nullptr) return;
+  const std::string remedy = choice.kinds == "auto"   ? ", or name a network with --model"
+                             : choice.kinds == "none" ? ", or take --detector yolo with --model"
+                             : choice.kinds.find(kExec) != std::string::npos
+                                 ? ""
+                                 : ", or take --detector " + choice.kinds + "+yolo with --model";
+  throw InputError(std::string(option) + ": --detector " + choice.kinds + " has no network; leave it out" + remedy);
 }
 
 void check_kinds(const DetectorChoice& choice, bool has_model) {

@@ -20,9 +20,9 @@ struct StampedPose {
 using Trajectory = std::vector<StampedPose>;  // stamps not falling
 
 // TUM format, `stamp tx ty tz qx qy qz qw` (camera in world). Comments, blank lines and CRLF are fine; rows are sorted
-// by stamp, equal stamps stay in the file's order; quaternions are normalised; further columns are ignored. Throws
-// InputError with file:line for malformed rows, values that are not finite and quaternions of length 0. An empty file
-// gives an empty trajectory.
+// by stamp, equal stamps stay in the file's order; quaternions are normalised. Throws InputError with file:line for
+// rows of other than 8 columns, values that are not finite and quaternions whose length is more than 1e-2 off 1. An
+// empty file gives an empty trajectory.
 Trajectory read_trajectory(const std::filesystem::path& path);
 // With `hidden` the file is a truth: rows with `nan`, which motion capture writes where its markers are hidden, are
 // left out and counted.
@@ -35,11 +35,12 @@ std::optional<Trajectory> truth_beside(const std::filesystem::path& recording, s
 
 // TUM format with `#` header, 9 decimals, w of the quaternion not negative. Rows in the order given.
 std::string trajectory_to_text(const Trajectory& trajectory);
-// Written atomically. Throws OutputError.
+// Written atomically. Throws as write_file_atomically() does.
 void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory);
 
 // What Slam says of a trajectory, as files have it: one trajectory a map, the first in any case, rows by stamp.
-// `stamps`: the stamp of every frame, as it shall be written; keyframes of a loaded map are of no frame.
+// `stamps`: the stamp of every frame, as it shall be written; empty: by its nanoseconds. Keyframes of a loaded map are
+// of no frame.
 std::vector<Trajectory> trajectories_by_map(const std::vector<TrajectoryFrame>& frames,
                                             const std::vector<std::string>& stamps);
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -19,8 +20,8 @@ std::string error(const std::string& text) {
 }
 
 TEST(TrajectoryFile, ReadsRowsSortedByStampEqualStampsInOrder) {
-  const Trajectory t =
-      parse_trajectory("# header\r\n2.50 1 2 3 0 0 0 2\r\n\r\n1.5 4 5 6 0 0 1 0 extra\n2.5 7 8 9 0 0 0 1", "t.txt");
+  const Trajectory t = parse_trajectory(
+      "# header\r\n2.50 1 2 3 0 0 0 1.009\r\n\r\n1.5 4 5 6 0 0 1 0  # a remark \n2.5 7 8 9 0 0 0 1", "t.txt");
   ASSERT_EQ(t.size(), 3u);
   EXPECT_EQ(t[0].stamp, "1.5");
   EXPECT_EQ(t[0].world_from_cam.rotation.z(), 1.0);
@@ -36,13 +37,40 @@ TEST(TrajectoryFile, FaultsNameFileAndLine) {
             "t.txt:2: 7 of 8 columns; a row must be `timestamp tx ty tz qx qy qz qw`");
   EXPECT_EQ(error("1 0 nan 0 0 0 0 1\n"), "t.txt:1: ty \"nan\" is not a finite number");
   EXPECT_EQ(error("1 0 0 0 0 0 0 1,5\n"), "t.txt:1: qw \"1,5\" is not a number");
-  EXPECT_EQ(error("1 0 0 0 0 0 0 0\n"), "t.txt:1: the quaternion is not of length 1");
+  EXPECT_EQ(error("1 0 0 0 0 0 0 0\n"),
+            "t.txt:1: the quaternion is of length 0, not 1; a row must be `timestamp tx ty tz qx qy qz qw`");
+  EXPECT_EQ(error("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0.5 1\n"),
+            "t.txt:2: the quaternion is of length 1.118, not 1; a row must be `timestamp tx ty tz qx qy qz qw`");
+  EXPECT_EQ(error("1 0 0 0 0 0 0 1 0.5\n"),
+            "t.txt:1: 9 columns, not 8; a row must be `timestamp tx ty tz qx qy qz qw`");
+}
+
+// Its first eight numbers look like a row whose quaternion is none.
+TEST(TrajectoryFile, KittisRowsAreNamed) {
+  EXPECT_EQ(
+      error("1 0 0 0.5 0 1 0 0 0 0 1 2\n"),
+      "t.txt:1: 12 numbers a row, as in a KITTI file: it has no stamps; give a file with rows `timestamp tx ty tz "
+      "qx qy qz qw`");
+}
+
+TEST(TrajectoryFile, WhatOtherToolsWriteIsRead) {
+  const char* evo = "1.305031102175303936e+09 0.0e+00 1.5e-01 -2.0 0.0 0.0 0.7071 0.7071\n";
+  const char* orb_slam = "1305031102.175304 0.0000000 0.1500000 -2.0000000 0.0000000 0.0000000 0.7071068 0.7071068\n";
+  const char* motion_capture =
+      "# ground truth trajectory\n# timestamp tx\n1305031102.1753 0 0.15 -2 0 0 0.71 0.71 \r\n";
+  for (const char* text : {evo, orb_slam, motion_capture}) {
+    const Trajectory t = parse_trajectory(text, "t.txt");
+    ASSERT_EQ(t.size(), 1u);
+    EXPECT_NEAR(t[0].timestamp, 1305031102.1753, 1e-4);
+    EXPECT_EQ(t[0].world_from_cam.translation, Eigen::Vector3d(0, 0.15, -2));
+    EXPECT_NEAR(t[0].world_from_cam.rotation.z(), std::sqrt(0.5), 1e-12);
+  }
 }
 
 TEST(TrajectoryFile, WritesStampsAsReadAndNineDecimals) {
   StampedPose a;
   a.timestamp = 1.5, a.stamp = "1.500";
-  a.world_from_cam = Rigid3(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {1, -2.25, 1e-10});
+  a.world_from_cam = Rigid3(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5), {1, -2.25, -1e-10});
   StampedPose b;
   b.timestamp = 1305031102.175304;
   EXPECT_EQ(trajectory_to_text({a, b}),

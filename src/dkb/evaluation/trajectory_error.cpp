@@ -16,8 +16,6 @@
 namespace dkb {
 namespace {
 
-constexpr double kBeyondDoubt = 5;  // [standard errors] those of few, and alike, errors are rough themselves
-
 double degrees_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return vector_from_rotation(a.conjugate() * b).norm() * 180.0 / std::numbers::pi;
 }
@@ -125,19 +123,48 @@ std::vector<Eigen::Vector3d> errors_after(const Similarity3& to_from_from, const
   return errors;
 }
 
-// The scale that fits best, where it is another than 1 by a tenth, which no camera's calibration is off by, and by five
-// standard errors. Errors of the estimate make its path longer, and the scale that fits best smaller, by the ratio of
-// their variances: that much is not counted.
-std::optional<double> wrong_scale(const Similarity3& best, const std::vector<Eigen::Vector3d>& errors,
-                                  const std::vector<Eigen::Vector3d>& from) {
-  constexpr double kLeast = 0.1;
-  if (!(best.scale > 0)) return {};
-  double squares = 0;
-  for (const Eigen::Vector3d& e : errors) squares += e.squaredNorm() / static_cast<double>(errors.size());
-  const double spread = best.scale * spreads(from).norm();
-  const double off = std::abs(std::log(best.scale)) - squares / (spread * spread);
-  if (!(off > kLeast) || off * spread < kBeyondDoubt * standard_error(errors)) return {};
-  return best.scale;
+// How many standard errors, told from errors with so many degrees of freedom, are as rare as five of a normal
+// distribution: those of few errors are rough themselves. Wallace's approximation of Student's t without its last term.
+double five_standard_errors(double freedom) {
+  return std::sqrt(freedom * std::expm1(25 / freedom));
+}
+
+// By how much the estimate is to be enlarged, where that is another than 1 by a tenth, which no camera's calibration is
+// off by, and by five standard errors. The estimate's size is fitted to the truth, which has no errors, and not the
+// other way round: errors that are larger than the way would make the fit smaller.
+//
+// An error that wanders off looks like a wrong size as long as the way is short, and what the fit leaves of it tells
+// little of that. So the way's steps count, between up to eleven poses: their errors are independent where the error
+// wanders as a random walk does; where errors are independent themselves those of steps oppose each other, and the
+// standard error is too large rather than too small. Where the error wanders smoothly, k steps count for
+// k (1 - r) / (1 + r) by the correlation r of neighbours (first-order autoregression), which a fit of four numbers,
+// rotation and size, makes look smaller by 4/3 (1 + r) / k.
+std::optional<double> wrong_scale(const std::vector<Eigen::Vector3d>& estimate,
+                                  const std::vector<Eigen::Vector3d>& truth) {
+  constexpr double kLeast = 0.1, kFitted = 4;
+  constexpr size_t kMostSteps = 10;
+  const Similarity3 fit = align_umeyama(truth, estimate, true);
+  if (!(fit.scale > 0) || !(std::abs(std::log(fit.scale)) > kLeast)) return {};
+  const size_t last = truth.size() - 1, steps = std::min(last, kMostSteps);
+  const std::vector<Eigen::Vector3d> errors = errors_after(fit, truth, estimate);
+  double way = 0, squares = 0, products = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < steps; ++i) {
+    const size_t from = i * last / steps, to = (i + 1) * last / steps;
+    const Eigen::Vector3d error = errors[to] - errors[from];
+    way += (truth[to] - truth[from]).squaredNorm();
+    squares += error.squaredNorm();
+    products += error.dot(before);
+    before = error;
+  }
+  const double k = static_cast<double>(steps), seen = squares > 0 ? products / squares : 0;
+  const double r = std::clamp(seen + kFitted / 3 * (1 + seen) / k, 0.0, 1.0);
+  const double independent = k * (1 - r) / (1 + r), freedom = 3 * independent - kFitted;
+  if (!(freedom >= 1)) return {};
+  const double variance = squares / (3 * k) * (3 * independent / freedom);  // [m^2] of a step's coordinate
+  const double standard_error = std::sqrt(variance * k / (independent * way));
+  if (!(std::abs(fit.scale - 1) >= five_standard_errors(freedom) * standard_error)) return {};
+  return 1 / fit.scale;
 }
 
 void add_statistics(PoseErrors* errors) {
@@ -229,6 +256,9 @@ std::vector<std::pair<size_t, size_t>> match_stamps(const Trajectory& a, const T
 Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const EvaluationOptions& options,
                     const std::string& name) {
   options.check();
+  const std::string whose = name.empty() ? name : name + ": ";
+  if (given.empty()) throw InputError(whose + "the estimate has no poses; was every frame lost?");
+  if (truth.empty()) throw InputError("the truth has no poses");
   Trajectory estimate = given;
   for (StampedPose& pose : estimate) pose.timestamp += options.time_offset;
   Evaluation e;
@@ -238,10 +268,9 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const Eval
   const auto matches = match_stamps(truth, estimate, options.max_difference);
   if (matches.size() < 2)
     throw InputError(
-        (name.empty() ? name : name + ": ") +
-        fmt::format("{} of {} estimated and {} true poses match within {} s; at least 2 must (are both of one "
-                    "recording and one clock?)",
-                    matches.size(), estimate.size(), truth.size(), options.max_difference));
+        whose + fmt::format("{} of {} estimated and {} true poses match within {} s; at least 2 must (are both of one "
+                            "recording and one clock?)",
+                            matches.size(), estimate.size(), truth.size(), options.max_difference));
   for (const auto& [i, j] : matches) {
     e.timestamps.push_back(estimate[j].timestamp);
     to.push_back(truth[i].world_from_cam.translation);
@@ -258,7 +287,7 @@ Evaluation evaluate(const Trajectory& truth, const Trajectory& given, const Eval
   // A wrong scale is an error of its own, and leaves the rotation as it is.
   const Similarity3 best = align_umeyama(from, to, true);
   const std::vector<Eigen::Vector3d> errors = errors_after(best, from, to);
-  if (options.alignment != Alignment::sim3) e.wrong_scale = wrong_scale(best, errors, from);
+  if (options.alignment != Alignment::sim3) e.wrong_scale = wrong_scale(from, to);
   if (by_positions) e.rotation_sd_deg = leave_a_line(from, to) ? rotation_sd(errors, to) : INFINITY;
   const Similarity3& s = e.truth_from_estimate;
   for (const auto& [i, j] : matches) {

@@ -13,6 +13,7 @@
 #include "dkb/util/errors.h"
 #include "dkb/util/random.h"
 #include "dkb/util/test_data.h"
+#include "dkb/util/test_errors.h"
 
 namespace dkb {
 namespace {
@@ -292,6 +293,34 @@ TEST(Evaluate, AScaleThatIsWrongBeyondDoubtIsTold) {
   EXPECT_FALSE(evaluate(truth, random_walk(200, 6)).wrong_scale);
 }
 
+// A camera that begins to move at 0.3 m/s; its estimate is off by `error` of the way so far, as when the error wanders.
+Trajectory beginning(int poses, double error) {
+  Random random(4);
+  Trajectory t;
+  Eigen::Vector3d off(0, 0, 0);
+  for (int i = 0; i < poses; ++i) {
+    const double s = i / 30.0;
+    t.push_back(pose(s, Eigen::Vector3d(0.3 * s, 0.1 * s * s, 0) + off));
+    for (int k = 0; k < 3; ++k) off[k] += error * 0.01 * random.normal();
+  }
+  return t;
+}
+
+TEST(Evaluate, AFewPosesTellNoScale) {
+  for (const int poses : {2, 3, 4, 5, 10, 30})
+    for (const double error : {0.1, 0.3, 1.0, 3.0})
+      EXPECT_FALSE(evaluate(beginning(poses, 0), beginning(poses, error)).wrong_scale) << poses << " " << error;
+}
+
+// Errors of a few millimetres that go with each other, on a way of a metre: a wrong depth factor stands out.
+TEST(Evaluate, AScaleIsToldAlsoWhereErrorsHangTogether) {
+  for (const double factor : {0.2, 5.0}) {
+    Trajectory estimate = beginning(100, 0.1);
+    for (StampedPose& p : estimate) p.world_from_cam.translation *= factor;
+    EXPECT_NEAR(evaluate(beginning(100, 0), estimate).wrong_scale.value_or(0) * factor, 1, 0.05) << factor;
+  }
+}
+
 TEST(Evaluate, TellsHowWellPositionsTellTheRotation) {
   // A clip of a second that moves by 4 mm, with errors of 5 mm and cameras turned by 2 degrees about z.
   Trajectory clip, turned;
@@ -311,7 +340,11 @@ TEST(Evaluate, TellsHowWellPositionsTellTheRotation) {
 
 TEST(Evaluate, TooFewMatchesAreAnInputError) {
   EXPECT_THROW(evaluate(stamps({1, 2, 3}), stamps({11, 12})), InputError);
-  EXPECT_THROW(evaluate(stamps({1, 2, 3}), stamps({})), InputError);
+  EXPECT_EQ(test::input_error_of([] {
+              evaluate(stamps({1, 2, 3}), stamps({}), {}, "run");
+            }),
+            "run: the estimate has no poses; was every frame lost?");
+  EXPECT_EQ(test::input_error_of([] { evaluate(stamps({}), stamps({1, 2})); }), "the truth has no poses");
   EXPECT_THROW(evaluate(stamps({1}), stamps({1})), InputError);
   EXPECT_THROW(evaluate(stamps({1, 2}), stamps({1, 2}), {.max_difference = -1, .rpe_delta = {}}), InvalidOption);
   EXPECT_EQ(evaluate(stamps({1, 2}), stamps({1, 2})).ape.translation.count, 2u);

@@ -27,7 +27,8 @@ Range above(double min) {
 // Visits every setting: its key, its public field, the stages' field, unit and meaning, and what it may be.
 template <class Public, class Internal, class Visit>
 void each_setting(Public& p, Internal& o, const Visit& visit) {
-  visit("seed", p.seed, o.seed, "of every source of randomness");
+  visit("seed", p.seed, o.seed,
+        "of the random draws in finding a lost camera, loops and the floor; results hardly ever depend on it");
 
   // Fewer than a point's name has room for (kMaxFeaturesPerFrame), since an image may give a few more than are wanted.
   visit("features.count", p.features.count, o.features.count, "[features] wanted per image", Range{1, 8000});

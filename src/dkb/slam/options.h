@@ -44,7 +44,7 @@ struct SlamOptions {
   DenseOptions dense;
   bool dense_map = false;  // keep what the dense map is made of
   PipelineOptions pipeline;
-  uint64_t seed = 1;     // reaches every source of randomness
+  uint64_t seed = 1;     // of every source of randomness in the run
   Rigid3 base_from_cam;  // mount: the world is the robot's base at the first tracked frame
 };
 

@@ -43,9 +43,23 @@ std::string read_file(const fs::path& path) {
   return content;
 }
 
+namespace {
+
+fs::path folder_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+}  // namespace
+
 void fail_to_write(const fs::path& path, const std::string& what, int error, const std::string& kept) {
   const std::string message = path.string() + ": cannot be written (" + what + ": " + std::strerror(error) + ")";
-  if (error == ENOENT || error == ENOTDIR) throw InputError(message + "; make the folder, or choose another");
+  if (path.filename().empty()) throw InputError(message + "; give the name of a file");
+  if (error == ENOENT || error == ENOTDIR) {
+    std::error_code unknown;
+    if (!fs::is_directory(folder_of(behind_links(path)), unknown))
+      throw InputError(message + "; make the folder, or choose another");
+    throw OutputError(message + "; something else took it away meanwhile" + kept);
+  }
   for (const int place : {EISDIR, EACCES, EPERM, ENAMETOOLONG, ELOOP, EEXIST, ENOTEMPTY})
     if (error == place) throw InputError(message + "; choose another place");
   throw OutputError(message + kept);
@@ -62,8 +76,7 @@ fs::path behind_links(const fs::path& path) {
 
 fs::path temporary_beside(const fs::path& target) {
   static std::atomic<uint64_t> made{0};
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  return folder /
+  return folder_of(target) /
          ("." + target.filename().string() + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(++made));
 }
 
@@ -116,8 +129,7 @@ void GrowingFile::commit() {
   if (straight_) return;
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("rename");
   temporary_.clear();
-  const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  const int dir = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int dir = ::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (dir >= 0) {
     ::fsync(dir);
     ::close(dir);

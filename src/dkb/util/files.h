@@ -46,7 +46,7 @@ class GrowingFile {
 
 // Throws that `path` cannot be written, with what was tried and the errno that it met: an InputError with the remedy
 // where the place is wrong (no such folder, a folder of that name), an OutputError, with `kept` at its end, where the
-// disk is full or broken.
+// disk is full or broken or the file went away while it was written.
 [[noreturn]] void fail_to_write(const std::filesystem::path& path, const std::string& what, int error,
                                 const std::string& kept = "");
 

@@ -16,17 +16,19 @@
 namespace dkb {
 namespace {
 
+// Letters that are left out, added or replaced, and neighbours that changed places.
 size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<size_t> row(b.size() + 1);
+  std::vector<size_t> before(b.size() + 1), row(b.size() + 1), next(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
   for (size_t i = 1; i <= a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i;
+    next[0] = i;
     for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+      next[j] = std::min({row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        next[j] = std::min(next[j], before[j - 2] + 1);
     }
+    before.swap(row);
+    row.swap(next);
   }
   return row[b.size()];
 }
@@ -50,15 +52,18 @@ std::string limit_to_text(double value) {
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
   std::string best;
   size_t best_distance = std::numeric_limits<size_t>::max();
+  bool one_of_several = false;
   if (name.size() > 200) return best;
   for (const std::string& candidate : candidates) {
     const size_t distance = edit_distance(name, candidate);
     const size_t longer = std::max(name.size(), candidate.size());
     const size_t shorter = std::min(name.size(), candidate.size());
-    const bool plausible = distance <= std::max<size_t>(2, longer / 3) && distance < shorter;
-    if (plausible && distance < best_distance) best = candidate, best_distance = distance;
+    const bool plausible = distance <= std::max<size_t>(1, longer / 3) && distance < shorter;
+    if (!plausible || distance > best_distance) continue;
+    one_of_several = distance == best_distance && candidate != best;
+    best = candidate, best_distance = distance;
   }
-  return best;
+  return one_of_several ? "" : best;
 }
 
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {

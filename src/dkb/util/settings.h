@@ -19,8 +19,9 @@
 
 namespace dkb {
 
-// The candidate with the smallest edit distance (Levenshtein) to `name`, the first of equals; empty when none is near
-// enough to be a plausible misspelling (more than a third of the longer name, or 2 letters, differ).
+// The candidate with the smallest edit distance to `name`, neighbours that changed places being one edit; empty when
+// none is near enough to be a plausible misspelling (more than a third of the longer name differs, or more than one
+// letter of a short one) or several are as near.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 
 // ` (did you mean "features.count"?)`, or nothing when no candidate is near.

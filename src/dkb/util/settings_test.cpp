@@ -36,7 +36,12 @@ TEST(NearestName, FindsMisspellingsAndRefusesStrangers) {
   const std::vector<std::string> names{"depth_factor", "features.count", "fx", "fy"};
   EXPECT_EQ(nearest_name("depth_factr", names), "depth_factor");
   EXPECT_EQ(nearest_name("featurs.count", names), "features.count");
-  EXPECT_EQ(nearest_name("fz", names), "fx");
+  EXPECT_EQ(nearest_name("fxx", names), "fx");
+  EXPECT_EQ(nearest_name("fz", names), "") << "fx and fy are as near";
+  EXPECT_EQ(nearest_name("foo", {"yolo", "loop", "none"}), "");
+  EXPECT_EQ(nearest_name("fr9", {"fr1", "fr2", "fr3", "bonn"}), "");
+  EXPECT_EQ(nearest_name("motoin", {"motion"}), "motion");
+  EXPECT_EQ(nearest_name("rbg", {"rgb", "bgr"}), "rgb") << "neighbours that changed places";
   EXPECT_EQ(nearest_name("banana", names), "");
   EXPECT_EQ(nearest_name("", names), "");
 }

@@ -14,11 +14,13 @@
 #include "dkb/util/bounded_queue.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
+#include "dkb/util/folder_lock.h"
 #include "dkb/util/log.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/quantile.h"
 #include "dkb/util/radix_sort.h"
 #include "dkb/util/random.h"
+#include "dkb/util/test_errors.h"
 #include "dkb/util/test_folder.h"
 #include "dkb/util/thread_priority.h"
 #include "dkb/util/timing.h"
@@ -194,6 +196,19 @@ TEST(Files, AFolderInTheirPlaceStays) {
   EXPECT_TRUE(fs::is_empty(folder / "a"));
 }
 
+TEST(Files, OneThatIsTakenAwayWhileItIsWrittenIsNoBadPlace) {
+  const test::TempFolder folder;
+  GrowingFile file(folder / "a", ".part");
+  file.append("x");
+  fs::remove(folder / "a.part");
+  try {
+    file.commit();
+    FAIL() << "must throw";
+  } catch (const OutputError& e) {
+    EXPECT_NE(std::string(e.what()).find("; something else took it away meanwhile"), std::string::npos) << e.what();
+  }
+}
+
 TEST(Files, AreReadWholeWhetherTheyTellTheirSizeOrNot) {
   const test::TempFolder folder;
   const fs::path path = folder / "file";
@@ -223,6 +238,18 @@ TEST(Files, AnUnwritablePlaceIsNamed) {
   }
   EXPECT_THROW(make_output_folder("/proc/nowhere"), InputError);
   EXPECT_THROW(read_file("/nowhere/at/all"), InputError);
+}
+
+TEST(FolderLock, KeepsAFolderToOneWriterAndLeavesNothing) {
+  const test::TempFolder folder;
+  {
+    const FolderLock held(folder.path());
+    EXPECT_EQ(
+        test::input_error_of([&] { FolderLock(folder.path()); }),
+        folder.path().string() + ": another run is writing its results there; wait for it, or choose another folder");
+    EXPECT_TRUE(fs::is_empty(folder.path()));
+  }
+  EXPECT_NO_THROW(FolderLock(folder.path()));
 }
 
 TEST(StageTimes, SummarisesWithPercentiles) {
