@@ -34,7 +34,7 @@ std::string legend(const std::vector<std::pair<const char*, std::string>>& entri
     out += fmt::format("<line x1=\"{0:.0f}\" y1=\"{1:.0f}\" x2=\"{2:.0f}\" y2=\"{1:.0f}\"{3} stroke-width=\"3\"/>\n", x,
                        y, x + 18, styled(style));
     out += svg::label(x + 23, y + 4, "start", 11, svg::kInk, name);
-    x += 38 + 6.2 * static_cast<double>(name.size());
+    x += 44 + 6.2 * static_cast<double>(name.size());
   }
   return out;
 }
