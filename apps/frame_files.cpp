@@ -36,7 +36,11 @@ std::string rows_of_boxes(const std::string& stamp, const FrameResult& result) {
 
 std::string row_of_log(const std::string& stamp, const FrameResult& result) {
   std::string log = fmt::format("{} frame {} {}", stamp, result.frame, name_of(result.state));
-  if (result.tracked()) log += fmt::format(", {} points; {}", result.inliers, result.keyframe_explanation);
+  if (result.tracked())
+    log += fmt::format(", {} points; {}", result.inliers, result.keyframe_explanation);
+  else if (result.state != TrackingState::paused)
+    log += fmt::format(": {} features, {} with depth on what stands still, {} fit the map", result.features.size(),
+                       result.with_depth, result.refused_inliers);
   return log + '\n';
 }
 

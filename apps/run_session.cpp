@@ -116,6 +116,7 @@ report::ReportFacts report_facts(const RunArguments& args, const Source& source,
   r.statistics = statistics_with(slam, facts);
   r.trajectory = trajectory;
   r.poses_of_map = facts.poses_of_map;
+  r.take_map(slam.map());
   r.settings = report::changed_settings(options);
   r.limits = {options.tracking.min_inliers, options.tracking.initial_points, r.camera.fx, r.camera.width};
   r.seed = options.seed;
@@ -364,17 +365,19 @@ void RunSession::write(double seconds) {
   write_outputs(out_, *slam_, trajectories, facts_);
   files_->commit();
   written.merge(files_->names());
+  std::optional<OccupancyGrid> grid;
   std::exception_ptr no_dense_map;
   if (args_.dense && !failure_) {
     try {
-      write_dense(trajectories.front(), written);
+      grid = write_dense(trajectories.front(), written);
     } catch (...) {
       no_dense_map = std::current_exception();
       written.insert({"dense.ply", "occupancy.pgm", "occupancy.yaml"});  // the error says that earlier ones are kept
     }
   }
   write_statistics(out_, *slam_, facts_);  // with the time that the dense map took
-  const report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
+  report::ReportFacts reported = report_facts(args_, *recording_, options_, *slam_, trajectories.front(), facts_);
+  if (grid && grid->map == 0) reported.grid = std::move(grid);
   report::Truth truth = report::evaluated_by_truth(args_.source, reported.trajectory);
   write_file_atomically(out_ / "report.html", report_html(*log_, reported, truth));
   if (args_.cv_orb && interrupted_.empty()) {
@@ -401,15 +404,16 @@ void RunSession::write(double seconds) {
   if (no_dense_map) std::rethrow_exception(no_dense_map);
 }
 
-void RunSession::write_dense(const Trajectory& trajectory, std::set<std::string>& written) {
+std::optional<OccupancyGrid> RunSession::write_dense(const Trajectory& trajectory, std::set<std::string>& written) {
   const Stopwatch building;
   // Of the world of trajectory.txt, unless that holds nothing.
-  const DenseMap map = trajectory.empty() ? slam_->dense_map() : slam_->dense_map(0);
+  DenseMap map = trajectory.empty() ? slam_->dense_map() : slam_->dense_map(0);
   facts_.times.add("dense_build", building.ms());
   const std::string line = write_dense_map(out_, map, building.ms() / 1000);
   if (!args_.quiet) tell(stdout, "{}\n", line);
   written.insert("dense.ply");
   if (map.grid) written.insert({"occupancy.pgm", "occupancy.yaml"});
+  return std::move(map.grid);
 }
 
 int RunSession::tell_the_end() {

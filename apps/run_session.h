@@ -76,7 +76,8 @@ class RunSession {
   void tell_depths(const Frame& first);
   void show(const SourceFrame& next, FrameResult result);
   void write(double seconds);
-  void write_dense(const Trajectory& trajectory, std::set<std::string>& written);
+  // Returns the grid, if there is a floor.
+  std::optional<OccupancyGrid> write_dense(const Trajectory& trajectory, std::set<std::string>& written);
   int tell_the_end();
   std::string without_new_map() const;
   std::string remedy_without_features() const;

@@ -102,9 +102,12 @@ TEST(Report, NamesWhyAStretchIsLost) {
                          "45", "--blackout", "0.7,0.3"})
                 .exit_code,
             0);
-  const SlamRun run(temp / "dark", temp / "out");
+  const SlamRun run(temp / "dark", temp / "out", {"--debug-log"});
   ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
   ASSERT_GT(run.stats.at("lost"), 0);
+  EXPECT_NE(
+      read_text(run.out / "debug.log").find(" lost: 0 features, 0 with depth on what stands still, 0 fit the map\n"),
+      std::string::npos);
   const std::string html = read_text(run.out / "report.html");
   expect_sound(html);
   EXPECT_EQ(by_id(html, "lost-frames"), std::to_string(run.stats.at("lost").get<int>()));

@@ -34,7 +34,7 @@ std::string legend(const std::vector<std::pair<const char*, std::string>>& entri
     out += fmt::format("<line x1=\"{0:.0f}\" y1=\"{1:.0f}\" x2=\"{2:.0f}\" y2=\"{1:.0f}\"{3} stroke-width=\"3\"/>\n", x,
                        y, x + 18, styled(style));
     out += svg::label(x + 23, y + 4, "start", 11, svg::kInk, name);
-    x += 38 + 6.2 * static_cast<double>(name.size());
+    x += 44 + 6.2 * static_cast<double>(name.size());
   }
   return out;
 }
@@ -224,6 +224,7 @@ std::string thin_path(const SpacePath& path, const std::vector<Eigen::Vector2d>&
 }
 
 std::string path_svg(const SpacePath& path, const std::vector<Eigen::Vector2d>& px) {
+  if (px.empty()) return "";
   double least = 0.7;
   std::string d = thin_path(path, px, least);
   while (d.size() > 11 * kPathPoints && least < 100) d = thin_path(path, px, least *= 2);
@@ -291,10 +292,15 @@ std::vector<SpacePath> floor_below(const std::vector<SpacePath>& paths, double* 
 
 }  // namespace
 
+// A right-handed frame with up for either sign.
+std::pair<int, int> axes_from_above(UpAxis up) {
+  std::pair<int, int> axes((up.axis + 1) % 3, (up.axis + 2) % 3);
+  if (up.negative) std::swap(axes.first, axes.second);
+  return axes;
+}
+
 std::vector<std::string> path_views(const std::vector<SpacePath>& paths, UpAxis up) {
-  // a to the right and b away from the viewer, with up above: a right-handed frame for either sign.
-  int a = (up.axis + 1) % 3, b = (up.axis + 2) % 3;
-  if (up.negative) std::swap(a, b);
+  const auto [a, b] = axes_from_above(up);
   std::vector<SpacePath> local;
   for (SpacePath path : paths) {
     if (path.points.empty()) continue;
@@ -321,6 +327,133 @@ std::vector<std::string> path_views(const std::vector<SpacePath>& paths, UpAxis 
           view_svg({fmt::format("In space, over a grid of {:g} m", step), right,
                     std::cos(kTilt) * eu + std::sin(kTilt) * away, "", ""},
                    local, floor)};
+}
+
+namespace {
+
+constexpr double kMapTop = 46, kMapHeight = 330;
+constexpr size_t kMapBytes = 60000;  // of the points, or of the cells
+
+// Cells of a raster, row 0 at the top, as a path of horizontal runs; `thick`: filled rectangles, else strokes.
+std::string runs(const Image<uint8_t>& cells, uint8_t wanted, bool thick) {
+  std::string d;
+  for (int y = 0; y < cells.height(); ++y)
+    for (int x = 0; x < cells.width(); ++x) {
+      if (cells(x, y) != wanted) continue;
+      const int begin = x;
+      while (x < cells.width() && cells(x, y) == wanted) ++x;
+      d += thick ? fmt::format("M{} {}h{}v1h-{}z", begin, y, x - begin, x - begin)
+                 : fmt::format("M{} {}h{}", begin, y, x - begin);
+    }
+  return d;
+}
+
+// A bar of a length that is easy to think of, at the lower right.
+std::string scale_bar(const svg::Panel& panel, double metres_across) {
+  const double step = svg::tick_step(metres_across), px = panel.px(step) - panel.px(0);
+  const double right = kLeft + kPanel - 12, y = kMapTop + kMapHeight - 12;
+  return fmt::format("<path class=\"scale\" d=\"M{:.1f} {:.1f}v-6v3h{:.1f}v3v-6\"/>\n", right - px, y + 3, px) +
+         svg::label(right - px / 2, y - 8, "middle", 11, svg::kInk, fmt::format("{:g} m", step), " class=\"halo\"");
+}
+
+std::vector<Eigen::Vector2d> pixels(const svg::Panel& panel, const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector2d> px;
+  for (const Eigen::Vector3d& p : points) px.emplace_back(panel.px(p.x()), panel.py(p.y()));
+  return px;
+}
+
+std::string start_mark(const svg::Panel& panel, const SpacePath& path) {
+  if (path.points.empty()) return "";
+  return fmt::format("<circle class=\"start\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\"/>\n",
+                     panel.px(path.points.front().x()), panel.py(path.points.front().y()));
+}
+
+// All but the farthest hundredth at either end, which are mostly wrong.
+svg::Range usual_range(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t skipped = values.size() / 100;
+  return {values[skipped], values[values.size() - 1 - skipped]};
+}
+
+void widen(svg::Range& range, double value) {
+  range = {std::min(range.low, value), std::max(range.high, value)};
+}
+
+}  // namespace
+
+std::string map_above(const MapAbove& map) {
+  std::vector<double> xs, ys;
+  for (const auto* all : {&map.points, &map.path.points})
+    for (const Eigen::Vector3d& p : *all) xs.push_back(p.x()), ys.push_back(p.y());
+  if (xs.empty()) return "";
+  svg::Range x = usual_range(std::move(xs)), y = usual_range(std::move(ys));
+  for (const auto* all : {&map.keyframes, &map.path.points})
+    for (const Eigen::Vector3d& p : *all) widen(x, p.x()), widen(y, p.y());
+  svg::frame_equally(kPanel, kMapHeight, &x, &y);
+  const svg::Panel panel(kLeft, kMapTop, kPanel, kMapHeight, x, y);
+  std::string out = opening(kMapTop + kMapHeight + 42, "The map from above");
+  out += svg::label(kLeft, 16, "start", 13, svg::kInk, "The map from above", " class=\"title\"");
+  out += legend({{"cloud", "map points"}, {"keys", "keyframes"}, {map.path.style, "path"}}, 32);
+  out += panel.axes(map.right_name, map.up_name);
+  // Points as cells of a raster: a picture of a large map is no larger than one of a small one.
+  std::string cloud;
+  for (double cell = 1.2; cell == 1.2 || cloud.size() > kMapBytes; cell *= 1.4) {
+    Image<uint8_t> cells(static_cast<int>(kPanel / cell), static_cast<int>(kMapHeight / cell), uint8_t{0});
+    for (const Eigen::Vector2d& p : pixels(panel, map.points)) {
+      const double column = (p.x() - kLeft) / cell, row = (p.y() - kMapTop) / cell;
+      if (column >= 0 && row >= 0 && column < cells.width() && row < cells.height())
+        cells(static_cast<int>(column), static_cast<int>(row)) = 1;
+    }
+    cloud = fmt::format("<path class=\"cloud\" transform=\"translate({} {:.1f}) scale({:.3g})\" d=\"{}\"/>\n", kLeft,
+                        kMapTop + cell / 2, cell, runs(cells, 1, false));
+  }
+  out += cloud + path_svg(map.path, pixels(panel, map.path.points));
+  std::string keys;
+  Eigen::Vector2d last(-1e9, -1e9);
+  for (const Eigen::Vector2d& p : pixels(panel, map.keyframes)) {
+    if ((p - last).norm() < 2) continue;
+    last = p;
+    keys += fmt::format("M{:.1f} {:.1f}h.1", p.x(), p.y());
+  }
+  out += "<path class=\"keys\" d=\"" + keys + "\"/>\n";
+  return out + start_mark(panel, map.path) + scale_bar(panel, x.length()) + "</svg>\n";
+}
+
+std::string grid_above(const OccupancyGrid& grid, const SpacePath& path) {
+  const Image<uint8_t>& full = grid.cells;
+  if (full.width() == 0 || full.height() == 0) return "";
+  svg::Range x{grid.origin_x, grid.origin_x + full.width() * grid.cell},
+      y{grid.origin_y, grid.origin_y + full.height() * grid.cell};
+  const double top = y.high;
+  for (const Eigen::Vector3d& p : path.points) widen(x, p.x()), widen(y, p.y());
+  svg::frame_equally(kPanel, kMapHeight, &x, &y);
+  const svg::Panel panel(kLeft, kMapTop, kPanel, kMapHeight, x, y);
+  std::string out = opening(kMapTop + kMapHeight + 42, "Where a robot can drive");
+  out += svg::label(kLeft, 16, "start", 13, svg::kInk, "Where a robot can drive", " class=\"title\"");
+  out += legend({{"free", "free"}, {"occupied", "occupied"}, {"unknown", "unknown"}, {path.style, "path"}}, 32);
+  out += fmt::format("<rect class=\"unknown\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kMapTop, kPanel,
+                     kMapHeight);
+  // Of cells that are drawn as one, an occupied one counts before a free one.
+  std::string cells;
+  for (int step = 1; cells.empty() || cells.size() > kMapBytes; ++step) {
+    Image<uint8_t> joined((full.width() + step - 1) / step, (full.height() + step - 1) / step, OccupancyGrid::kUnknown);
+    for (int row = 0; row < full.height(); ++row)
+      for (int column = 0; column < full.width(); ++column) {
+        const uint8_t value = full(column, row);
+        uint8_t& shown = joined(column / step, row / step);
+        if (value == OccupancyGrid::kOccupied || (value == OccupancyGrid::kFree && shown == OccupancyGrid::kUnknown))
+          shown = value;
+      }
+    cells = fmt::format("<g transform=\"translate({:.2f} {:.2f}) scale({:.5g})\" shape-rendering=\"crispEdges\">",
+                        panel.px(grid.origin_x), panel.py(top), (panel.px(grid.cell) - panel.px(0)) * step);
+    for (const auto& [style, value] :
+         {std::pair{"free", OccupancyGrid::kFree}, std::pair{"occupied", OccupancyGrid::kOccupied}})
+      cells += fmt::format("<path class=\"{}\" d=\"{}\"/>\n", style, runs(joined, value, true));
+    cells += "</g>\n";
+  }
+  out += cells + panel.axes("x of the grid [m]", "y of the grid [m]");
+  return out + path_svg(path, pixels(panel, path.points)) + start_mark(panel, path) + scale_bar(panel, x.length()) +
+         "</svg>\n";
 }
 
 }  // namespace dkb::report

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dkb/geometry/rigid3.h"
+#include "dkb_slam/map.h"
 
 // The report's diagrams: SVG inside HTML, coloured by the page's classes so that they follow its light and dark. Their
 // size does not grow with the number of frames.
@@ -77,7 +78,19 @@ struct UpAxis {
   bool negative = false;
 };
 UpAxis up_axis(const std::vector<Rigid3>& world_from_cam);
+// The world's axes that point to the right and up in a picture from above.
+std::pair<int, int> axes_from_above(UpAxis up);
 // From above, from the side and in space. The last path's start is marked.
 std::vector<std::string> path_views(const std::vector<SpacePath>& paths, UpAxis up);
+
+// A map from above [m], its path last; of points far from all others some may lie outside the picture.
+struct MapAbove {
+  std::string right_name, up_name;
+  std::vector<Eigen::Vector3d> points, keyframes;  // x to the right, y up in the picture
+  SpacePath path;                                  // likewise
+};
+std::string map_above(const MapAbove& map);
+// `path`: on the grid's floor.
+std::string grid_above(const OccupancyGrid& grid, const SpacePath& path);
 
 }  // namespace dkb::report

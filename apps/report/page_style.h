@@ -7,9 +7,9 @@ namespace dkb::report {
 // shape. Paper is always light.
 inline constexpr const char* kPageStyle = R"(
 :root{--paper:#fff;--card:#f6f8fa;--ink:#1f2328;--dim:#59636e;--line:#8c959f;--grid:#dfe3e8;--est:#0072b2;--truth:#a9b0b8;
---second:#c25a00;--good:#00795a;--bad:#b84a00;--pred:#a3467e}
+--second:#c25a00;--free:#a5d8c6;--occupied:#c25a00;--good:#00795a;--bad:#b84a00;--pred:#a3467e}
 @media screen and (prefers-color-scheme:dark){:root{--paper:#0f1318;--card:#181d24;--ink:#e6e9ed;--dim:#a3acb7;
---line:#6b7682;--grid:#2c343d;--est:#5cb6f0;--truth:#6f7a86;--second:#f0a040;--good:#35c79a;--bad:#ff8a4c;--pred:#e08fc0}
+--line:#6b7682;--grid:#2c343d;--est:#5cb6f0;--truth:#6f7a86;--second:#f0a040;--free:#1c5a49;--occupied:#f0a040;--good:#35c79a;--bad:#ff8a4c;--pred:#e08fc0}
 :root{color-scheme:dark}}
 *{box-sizing:border-box}
 body{margin:0 auto;padding:0 20px 40px;max-width:1240px;background:var(--paper);color:var(--ink);
@@ -30,6 +30,7 @@ a:focus-visible{outline:2px solid var(--est);outline-offset:2px}
 .tile .value{font-size:22px;font-weight:600;line-height:1.3}
 .tile .more{font-size:13px;color:var(--dim);line-height:1.35}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr));gap:14px 18px}
+.grid.maps{grid-template-columns:repeat(auto-fill,minmax(min(100%,440px),1fr))}
 .grid.three{grid-template-columns:repeat(auto-fit,minmax(min(100%,340px),1fr))}
 figure{margin:0;break-inside:avoid}
 figcaption{font-size:13px;line-height:1.4;padding:4px 0 0}
@@ -44,9 +45,22 @@ svg [stroke="#e6e8eb"],svg line.grid,.line.grid{stroke:var(--grid)}
 svg .line.est{stroke:var(--est)}
 svg .line.truth{stroke:var(--truth);stroke-width:4}
 svg .line.second{stroke:var(--second);stroke-dasharray:5 3}
+svg .line.removed{stroke:var(--pred);stroke-dasharray:1.5 3}
 svg .line.error{stroke:var(--second)}
 svg .line.shadow{stroke:var(--dim);stroke-width:1;opacity:.55}
 svg .line.grid{stroke-width:1}
+.cloud,.keys{fill:none;stroke:var(--dim)}
+.cloud{opacity:.65}
+.keys{stroke:var(--second);stroke-width:4.5;stroke-linecap:round}
+.free{fill:var(--free);stroke:none}
+.occupied{fill:var(--occupied);stroke:none}
+.unknown{fill:var(--grid);stroke:none}
+svg .line.cloud{stroke:var(--dim)}
+svg .line.keys{stroke:var(--second);stroke-width:4.5}
+svg .line.free{stroke:var(--free);stroke-width:9;stroke-linecap:butt}
+svg .line.occupied{stroke:var(--occupied);stroke-width:9;stroke-linecap:butt}
+svg .line.unknown{stroke:var(--grid);stroke-width:9;stroke-linecap:butt}
+.scale{fill:none;stroke:var(--ink);stroke-width:1.4}
 .start{fill:var(--est);stroke:var(--paper);stroke-width:1.5}
 .level,.budget{stroke:var(--ink);stroke-width:1.4;stroke-dasharray:6 4}
 .bars{fill:var(--est)}

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "dkb/evaluation/svg_drawing.h"
+#include "dkb/util/plural.h"
 #include "dkb/util/stamps.h"
 
 namespace dkb::report {
@@ -24,6 +25,12 @@ std::string figure(const std::string& svg) {
   return "<figure>" + svg + "</figure>\n";
 }
 
+// "Frames 20 to 22, 2.00 to 2.20 s: 3 frames".
+std::string frames_text(const Context& c, size_t begin, size_t end) {
+  return fmt::format("Frames {} to {}, {:.2f} to {:.2f} s: {}", begin, end - 1, c.seconds[begin], c.seconds[end - 1],
+                     plural(static_cast<long>(end - begin), "frame", "frames"));
+}
+
 // A value of each row that has a pose by the images.
 template <class Value>
 Line line_of(const Context& c, const char* style, const char* name, Value value) {
@@ -33,9 +40,16 @@ Line line_of(const Context& c, const char* style, const char* name, Value value)
   return line;
 }
 
-// The trajectory in the truth's world, or in its own.
-Eigen::Vector3d drawn(const Context& c, const Rigid3& pose) {
-  return c.truth.evaluation ? c.truth.evaluation->truth_from_estimate * pose.translation : pose.translation;
+// A point of the first map in the truth's world, or in its own.
+Eigen::Vector3d drawn(const Context& c, const Eigen::Vector3d& point) {
+  return c.truth.evaluation ? c.truth.evaluation->truth_from_estimate * point : point;
+}
+
+UpAxis up_where_drawn(const Context& c) {
+  if (c.truth.evaluation) return up_axis(c.truth.evaluation->truth);
+  std::vector<Rigid3> poses;
+  for (const StampedPose& p : c.facts.trajectory) poses.push_back(p.world_from_cam);
+  return up_axis(poses);
 }
 
 // The truth's poses during the run.
@@ -47,6 +61,7 @@ Trajectory truth_during_run(const Context& c) {
   return during;
 }
 
+// In the first map's world.
 SpacePath estimated_path(const Context& c) {
   SpacePath path{"est", "estimate (dot: start)", {}, {}};
   size_t last = 0;
@@ -55,7 +70,7 @@ SpacePath estimated_path(const Context& c) {
     if (path.points.empty() || (row != last + 1 && c.seconds[row] - c.seconds[last] > least_gap(c.duration)))
       path.starts.push_back(path.points.size());
     last = row;
-    path.points.push_back(drawn(c, p.world_from_cam));
+    path.points.push_back(p.world_from_cam.translation);
   }
   return path;
 }
@@ -65,22 +80,39 @@ SpacePath estimated_path(const Context& c) {
 std::string path_section(const Context& c) {
   if (c.facts.trajectory.empty()) return "";
   std::vector<SpacePath> paths;
-  std::vector<Rigid3> poses;
   if (c.truth.evaluation) {
     SpacePath truth{"truth", "truth", {}, {0}};
     for (const StampedPose& p : truth_during_run(c)) truth.points.push_back(p.world_from_cam.translation);
     paths.push_back(std::move(truth));
-    poses = c.truth.evaluation->truth;
-  } else {
-    for (const StampedPose& p : c.facts.trajectory) poses.push_back(p.world_from_cam);
   }
   paths.push_back(estimated_path(c));
+  for (Eigen::Vector3d& p : paths.back().points) p = drawn(c, p);
   std::string out = heading("path", "Path") + "<div class=\"grid three\">\n";
-  for (const std::string& view : path_views(paths, up_axis(poses))) out += figure(view);
+  for (const std::string& view : path_views(paths, up_where_drawn(c))) out += figure(view);
   out += "</div>\n";
   if (c.facts.statistics.maps > 1)
     out += "<p class=\"dim\">Of the first map alone; the others have worlds of their own.</p>\n";
   return out;
+}
+
+std::string map_section(const Context& c) {
+  if (c.facts.trajectory.empty() || c.facts.map_points.empty()) return "";
+  const std::pair<int, int> axes = axes_from_above(up_where_drawn(c));
+  const auto above = [&](std::vector<Eigen::Vector3d> points) {
+    for (Eigen::Vector3d& p : points) p = drawn(c, p), p = Eigen::Vector3d(p[axes.first], p[axes.second], 0);
+    return points;
+  };
+  const SpacePath path = estimated_path(c);
+  MapAbove map{std::string(1, "xyz"[axes.first]) + " [m]", std::string(1, "xyz"[axes.second]) + " [m]",
+               above(c.facts.map_points), above(c.facts.keyframes), path};
+  map.path.points = above(path.points);
+  std::string out = heading("map", "Map") + "<div class=\"grid maps\">\n" + figure(map_above(map));
+  if (c.facts.grid) {
+    SpacePath on_floor = path;
+    for (Eigen::Vector3d& p : on_floor.points) p = c.facts.grid->floor_from_world * p;
+    out += figure(grid_above(*c.facts.grid, on_floor));
+  }
+  return out + "</div>\n";
 }
 
 std::string time_section(const Context& c) {
@@ -97,7 +129,7 @@ std::string time_section(const Context& c) {
     }
     Line line{"est", "estimate", {}, {}, {}};
     for (const StampedPose& p : c.facts.trajectory)
-      line.add(c.seconds_of(p.timestamp), drawn(c, p.world_from_cam)[axis], c.row_of(p.timestamp));
+      line.add(c.seconds_of(p.timestamp), drawn(c, p.world_from_cam.translation)[axis], c.row_of(p.timestamp));
     chart.lines.push_back(std::move(line));
     out += figure(time_chart(chart, c.duration, c.bands));
   }
@@ -121,10 +153,10 @@ std::string time_section(const Context& c) {
 }
 
 std::string lost_section(const Context& c) {
-  constexpr size_t kShown = 30;
+  constexpr size_t kShown = 30, kParts = 6;
   std::string out = heading("lost", "Where the images told no pose");
   if (c.stretches.empty()) return out + "<p>Nowhere: every frame was tracked by its images.</p>\n";
-  out += "<p>Shaded in all charts below. The likely cause is what the first frames of a stretch were like.</p>\n";
+  out += "<p>Shaded in all charts below. The likely causes are what the frames of a stretch were like.</p>\n";
   size_t shown = 0;
   for (const LostStretch& s : c.stretches) {
     if (++shown > kShown) break;
@@ -137,11 +169,17 @@ std::string lost_section(const Context& c) {
                                                              : "before the first map";
     out += fmt::format("<div class=\"stretch{}\">", bare ? " bare" : "");
     if (!bare) out += figure(overlay_svg(*picture, "First frame of the stretch"));
-    out += fmt::format(
-        "<div><p class=\"cause\">{}</p><p>{}.</p><p class=\"dim\">Frames {} to {}, {:.2f} to {:.2f} s: {} "
-        "{}.</p></div></div>\n",
-        s.cause, s.evidence, s.begin, s.end - 1, c.seconds[s.begin], c.seconds[s.end - 1], s.end - s.begin,
-        (s.end - s.begin == 1 ? "frame " : "frames ") + std::string(what));
+    out += "<div>";
+    for (size_t k = 0; k < std::min(kParts, s.parts.size()); ++k) {
+      const LostPart& part = s.parts[k];
+      out += fmt::format("<p class=\"cause\">{}</p><p>{}.</p>", part.cause, part.evidence);
+      if (s.parts.size() > 1) out += "<p class=\"dim\">" + frames_text(c, part.begin, part.end) + "</p>";
+    }
+    if (s.parts.size() > kParts) out += fmt::format("<p>And {} parts more.</p>", s.parts.size() - kParts);
+    out += fmt::format("<p class=\"dim\">{} {}.</p></div></div>\n",
+                       s.parts.size() == 1 ? frames_text(c, s.begin, s.end)
+                                           : "In all: " + plural(static_cast<long>(s.end - s.begin), "frame", "frames"),
+                       what);
   }
   if (c.stretches.size() > kShown) out += fmt::format("<p>And {} stretches more.</p>\n", c.stretches.size() - kShown);
   return out;
@@ -150,13 +188,16 @@ std::string lost_section(const Context& c) {
 std::string tracking_section(const Context& c) {
   const std::vector<FrameRow>& rows = c.log.rows();
   std::string out = heading("tracking", "Tracking, filter and keyframes") + "<div class=\"grid\">\n";
-  const TimeChart points{"Features and map points",
-                         "a frame",
-                         {line_of(c, "second", "features", [&](size_t i) { return rows[i].features; }),
-                          line_of(c, "est", "map points that the pose rests on",
-                                  [&](size_t i) { return rows[i].by_images() ? rows[i].inliers : std::nan(""); })},
-                         true,
-                         {{static_cast<double>(c.facts.limits.min_inliers), "fewest for a pose"}}};
+  // What is extracted is mostly features.count, frame by frame: what became of it tells more.
+  const auto by_images = [&](const FrameRow& r, double value) { return r.by_images() ? value : std::nan(""); };
+  const TimeChart points{
+      "Map points and features",
+      "a frame",
+      {line_of(c, "est", "of the pose", [&](size_t i) { return by_images(rows[i], rows[i].inliers); }),
+       line_of(c, "second", "matched, not fitting", [&](size_t i) { return by_images(rows[i], rows[i].misfits); }),
+       line_of(c, "removed", "on movers", [&](size_t i) { return rows[i].removed; })},
+      true,
+      {{static_cast<double>(c.facts.limits.min_inliers), "fewest for a pose"}}};
   out += figure(time_chart(points, c.duration, c.bands));
   const TimeChart removed{"What the filter removed",
                           "share [%]",

@@ -29,6 +29,7 @@ struct Context {
 // The text that stands first: what a reader in a hurry needs, and links to those of the sections that there are.
 std::string verdict(const Context& c, const std::string& sections);
 std::string path_section(const Context& c);
+std::string map_section(const Context& c);
 std::string time_section(const Context& c);
 std::string lost_section(const Context& c);
 std::string tracking_section(const Context& c);

@@ -43,9 +43,12 @@ std::string why_lost(const Context& c, TrackingState state) {
   std::vector<std::pair<std::string, size_t>> causes;
   for (const LostStretch& s : c.stretches) {
     if (s.state != state) continue;
-    auto it = std::find_if(causes.begin(), causes.end(), [&](const auto& cause) { return cause.first == s.cause; });
-    if (it == causes.end()) it = causes.insert(it, {s.cause, 0});
-    it->second += s.end - s.begin;
+    for (const LostPart& part : s.parts) {
+      auto it =
+          std::find_if(causes.begin(), causes.end(), [&](const auto& known) { return known.first == part.cause; });
+      if (it == causes.end()) it = causes.insert(it, {part.cause, 0});
+      it->second += part.end - part.begin;
+    }
   }
   std::stable_sort(causes.begin(), causes.end(), [](auto& a, auto& b) { return a.second > b.second; });
   std::string out;
@@ -110,7 +113,7 @@ std::string verdict(const Context& c, const std::string& sections) {
                     "</div>\n<h1>" + headline(c) + "</h1>\n<div class=\"dim\">" +
                     svg::escaped(c.facts.name + ": " + c.facts.source) + "</div>\n<nav>";
   for (const auto& [id, name] :
-       {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"time", "Over time"},
+       {std::pair{"lost", "Lost"}, std::pair{"path", "Path"}, std::pair{"map", "Map"}, std::pair{"time", "Over time"},
         std::pair{"tracking", "Tracking"}, std::pair{"pictures", "Pictures"}, std::pair{"stages", "Times"},
         std::pair{"events", "Events"}, std::pair{"settings", "Settings"}}) {
     if (sections.find(fmt::format("<h2 id=\"{}\">", id)) != std::string::npos)

@@ -8,8 +8,7 @@ namespace dkb::report {
 namespace {
 
 constexpr size_t kEvenPictures = 16, kLostPictures = 8, kHappenings = 200;
-constexpr int kGrid = 32;           // [px] between the pixels by which an image is judged
-constexpr size_t kEachFeature = 4;  // by which the features are
+constexpr int kGrid = 32;  // [px] between the pixels by which an image is judged
 
 void judge_image(const Frame& frame, FrameRow& row) {
   const ImageView grey = frame.grey(), depth = frame.depth();
@@ -24,20 +23,6 @@ void judge_image(const Frame& frame, FrameRow& row) {
   if (pixels == 0) return;
   row.brightness = static_cast<float>(sum / pixels);
   row.depth = static_cast<float>(with_depth) / static_cast<float>(pixels);
-}
-
-void judge_features(const Frame& frame, const FrameResult& result, FrameRow& row) {
-  const ImageView depth = frame.depth();
-  row.features = static_cast<int>(result.features.size());
-  for (const FeatureReport& f : result.features) row.removed += f.state == FeatureState::dynamic;
-  int asked = 0, with_depth = 0;
-  for (size_t i = 0; i < result.features.size(); i += kEachFeature) {
-    const int x = static_cast<int>(result.features[i].image_x), y = static_cast<int>(result.features[i].image_y);
-    if (x < 0 || y < 0 || x >= depth.width || y >= depth.height) continue;
-    ++asked;
-    with_depth += reinterpret_cast<const float*>(depth.row(y))[x] > 0;
-  }
-  if (asked > 0) row.with_depth = static_cast<float>(with_depth) / static_cast<float>(asked);
 }
 
 float masked_share(const MoverMask& mask) {
@@ -58,12 +43,17 @@ void RunLog::frame(const Frame& frame, const FrameResult& result) {
   row.state = result.state;
   row.keyframe = result.keyframe;
   row.ambiguous = result.ambiguous;
-  row.inliers = result.inliers;
+  row.inliers = row.by_images() ? result.inliers : result.refused_inliers;
+  row.features = static_cast<int>(result.features.size());
+  row.with_depth = result.with_depth;
+  for (const FeatureReport& f : result.features) {
+    row.removed += f.state == FeatureState::dynamic;
+    row.misfits += f.state == FeatureState::outlier;
+  }
   row.masked = masked_share(result.mask);
   row.tracking_ms = static_cast<float>(result.tracking_ms);
   row.waiting_ms = static_cast<float>(result.waiting_ms);
   judge_image(frame, row);
-  judge_features(frame, result, row);
   if (result.world_from_cam && last_pose_) {
     const Rigid3 moved = last_pose_->inverse() * *result.world_from_cam;
     row.turned_deg = static_cast<float>(2 * std::atan2(moved.rotation.vec().norm(), std::abs(moved.rotation.w())) *
@@ -89,7 +79,7 @@ void RunLog::keep_pictures(const Frame& frame, const FrameResult& result) {
   if (was_tracked && !result.tracked() && lost_.size() < kLostPictures)
     lost_.push_back(take_picture(row, frame, result));
   // Each a tenth below the one before, so that a slow decline does not cost a picture a frame.
-  if (!result.tracked()) return;
+  if (!rows_[row].by_images()) return;
   if (!first_tracked_) first_tracked_ = row;
   if (10 * result.inliers < 9 * rows_[fewest_ ? fewest_->row : *first_tracked_].inliers)
     fewest_ = take_picture(row, frame, result);

@@ -16,15 +16,17 @@ struct FrameRow {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::initialising;
   bool keyframe = false;
-  bool ambiguous = false;        // lost, before one of two places that look alike
-  uint8_t rule = 0;              // of a keyframe, index into RunLog::rules()
-  int features = 0;              // extracted
-  int removed = 0, inliers = 0;  // kept from tracking by the filter; map points that the pose rests on
-  float masked = 0, depth = 0;   // shares of the image: on movers; with depth
-  float with_depth = 0;          // share of the features that have depth where they are
-  float brightness = 0;          // mean grey level
-  float turned_deg = 0;          // since the frame before, when both have poses
-  float position_sd = 0;         // [m] by the covariance; 0 = unknown
+  bool ambiguous = false;       // lost, before one of two places that look alike
+  uint8_t rule = 0;             // of a keyframe, index into RunLog::rules()
+  int features = 0;             // extracted
+  int removed = 0;              // kept from tracking by the filter
+  int with_depth = 0;           // of the others
+  int inliers = 0;              // map points that the pose rests on; without one by the images, that a refused one does
+  int misfits = 0;              // matched, but off from where they should be
+  float masked = 0, depth = 0;  // shares of the image: on movers; with depth
+  float brightness = 0;         // mean grey level
+  float turned_deg = 0;         // since the frame before, when both have poses
+  float position_sd = 0;        // [m] by the covariance; 0 = unknown
   float tracking_ms = 0, waiting_ms = 0;
 
   bool tracked() const { return state != TrackingState::initialising && state != TrackingState::lost; }

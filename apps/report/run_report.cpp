@@ -23,6 +23,13 @@ std::vector<Setting> changed_settings(const Options& options) {
   return changed;
 }
 
+void ReportFacts::take_map(const MapSnapshot& map) {
+  for (const PointInfo& p : map.points())
+    if (p.map == 0) map_points.push_back(p.position_in_world);
+  for (const KeyframeInfo& k : map.keyframes())
+    if (k.map == 0) keyframes.push_back(k.world_from_cam.translation);
+}
+
 Truth evaluated_by_truth(const std::string& source, const Trajectory& trajectory) {
   Truth truth;
   try {
@@ -89,8 +96,8 @@ std::string report_html(const RunLog& log, const ReportFacts& facts, const Truth
       svg::escaped(facts.name) + "</title>\n<style>" + kPageStyle + "</style>\n</head>\n<body>\n";
   std::string sections;
   if (any) {
-    sections = lost_section(c) + path_section(c) + time_section(c) + tracking_section(c) + pictures_section(c) +
-               stages_section(c) + events_section(c);
+    sections = lost_section(c) + path_section(c) + map_section(c) + time_section(c) + tracking_section(c) +
+               pictures_section(c) + stages_section(c) + events_section(c);
   }
   sections += settings_section(c);
   return out + verdict(c, sections) + sections + "</body>\n</html>\n";

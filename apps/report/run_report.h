@@ -24,15 +24,19 @@ struct ReportFacts {
   std::string version;                                       // of the program
   std::vector<std::pair<std::string, std::string>> choices;  // how it was started: camera, detector ...
   Camera camera;
-  bool realtime = false;             // frames came at the pace of their stamps
-  int offered = 0, skipped = 0;      // as in stats.json
-  double wall_s = 0;                 // likewise
-  Statistics statistics;             // with the stages of all threads
-  Trajectory trajectory;             // of the first map, as in trajectory.txt
-  std::vector<size_t> poses_of_map;  // in trajectory.txt, trajectory_map2.txt ...
-  std::vector<Setting> settings;     // by changed_settings()
+  bool realtime = false;                               // frames came at the pace of their stamps
+  int offered = 0, skipped = 0;                        // as in stats.json
+  double wall_s = 0;                                   // likewise
+  Statistics statistics;                               // with the stages of all threads
+  Trajectory trajectory;                               // of the first map, as in trajectory.txt
+  std::vector<size_t> poses_of_map;                    // in trajectory.txt, trajectory_map2.txt ...
+  std::vector<Eigen::Vector3d> map_points, keyframes;  // [m] of the first map, where its points and cameras are
+  std::optional<OccupancyGrid> grid;                   // of the first map, with a dense map and a floor
+  std::vector<Setting> settings;                       // by changed_settings()
   CauseLimits limits;
   uint64_t seed = 1;  // picks the random pictures
+
+  void take_map(const MapSnapshot& map);  // points and keyframes
 };
 
 // The truth that lies beside a recording.

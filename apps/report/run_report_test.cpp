@@ -134,6 +134,69 @@ TEST(TimeChart, ALevelAtTheTopIsNamedBelowItsLine) {
   EXPECT_GT(text, line + 10);
 }
 
+TEST(RunReport, ShowsTheMapAndTheGridFromAbove) {
+  LongRun run(100, 50);
+  EXPECT_EQ(report_html(run.log, run.facts, run.truth).find("<h2 id=\"map\">"), std::string::npos) << "there is none";
+  for (int i = 0; i < 200; ++i) run.facts.map_points.emplace_back(0.05 * i, 1, 0.5 * std::sin(i));
+  run.facts.keyframes = {{0, 0, 0}, {1, 0, 0}};
+  std::string html = report_html(run.log, run.facts, run.truth);
+  EXPECT_NE(html.find("<a href=\"#map\">Map</a>"), std::string::npos);
+  EXPECT_NE(html.find("The map from above"), std::string::npos);
+  EXPECT_EQ(html.find("Where a robot can drive"), std::string::npos);
+  run.facts.grid.emplace();
+  run.facts.grid->cells = Image<uint8_t>(2, 2, OccupancyGrid::kFree);
+  html = report_html(run.log, run.facts, run.truth);
+  EXPECT_NE(html.find("Where a robot can drive"), std::string::npos);
+}
+
+TEST(MapAbove, PointsOfALargeMapTakeNoMoreRoom) {
+  MapAbove map{"x [m]", "y [m]", {}, {}, {"est", "path", {{0, 0, 0}, {5, 5, 0}}}};
+  for (int i = 0; i < 300000; ++i) map.points.emplace_back(10 * std::sin(0.37 * i), 10 * std::sin(0.61 * i + 1), 0);
+  EXPECT_LT(map_above(map).size(), 80000u);
+}
+
+TEST(MapAbove, AFewPointsFarAwayDoNotShrinkTheRest) {
+  MapAbove map{"x [m]", "y [m]", {}, {}, {"est", "path", {{0, 0, 0}, {4, 3, 0}}}};
+  for (int i = 0; i < 1000; ++i) map.points.emplace_back(4 * std::sin(i), 3 * std::cos(0.3 * i), 0);
+  map.points.emplace_back(5000, 0, 0);
+  EXPECT_NE(map_above(map).find(">2 m</text>"), std::string::npos) << "the bar that gives the scale";
+}
+
+TEST(GridAbove, CellsLieWhereTheyAre) {
+  OccupancyGrid grid;
+  grid.cell = 0.5;
+  grid.cells = Image<uint8_t>(3, 2, OccupancyGrid::kUnknown);
+  grid.cells(0, 0) = grid.cells(1, 0) = OccupancyGrid::kFree;
+  grid.cells(2, 1) = OccupancyGrid::kOccupied;
+  const std::string svg = grid_above(grid, {"est", "path", {{0.25, 0.75, 0}}});
+  EXPECT_NE(svg.find("class=\"free\" d=\"M0 0h2v1h-2z\""), std::string::npos) << svg;
+  EXPECT_NE(svg.find("class=\"occupied\" d=\"M2 1h1v1h-1z\""), std::string::npos);
+  // The path's point lies in the middle of the first cell.
+  double x = 0, y = 0, scale = 0, cx = 0, cy = 0;
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find("translate("), "translate(%lf %lf) scale(%lf)", &x, &y, &scale), 3);
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find("cx="), "cx=\"%lf\" cy=\"%lf\"", &cx, &cy), 2);
+  EXPECT_NEAR(cx, x + 0.5 * scale, 0.1);
+  EXPECT_NEAR(cy, y + 0.5 * scale, 0.1);
+}
+
+TEST(GridAbove, OfALargeGridObstaclesAreKept) {
+  OccupancyGrid grid;
+  grid.cells = Image<uint8_t>(2000, 2000, OccupancyGrid::kFree);
+  for (int y = 0; y < 2000; ++y)
+    for (int x = y % 3; x < 2000; x += 7) grid.cells(x, y) = OccupancyGrid::kUnknown;
+  grid.cells(1000, 1001) = OccupancyGrid::kOccupied;
+  const std::string svg = grid_above(grid, {"est", "path", {}});
+  EXPECT_LT(svg.size(), 80000u);
+  EXPECT_NE(svg.find("class=\"occupied\" d=\"M"), std::string::npos);
+}
+
+TEST(RunReport, FeaturesAreToldByWhatBecameOfThem) {
+  const LongRun run(100, 50);
+  const std::string html = report_html(run.log, run.facts, run.truth);
+  EXPECT_NE(html.find("matched, not fitting"), std::string::npos);
+  EXPECT_EQ(html.find(">features<"), std::string::npos) << "as many in every frame";
+}
+
 TEST(PathViews, EndAlsoFarFromTheOrigin) {
   SpacePath path{"est", "estimate", {}};
   for (int i = 0; i < 31; ++i) path.points.emplace_back(1e17, 0, 0);

@@ -138,6 +138,8 @@ struct FrameResult {
   TrackingState state = TrackingState::initialising;  ///< what the rest may be used for
   /// Lost, though the map has a place that looks like this one: it may be another. More views decide.
   bool ambiguous = false;
+  /// Without a pose by the images: map points that agree with the best one that was found and refused.
+  int refused_inliers = 0;
   /// The pose. Camera axes: x right, y down, z forward. World: the first tracked camera, or the robot's base there
   /// (Options::base_from_cam). There is a pose when tracked().
   std::optional<Rigid3> world_from_cam;
@@ -153,6 +155,7 @@ struct FrameResult {
   std::vector<Detection> detections;    ///< boxes of the detectors, carried to this image
   MoverMask mask;                       ///< where movers are in this image
   std::vector<FeatureReport> features;  ///< every feature that was extracted, people's included
+  int with_depth = 0;                   ///< of these with depth, those on movers left out: a map begins with them
   bool keyframe = false;                ///< the frame became a keyframe
   std::string keyframe_explanation;     ///< why, or why not; empty unless Slam::explain_keyframes(true)
   double tracking_ms = 0;               ///< steady clock: own work on this frame

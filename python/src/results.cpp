@@ -154,6 +154,12 @@ frame a to frame b. Camera axes: x right, y down, z forward. World: the first tr
       .def_property_readonly(
           "inliers", [](const PyResult& p) { return p.r.inliers; }, "int: map points that the pose rests on.")
       .def_property_readonly(
+          "refused_inliers", [](const PyResult& p) { return p.r.refused_inliers; },
+          "int: without a pose by the images, map points that agree with the best one that was found and refused.")
+      .def_property_readonly(
+          "with_depth", [](const PyResult& p) { return p.r.with_depth; },
+          "int: features with depth, those on movers left out: a map begins with them.")
+      .def_property_readonly(
           "reference_keyframe", [](const PyResult& p) { return p.r.reference_keyframe; },
           "int: the keyframe that shows most of them; -1 = none.")
       .def_property_readonly(

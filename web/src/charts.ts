@@ -117,7 +117,7 @@ export class Charts {
       new uPlot({
         width: box.clientWidth || 300, height: box.clientHeight || 90, legend: { show: false }, cursor: { show: false },
         scales: { x: { time: false }, y: { range: (_u, min, max) => range(min ?? 0, max ?? 1) } }, axes: axes(unit),
-        series: [{}, ...series], padding: [6, 6, 0, 0],
+        series: [{}, ...series], padding: [6, 20, 0, 0], // half of the last time's label
       }, [[]], box);
     const dots = (c: string, shape: string, size = 6): uPlot.Series => ({
       stroke: c, width: 0, paths: () => null, points: { show: true, size, fill: c, ...markPaths(shape, size) },

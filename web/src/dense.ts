@@ -7,10 +7,15 @@ export function matrixOf(pose: number[]): THREE.Matrix4 {
     new THREE.Quaternion(pose[0], pose[1], pose[2], pose[3]), new THREE.Vector3(1, 1, 1));
 }
 
+// [m] The floor's surface lies up to 3 cm off its plane (src/dkb/dense/floor_plane.cpp), obstacles begin above this: the
+// grid is drawn so much nearer, on the side it is seen from, or the two would cover each other in stripes.
+const kLift = 0.05;
+
 export class DenseView {
   readonly surface = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }));
   readonly grid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true, side: THREE.DoubleSide, depthWrite: false }));
   private roots = { surface: -1, grid: -1 }; // of the maps that they are of
+  private worldFromFloor = new THREE.Matrix4();
 
   constructor() {
     this.surface.visible = this.grid.visible = this.grid.matrixAutoUpdate = false;
@@ -65,6 +70,12 @@ export class DenseView {
     geometry.setAttribute("position", new THREE.Float32BufferAttribute([x, y, 0, right, y, 0, right, top, 0, x, top, 0], 3));
     geometry.setAttribute("uv", new THREE.Float32BufferAttribute([0, 1, 1, 1, 1, 0, 0, 0], 2)); // the first row is the top
     geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    this.grid.matrix.copy(matrixOf([f(3), f(4), f(5), f(6), f(7), f(8), f(9)]).invert());
+    this.worldFromFloor.copy(matrixOf([f(3), f(4), f(5), f(6), f(7), f(8), f(9)]).invert());
+  }
+  // `eye`: from where it is looked at, in the world.
+  lookFrom(eye: THREE.Vector3): void {
+    const above = eye.clone().applyMatrix4(this.worldFromFloor.clone().invert()).z > 0;
+    this.grid.matrix.makeTranslation(0, 0, above ? kLift : -kLift).premultiply(this.worldFromFloor);
+    this.grid.matrixWorldNeedsUpdate = true;
   }
 }

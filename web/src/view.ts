@@ -449,6 +449,7 @@ export class View {
     this.cloud.material.uniforms.size.value = this.renderer.getPixelRatio();
     this.cloud.material.uniforms.lift.value = document.documentElement.dataset.theme === "dark" ? 0.18 : 0;
     this.cloud.draw(points);
+    this.dense.lookFrom(this.camera.position);
     this.renderer.render(this.scene, this.camera);
     this.drawn.position.copy(this.camera.position);
     this.drawn.quaternion.copy(this.camera.quaternion);

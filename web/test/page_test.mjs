@@ -351,6 +351,16 @@ assert.equal(await drawn("surface"), "true");
 assert.equal(await drawn("truth"), "true");
 assert.ok((await film.locator("#stages button").count()) >= 4, "stages are told apart");
 assert.match(await film.textContent("#rules"), /first.*baseline/);
+// Legends take a line more where one is too short for them, and the last time stays inside.
+for (const p of [film, pair])
+  assert.deepEqual(await p.evaluate(() => [...document.querySelectorAll(".chart")].flatMap((chart) => {
+    const whole = chart.getBoundingClientRect(), plot = chart.querySelector(".u-over").getBoundingClientRect();
+    const cut = [...chart.querySelectorAll("small > *")].filter((e) => {
+      const box = e.getBoundingClientRect(), at = document.elementFromPoint(box.x + box.width - 2, box.y + box.height / 2);
+      return box.right > whole.right || box.bottom > plot.top || !e.contains(at);
+    });
+    return [...cut.map((e) => e.textContent), ...(plot.right + 18 > whole.right ? ["the last time"] : [])];
+  })), [], "cut off");
 await until(pair, () => new Set([...document.querySelectorAll(".view")].map((view) => view.dataset.look)).size === 1);
 assert.equal(await pair.getAttribute("#free", "aria-pressed"), "true");
 await shoot(pair, "compare");

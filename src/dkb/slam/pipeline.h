@@ -91,6 +91,7 @@ class Pipeline {
   TrackedFrame track(const Scene& scene, const UsableFeatures& usable);
   void retract_late(const std::vector<LateMask>& masks);
   void weigh_evidence(const Scene& scene, const TrackedFrame& tracked);
+  bool waits_for_depth(const TrackedFrame& tracked);
   KeyframeDecision decide(const Scene& scene, const TrackedFrame& tracked);
   std::shared_ptr<const PlaneView> find_planes(const Scene& scene);
   void insert_keyframe(const Scene& scene, const UsableFeatures& usable, TrackedFrame& tracked);
@@ -131,6 +132,7 @@ class Pipeline {
   int frames_without_map_ = 0;    // of those that only localise
   int frames_without_depth_ = 0;  // in a row
   bool told_no_depth_ = false;
+  std::optional<double> last_depth_time_;  // [s] of the last tracked frame with depth
   size_t most_corners_ = 0;   // of a frame before there was a map
   double crowded_share_ = 0;  // of its features that movers took
   MoverMask last_mask_;

@@ -49,6 +49,8 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
   result.state = tracked.state;
   result.detections = scene.boxes;
   result.mask = scene.mask;
+  result.with_depth = tracked.with_depth;
+  if (!tracked.tracked()) result.refused_inliers = tracked.refused_inliers;
   FrameOutcome outcome;
   if (result.tracked()) {
     const Rigid3 world_from_cam = tracked.cam_from_world.inverse();

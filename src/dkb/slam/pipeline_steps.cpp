@@ -296,6 +296,12 @@ Pipeline::LastKeyframe Pipeline::last_keyframe_of(const Map& map, KeyframeId id)
   return {id, k->frame, ns_from_seconds(k->timestamp)};
 }
 
+// A keyframe without depth makes no points. Where every second frame has none, one that has is not far.
+bool Pipeline::waits_for_depth(const TrackedFrame& tracked) {
+  if (tracked.with_depth > 0) last_depth_time_ = tracked.timestamp;
+  return tracked.with_depth == 0 && last_depth_time_ && tracked.timestamp - *last_depth_time_ <= kEvenMotion;
+}
+
 KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracked) {
   if (!tracked.tracked()) return {};
   if (tracked.state == TrackingState::relocalised) {
@@ -314,6 +320,8 @@ KeyframeDecision Pipeline::decide(const Scene& scene, const TrackedFrame& tracke
     decision = {false, KeyframeRule::none, "the map is not changed"};
   } else if (!may_make_keyframes()) {
     decision = {false, KeyframeRule::none, "the map is full"};
+  } else if (waits_for_depth(tracked)) {
+    decision = {false, KeyframeRule::none, "it has no depth, and one just before it had"};
   } else {
     KeyframeContext c;
     c.frame = tracked.index;

@@ -80,6 +80,8 @@ struct TrackedFrame : PosedFrame {
   std::vector<uint8_t> makes_point;          // per feature: 1 = it made a map point, when the frame became a keyframe
   std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that was weighed
   int inliers = 0;                           // among `points`
+  int with_depth = 0;                        // features with depth, those on movers left out
+  int refused_inliers = 0;                   // of the best pose that was refused
 
   // None of its features shows anything.
   void show_nothing() {

@@ -261,7 +261,10 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   const PoseEstimate pose = refine(initial, pairs, features, frame.predicted);
   if (!pose.ok) return false;
   const auto inliers = std::count(pose.inlier.begin(), pose.inlier.begin() + static_cast<long>(in_map), uint8_t{1});
-  if (inliers < min_inliers || (accept && !accept(pose))) return false;
+  if (inliers < min_inliers || (accept && !accept(pose))) {
+    frame.refused_inliers = std::max(frame.refused_inliers, static_cast<int>(inliers));
+    return false;
+  }
 
   const double limit = forget_strays(pairs, in_map, pose, features, followed);
   std::vector<PointId> in_view, found;
@@ -427,6 +430,8 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.motion = input.features.motion;
   frame.motion.resize(frame.features->size(), FeatureMotion::still);
   frame.show_nothing();
+  for (size_t f = 0; f < frame.features->size(); ++f)
+    frame.with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
 
   const bool has_map = state_ != TrackingState::initialising;
   const auto predicted = frame.predicted = predict(input);

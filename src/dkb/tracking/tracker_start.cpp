@@ -16,12 +16,9 @@ constexpr double kGoOnAfter = 0.1;  // [s] without a pose by the images: more th
 // A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight. Where
 // a prior tells how the camera came here, the old map goes on instead, with a keyframe that shows nothing of it.
 bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
-  int with_depth = 0;
-  for (size_t f = 0; f < frame.features->size(); ++f)
-    with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
   const double since_last = lost_at_ ? frame.timestamp - *lost_at_ : 0;
   lost_at_ = frame.timestamp;
-  if (with_depth < options_.initial_points) {
+  if (frame.with_depth < options_.initial_points) {
     // What cannot start a map says nothing of whether the old one is in sight: its time does not count.
     if (lost_since_) *lost_since_ += since_last;
     return false;
@@ -42,7 +39,7 @@ bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
     std::erase(made, kNoPoint);
     retract(made);
   }
-  frame.inliers = with_depth;
+  frame.inliers = frame.with_depth;
   frame.cam_from_world = last_ ? last_->cam_from_world : suggested_ ? suggested_->cam_from_world : start_;
   frame.covariance = Matrix6d::Identity() * (kStartSd * kStartSd);
   if (expected != nullptr) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "dkb/tracking/tracker_test_fixture.h"
 #include "dkb/util/errors.h"
 
@@ -337,6 +339,22 @@ TEST_F(TrackerTest, WhereAllIsTakenForMovedTheMapIsFoundAllTheSame) {
   EXPECT_LT((frame.cam_from_world.inverse() * on_path(1)).translation.norm(), 0.005);
   for (size_t f = 0; f < frame.points.size(); ++f)
     EXPECT_NE(frame.points[f], kNoPoint) << "what shows nothing of the map makes no map points";
+}
+
+TEST_F(TrackerTest, ALostFrameTellsHowNearItCameToAPose) {
+  TrackingOptions options;
+  options.min_inliers = 5000;
+  tracker = Tracker(scene.optics(), options, 1);
+  start();
+  const View next = scene.look(on_path(1), {.depth_share = 0.5});
+  const TrackedFrame lost = tracker.track(
+      {.index = ++index, .timestamp = kFrameTime, .features = FakeFeatures(next.features), .may_start_map = false});
+  EXPECT_EQ(lost.state, TrackingState::lost);
+  EXPECT_GT(lost.refused_inliers, 100);
+  const auto& keypoints = next.features->keypoints;
+  EXPECT_EQ(lost.with_depth,
+            std::count_if(keypoints.begin(), keypoints.end(), [](const auto& k) { return k.depth > 0; }));
+  EXPECT_LT(static_cast<size_t>(lost.with_depth), keypoints.size());
 }
 
 TEST_F(TrackerTest, WithoutLeaveNoMapIsStarted) {
