@@ -56,7 +56,7 @@ void measure(const fs::path& folder, size_t frames) {
   while (const auto frame = reader.next()) {
     if (!frame->image) continue;
     const FrameResult result = slam.process(frame_of(frame->image));
-    const std::optional<Rigid3> there = truth_at(frame->timestamp);
+    const std::optional<Rigid3> there = truth_at(frame->image->timestamp);
     if (!result.tracked() || !there) continue;
     if (!run_from_truth) run_from_truth = *result.world_from_cam * there->inverse();
     const Vector6d error = tangent_from_rigid3(result.world_from_cam->inverse() * *run_from_truth * *there);

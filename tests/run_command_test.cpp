@@ -405,6 +405,28 @@ TEST(RunCommand, SurvivesAStretchWithoutDepth) {
   EXPECT_LT(ape_of(folder, run.out / "trajectory.txt"), 0.03);
 }
 
+// As drivers do that give colour at twice the rate of depth.
+TEST(RunCommand, DepthThatIsGivenTwiceIsUsedOnce) {
+  const TempFolder folder;
+  copy_sequence(folder.path(), kSequenceFrames, true);
+  std::string pairs;
+  const auto rows = rows_of(folder / "associations.txt");
+  for (size_t i = 0; i < rows.size(); ++i)
+    pairs += fmt::format("{} {} {} {}\n", rows[i][0], rows[i][1], rows[i][2], rows[i - i % 2][3]);
+  write_text(folder / "associations.txt", pairs);
+  const SlamRun run(folder.path(), folder / "out");
+  ASSERT_EQ(run.finished.exit_code, 0) << run.finished.err;
+  EXPECT_NE(run.finished.err.find("frame 1: the depth image is the one of the frame before once more"),
+            std::string::npos)
+      << run.finished.err;
+  EXPECT_EQ(run.stats.at("tracked"), kSequenceFrames);
+  EXPECT_LT(ape_of(sequence(), run.out / "trajectory.txt"), 0.005);
+  for (const auto& row : rows_of(run.out / "keyframes.txt")) {
+    const auto at = std::find_if(rows.begin(), rows.end(), [&](const auto& pair) { return pair[0] == row[0]; });
+    EXPECT_EQ((at - rows.begin()) % 2, 0) << "a keyframe waits for depth";
+  }
+}
+
 TEST(RunCommand, StartsOnceTheLensIsUncovered) {
   const TempFolder temp;
   const fs::path folder = temp / "covered";

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "dkb/detection/mask_folder.h"
 #include "dkb/geometry/motion_model.h"
@@ -324,6 +325,34 @@ TEST(MotionSegmenter, GivesNothingOnImagesWithoutDepth) {
   run(
       world, 10, [](int) { return std::vector<Panel>{}; },
       [](int, const MoverMask&, const Figures& figures) { EXPECT_EQ(figures.wrong, 0); });
+}
+
+// As with depth at half the rate of colour.
+TEST(MotionSegmenter, KnowsWhatMovesThroughImagesWithoutDepth) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {});
+  const auto look = [&](int f) {
+    Picture p = world.render(f, {box_at(-1.4 + 0.02 * f)});
+    if (f > 40 || (f > 20 && f % 2 == 1)) p.image.depth = DepthImage(World::kWidth, World::kHeight);
+    const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
+    segmenter.commit(world.cam_from_world(f));
+    return std::pair(judge(mask, p.truth), segmenter.aligned_step().has_value());
+  };
+  for (int f = 0; f <= 40; ++f) {
+    const auto [figures, aligned] = look(f);
+    EXPECT_LT(figures.wrong, 0.01) << f;
+    if (f < 15) continue;
+    EXPECT_GT(figures.covered, 0.85) << f;
+    EXPECT_EQ(aligned, f <= 20 || f % 2 == 0) << f << ": with the image before that had depth";
+  }
+  for (int f = 41; f < 60; ++f) {
+    const auto [figures, aligned] = look(f);
+    EXPECT_FALSE(aligned);
+    EXPECT_TRUE(segmenter.still().kinds.empty());
+    if (f > 56) {
+      EXPECT_EQ(figures.covered, 0) << "nobody knows where it is half a second later";
+    }
+  }
 }
 
 TEST(MotionSegmenter, BeginsAnewWhenTrackingIsLost) {
