@@ -335,7 +335,12 @@ std::vector<Event> RunSession::take_events() {
 void RunSession::show(const SourceFrame& next, FrameResult result) {
   log_->frame(next.frame, result);
   std::vector<Event> events = take_events();
-  most_features_ = std::max(most_features_, result.features.size());
+  if (result.features.size() > most_features_) {
+    most_features_ = result.features.size();
+    on_movers_ = static_cast<size_t>(std::count_if(result.features.begin(), result.features.end(), [](const auto& f) {
+      return f.reason == FeatureReason::on_mover;
+    }));
+  }
   files_->add(next.stamp, result);
   progress_->frame(next.index + 1, &result);
   if (viewer_) viewer_->show(std::move(result), next.frame, *slam_, std::move(events));
@@ -461,6 +466,10 @@ std::string RunSession::remedy_without_features() const {
   if (most_features_ < static_cast<size_t>(options_.tracking.initial_points))
     return fmt::format("; the images show {} at most: are they black, covered or out of focus?",
                        plural(most_features_, "corner", "corners"));
+  if (2 * on_movers_ > most_features_)
+    return fmt::format(
+        " on what stands still: {} of {} lie on what the detector ({}) takes for movers; does it mark the still world?",
+        on_movers_, most_features_, slam_->statistics().detector);
   return fmt::format(
       "; are there depth images, in units of the camera's depth_factor ({} per metre; float images are "
       "in metres)?{}",

@@ -116,6 +116,7 @@ class RunSession {
   bool had_prior_ = false;
   int brightest_ = 0;         // grey of the first frames
   size_t most_features_ = 0;  // of a frame
+  size_t on_movers_ = 0;      // of these
   LiveReport camera_;
   std::optional<Progress> progress_;
   std::exception_ptr failure_;

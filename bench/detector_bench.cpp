@@ -85,7 +85,7 @@ int main(int argc, char** argv) try {
   if (argc > 3) options.inference = inference_named(argv[3]);
   OnnxDetector network(options, camera.width, camera.height);
   FileDetector truth(sequence / "boxes.txt", camera.width, camera.height);
-  MaskFolder masks(sequence / "masks", read_grey, {}, camera.width, camera.height);
+  MaskFolder masks(sequence / "masks", read_mask, {}, camera.width, camera.height);
   std::vector<double> milliseconds, filling_ms;
   const Preprocessing& preprocessing = network.head().preprocessing;
   const Letterbox letterbox =

@@ -132,7 +132,7 @@ Detectors make_detectors(const DetectorChoice& choice, const Camera& camera) {
   if (!choice.masks.empty()) {
     std::vector<double> stamps;
     for (int64_t stamp : choice.stamps_ns) stamps.push_back(seconds_from_ns(stamp));
-    made.prompt.push_back(std::make_shared<MaskFolder>(choice.masks, read_grey, stamps, camera.width, camera.height));
+    made.prompt.push_back(std::make_shared<MaskFolder>(choice.masks, read_mask, stamps, camera.width, camera.height));
   }
   made.motion = has("motion");
   return made;

@@ -179,8 +179,18 @@ Picture resampled(const Picture& picture, int width, int height) {
   return result;
 }
 
-GreyImage read_grey(const std::filesystem::path& path) {
-  return read_picture(path).grey;
+GreyImage read_mask(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path), name = path.string();
+  const ImageHeader header = read_image_header(bytes, name);
+  GreyImage mask(header.width, header.height);
+  const auto mark = [&](const auto& samples) {
+    for (size_t i = 0; i < mask.size(); ++i) mask.data()[i] = samples.data()[i] > 0 ? 255 : 0;
+  };
+  if (header.kind == ImageKind::png && header.bits == 16 && header.channels == 1)
+    mark(formats::decode_png16(bytes, name, header));
+  else
+    mark(decode_picture(bytes, name).grey);
+  return mask;
 }
 
 DepthImage decode_depth(std::string_view bytes, const std::string& name, const CameraModel& camera) {

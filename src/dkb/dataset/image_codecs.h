@@ -41,8 +41,8 @@ Picture read_picture(const std::filesystem::path& path);
 // The picture at another size: each pixel the mean of the area that it covers.
 Picture resampled(const Picture& picture, int width, int height);
 
-// Grey of any picture (masks).
-GreyImage read_grey(const std::filesystem::path& path);
+// A mask: 255 where a sample is above 0, however little of the range of its bits that is.
+GreyImage read_mask(const std::filesystem::path& path);
 
 // Depth [m], 0 = no data. 16-bit grey PNG and NumPy .npy of uint16: value / camera.depth_factor. 32-bit float (TIFF
 // with one channel and without compression; PFM; NumPy .npy): metres. Values outside camera.depth_min ... depth_max and

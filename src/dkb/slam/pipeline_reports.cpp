@@ -24,12 +24,15 @@ bool has_depth(const DepthImage& image) {
 // What depths an image has of those that the camera may tell.
 std::string depths_text(const DepthImage& image, const Camera& camera) {
   float nearest = std::numeric_limits<float>::infinity(), farthest = 0;
+  size_t known = 0;
   for (size_t i = 0; i < image.size(); ++i) {
     const float z = image.data()[i];
-    if (z > 0) nearest = std::min(nearest, z), farthest = std::max(farthest, z);
+    if (z > 0) ++known, nearest = std::min(nearest, z), farthest = std::max(farthest, z);
   }
   if (farthest == 0) return fmt::format("(no pixel has a depth of {:g} to {:g} m)", camera.depth_min, camera.depth_max);
-  return fmt::format("(depths of {:.3g} to {:.3g} m{})", nearest, farthest, farthest > 100 ? ": millimetres?" : "");
+  return fmt::format("({:.2g}% of the pixels have a depth, of {:.3g} to {:.3g} m{})",
+                     100 * static_cast<double>(known) / static_cast<double>(image.size()), nearest, farthest,
+                     farthest > 100 ? ": millimetres?" : "");
 }
 
 // Counted from 1, as in the names of files.
