@@ -137,7 +137,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
   for (int n = 0; n < arguments.kidnaps; ++n) {
     const size_t start = random.below(static_cast<uint32_t>(shown.size() - arguments.shown + 1));
     const auto first = shown.begin() + static_cast<long>(start);
-    RgbdReader frames({first, first + static_cast<long>(arguments.shown)}, camera, {.threaded = false, .probed = 1});
+    RgbdReader frames({first, first + static_cast<long>(arguments.shown)}, camera, {.threaded = false});
     slam.process(darkness(camera, clock += 1));
     const bool mapped = arguments.elsewhere.empty() && reference.mapped(first->timestamp);
     Score& score = mapped ? inside : outside;
@@ -150,7 +150,7 @@ void measure(const fs::path& folder, const Arguments& arguments) {
       if (!result.tracked()) continue;
       if (!found) score.frames_needed.push_back(static_cast<double>(frame->index) + 1);
       found = true;
-      const std::optional<Rigid3> truth = arguments.elsewhere.empty() ? reference.at(frame->timestamp) : std::nullopt;
+      const std::optional<Rigid3> truth = arguments.elsewhere.empty() ? reference.at(frame->image->timestamp) : std::nullopt;
       if (!truth) {
         wrong = wrong || !arguments.elsewhere.empty();
         continue;

@@ -115,7 +115,7 @@ TEST_F(Export, NerfstudiosPosesAreTheKeyframesWithTheAxesOfOpengl) {
       EXPECT_NEAR(m[i][2].get<double>(), -forward[i], 1e-6) << "z looks backward";
     }
     EXPECT_EQ(read_picture(folder / "nerfstudio" / picture).grey.width(), 640);
-    EXPECT_EQ(read_grey(folder / "nerfstudio" / frame["mask_path"].get<std::string>()).height(), 480);
+    EXPECT_EQ(read_picture(folder / "nerfstudio" / frame["mask_path"].get<std::string>()).grey.height(), 480);
   }
 }
 

@@ -293,7 +293,7 @@ TEST(PeopleControl, InvertedMasksAreNoticed) {
   const fs::path masks = temp / "masks";
   fs::create_directory(masks);
   for (const auto& row : rows_of(people_sequence() / "rgb.txt")) {
-    GreyImage mask = read_grey(people_sequence() / "masks" / (row[0] + ".png"));
+    GreyImage mask = read_picture(people_sequence() / "masks" / (row[0] + ".png")).grey;
     for (size_t i = 0; i < mask.size(); ++i) mask.data()[i] = static_cast<uint8_t>(255 - mask.data()[i]);
     write_text(masks / (row[0] + ".png"), encode_png(mask, 1));
   }

@@ -119,7 +119,7 @@ FeatureUse feature_use(const fs::path& dataset, const FeatureRows& features, int
   int leaked = 0, used_in_boxes = 0, outside = 0, used_outside = 0, frame = 0;
   for (const auto& [stamp, rows] : features) {
     if (frame++ < skipped) continue;
-    const Silhouettes people(read_grey(dataset / "masks" / (stamp + ".png")));
+    const Silhouettes people(read_picture(dataset / "masks" / (stamp + ".png")).grey);
     const auto boxes_here = boxes.find(stamp);
     for (const FeatureRow& f : rows) {
       const int x = std::min(people.width() - 1, static_cast<int>(f.x)),
@@ -176,7 +176,7 @@ int points_on_people(const fs::path& dataset, const std::vector<Eigen::Vector3d>
   const auto pairs = rows_of(dataset / "associations.txt");
   std::vector<bool> on_people(points.size(), false);
   for (size_t i = 0; i < pairs.size(); ++i) {
-    const GreyImage mask = read_grey(dataset / "masks" / (pairs[i].at(0) + ".png"));
+    const GreyImage mask = read_picture(dataset / "masks" / (pairs[i].at(0) + ".png")).grey;
     if (std::all_of(mask.data(), mask.data() + mask.size(), [](uint8_t v) { return v == 0; })) continue;
     const Silhouettes people(mask);
     const DepthImage depth = read_depth(dataset / pairs[i].at(3), camera);

@@ -286,7 +286,7 @@ TEST(RunCommand, GreyOfTwelveBitsIsWarnedOf) {
     const fs::path folder = temp / std::to_string(factor);
     copy_sequence(folder, 6, true);
     for (const auto& row : rows_of(folder / "associations.txt")) {
-      const GreyImage grey = read_grey(folder / row[1]);
+      const GreyImage grey = read_picture(folder / row[1]).grey;
       Image<uint16_t> wide(grey.width(), grey.height());
       for (size_t i = 0; i < grey.size(); ++i) wide.data()[i] = static_cast<uint16_t>(factor * grey.data()[i]);
       fs::remove(folder / row[1]);
@@ -353,7 +353,7 @@ TEST(RunCommand, GreyImagesFloatDepthAndHalfTheSizeWork) {
   camera.cy = (camera.cy - 0.5) / 2;
   write_text(folder / "camera.yaml", camera.to_yaml());
   for (const auto& row : rows_of(folder / "associations.txt")) {
-    const GreyImage grey = read_grey(folder / row[1]);
+    const GreyImage grey = read_picture(folder / row[1]).grey;
     const DepthImage depth = read_depth(folder / row[3], full);
     GreyImage small(camera.width, camera.height);
     DepthImage small_depth(camera.width, camera.height);
