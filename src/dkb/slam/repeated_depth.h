@@ -16,11 +16,12 @@ namespace dkb {
 // are those of another moment, and it says that nothing has moved. Deterministic.
 class RepeatedDepth {
  public:
-  // The frame, without its depth where that is the one of the frame before and colour is not: where both are the same,
-  // the camera may stand still in a simulation without noise.
+  // The frame, without its depth where that is the one of the frame before and colour is not. In a simulation without
+  // noise depth may be the same all the same: where the camera stands still, as colour is then, and along a wall that
+  // it faces, where all depths are one.
   Frame left_out(const Frame& frame) {
     const std::shared_ptr<const RgbdImage> before = std::exchange(last_, frame.image());
-    repeats_ = before && same(before->depth, last_->depth) && !same(before->grey, last_->grey);
+    repeats_ = before && same(before->depth, last_->depth) && !same(before->grey, last_->grey) && !flat(last_->depth);
     if (!repeats_) return frame;
     auto image = std::make_shared<RgbdImage>(*last_);
     image->depth = DepthImage(image->depth.width(), image->depth.height());
@@ -36,6 +37,9 @@ class RepeatedDepth {
   }
 
  private:
+  static bool flat(const DepthImage& depth) {
+    return std::all_of(depth.data(), depth.data() + depth.size(), [&](float z) { return z == depth.data()[0]; });
+  }
   template <class Pixel>
   static bool same(const Image<Pixel>& a, const Image<Pixel>& b) {
     return a.size() == b.size() && std::equal(a.data(), a.data() + a.size(), b.data());

@@ -8,11 +8,12 @@
 namespace dkb {
 namespace {
 
-Frame frame_at(double time, uint8_t grey, float depth) {
+Frame frame_at(double time, uint8_t grey, float depth, float step = 0.01F) {
   auto image = std::make_shared<RgbdImage>();
   image->timestamp = image->depth_timestamp = time;
   image->grey = GreyImage(8, 6, grey);
   image->depth = DepthImage(8, 6, depth);
+  if (step > 0) image->depth(0, 0) += step;
   return frame_of(std::move(image));
 }
 
@@ -38,6 +39,13 @@ TEST(RepeatedDepth, IsLeftOutWhileColourGoesOn) {
 TEST(RepeatedDepth, OfACameraThatStandsStillWithoutNoiseIsKept) {
   RepeatedDepth repeated;
   for (int i = 0; i < 3; ++i) EXPECT_EQ(repeated.left_out(frame_at(0.1 * i, 1, 2)).image()->depth(3, 3), 2);
+  EXPECT_EQ(repeated.take_warning(), "");
+}
+
+TEST(RepeatedDepth, OfAWallThatIsFacedWithoutNoiseIsKept) {
+  RepeatedDepth repeated;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_EQ(repeated.left_out(frame_at(0.1 * i, static_cast<uint8_t>(i), 2, 0)).image()->depth(3, 3), 2);
   EXPECT_EQ(repeated.take_warning(), "");
 }
 
