@@ -76,7 +76,9 @@ uint8_t SeenSpace::verdict(int x, int y) const {
   const auto column = log_odds_.begin() + static_cast<std::ptrdiff_t>(first_voxel(x, y));
   const auto [least, most] = std::minmax_element(column, column + layers_);
   const Stands& stands = stands_(x, y);
-  if (*most > 0) return stands.last - stands.first >= kStandsFor ? OccupancyGrid::kOccupied : OccupancyGrid::kUnknown;
+  // One view alone does not make an obstacle, nor is what it saw free.
+  if (*most > kHit && stands.last - stands.first >= kStandsFor) return OccupancyGrid::kOccupied;
+  if (*most > 0) return OccupancyGrid::kUnknown;
   if (below_(x, y) >= kDropRays && below_(x, y) > floor_(x, y)) return OccupancyGrid::kOccupied;
   return *least < 0 || floor_(x, y) > 0 ? OccupancyGrid::kFree : OccupancyGrid::kUnknown;
 }
