@@ -385,7 +385,6 @@ bool Tracker::refine_at_velocity(const Vector6d& velocity, const FrameFeatures& 
 // `expected`: where to look first; may be null.
 bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const PosePrediction* expected) {
   std::optional<PoseProposal> found;
-  int min_inliers = kMinRelocalisationInliers;
   if (expected != nullptr) found = find_near(*expected, frame.matchable());
   if (!found) {
     found = relocaliser_.find(map_.view(), frame.matchable(), retracted_, appearance, place_evidence_);
@@ -394,14 +393,13 @@ bool Tracker::relocalise(TrackedFrame& frame, PointAppearance* appearance, const
       if (frame.ambiguous) return false;
     } else {
       found = find_where_lost(frame);
-      min_inliers = options_.min_inliers;
     }
     if (!found) return false;
   }
   candidates_made_.reset();
   if (frame.predicted) frame.predicted->weighs = false;
-  const bool there =
-      track_local_map(found->fit.cam_from_world, radius_local_map(), min_inliers, found->fit.points, frame);
+  const bool there = track_local_map(found->fit.cam_from_world, radius_local_map(), kMinRelocalisationInliers,
+                                     found->fit.points, frame);
   if (!there) candidates_made_.reset();  // those around the place that was no place
   return there;
 }

@@ -170,8 +170,7 @@ std::optional<PoseProposal> Tracker::find_near(const PosePrediction& expected,
 }
 
 // A camera that was lost a moment ago still looks at what it saw last, if it may not have gone farther since than
-// cameras that show the same are apart. What vouches for a frame that is followed is enough there; the next frame
-// confirms it.
+// cameras that show the same are apart. Few matches are worth a try there.
 std::optional<PoseProposal> Tracker::find_where_lost(const TrackedFrame& frame) const {
   if (state_ != TrackingState::lost || !last_) return std::nullopt;
   const double seconds = frame.timestamp - last_->timestamp;
