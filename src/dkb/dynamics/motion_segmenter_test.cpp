@@ -332,7 +332,7 @@ TEST(MotionSegmenter, KnowsWhatMovesThroughImagesWithoutDepth) {
   const World world;
   MotionSegmenter segmenter(world.camera, {});
   const auto look = [&](int f) {
-    Picture p = world.render(f, {box_at(-1.4 + 0.02 * f)});
+    Picture p = world.render(f, {box_at(-1.4 + 0.05 * std::min(f, 40))});
     if (f > 40 || (f > 20 && f % 2 == 1)) p.image.depth = DepthImage(World::kWidth, World::kHeight);
     const MoverMask mask = segment(segmenter, p.image, world.cam_from_world(f));
     segmenter.commit(world.cam_from_world(f));
@@ -341,7 +341,7 @@ TEST(MotionSegmenter, KnowsWhatMovesThroughImagesWithoutDepth) {
   for (int f = 0; f <= 40; ++f) {
     const auto [figures, aligned] = look(f);
     EXPECT_LT(figures.wrong, 0.01) << f;
-    if (f < 15) continue;
+    if (f < 20) continue;
     EXPECT_GT(figures.covered, 0.85) << f;
     EXPECT_EQ(aligned, f <= 20 || f % 2 == 0) << f << ": with the image before that had depth";
   }
