@@ -42,7 +42,7 @@ demo: deps  ## Simulate a sequence with people, run SLAM on it, score it: demo/
 
 test: deps  ## Release build of everything, then all tests
 	@$(MAKE) --no-print-directory onnxruntime || echo "without ONNX Runtime: its tests are skipped"
-	cmake --preset release -D DKB_PYTHON=ON -D DKB_BENCHMARKS=ON
+	cmake --preset release -D DKB_PYTHON=ON
 	cmake --build build -j $(JOBS)
 	ctest --test-dir build --output-on-failure -j $(JOBS)
 
