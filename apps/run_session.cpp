@@ -23,6 +23,7 @@
 #include "dkb/detection/mask_folder.h"
 #include "dkb/evaluation/evaluation_report.h"
 #include "dkb/map/map_file.h"
+#include "dkb/slam/few_features.h"
 #include "dkb/sources/source_registry.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
@@ -337,9 +338,8 @@ void RunSession::show(const SourceFrame& next, FrameResult result) {
   std::vector<Event> events = take_events();
   if (result.features.size() > most_features_) {
     most_features_ = result.features.size();
-    on_movers_ = static_cast<size_t>(std::count_if(result.features.begin(), result.features.end(), [](const auto& f) {
-      return f.reason == FeatureReason::on_mover;
-    }));
+    on_movers_ = static_cast<size_t>(std::count_if(result.features.begin(), result.features.end(),
+                                                   [](const auto& f) { return f.reason == FeatureReason::on_mover; }));
   }
   files_->add(next.stamp, result);
   progress_->frame(next.index + 1, &result);
@@ -463,13 +463,11 @@ std::string RunSession::without_new_map() const {
 }
 
 std::string RunSession::remedy_without_features() const {
-  if (most_features_ < static_cast<size_t>(options_.tracking.initial_points))
-    return fmt::format("; the images show {} at most: are they black, covered or out of focus?",
-                       plural(most_features_, "corner", "corners"));
-  if (2 * on_movers_ > most_features_)
-    return fmt::format(
-        " on what stands still: {} of {} lie on what the detector ({}) takes for movers; does it mark the still world?",
-        on_movers_, most_features_, slam_->statistics().detector);
+  const double on_movers =
+      most_features_ > 0 ? static_cast<double>(on_movers_) / static_cast<double>(most_features_) : 0;
+  std::string why =
+      why_few_features(most_features_, on_movers, slam_->statistics().detector, options_.tracking.initial_points);
+  if (!why.empty()) return why;
   return fmt::format(
       "; are there depth images, in units of the camera's depth_factor ({} per metre; float images are "
       "in metres)?{}",

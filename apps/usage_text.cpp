@@ -29,9 +29,7 @@ std::string not_one_of(const std::string& name, const std::string& value, const 
   std::vector<std::string> known;
   std::istringstream in(list);
   for (std::string item; std::getline(in, item, ',');) known.push_back(item);
-  std::string all;
-  for (const std::string& item : known) all += (all.empty() ? "" : ", ") + item;
-  return name + ": there is no \"" + value + "\"" + did_you_mean(value, known) + "; give one of " + all;
+  return name + ": there is no \"" + value + "\"" + did_you_mean(value, known) + "; give one of " + listed(known);
 }
 
 // What the parser of the command line says, in this program's words.
@@ -81,8 +79,8 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<const CLI::App*> below = command->get_subcommands([](const CLI::App*) { return true; });
   const std::vector<std::string> rest = app.remaining(true);
   const std::string help = "; see " + path + "--help";
-  std::string commands;
-  for (const CLI::App* c : below) commands += (commands.empty() ? "" : ", ") + c->get_name();
+  std::vector<std::string> commands;
+  for (const CLI::App* c : below) commands.push_back(c->get_name());
 
   const auto is_option = [](const std::string& word) { return word.size() > 1 && word[0] == '-'; };
   const auto option = std::find_if(rest.begin(), rest.end(), is_option);
@@ -94,14 +92,13 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     return "unknown option " + name + did_you_mean(name, known) + help;
   }
   if (!below.empty() && !rest.empty()) {
-    std::vector<std::string> known;
-    for (const CLI::App* c : below) known.push_back(c->get_name());
-    const std::string near = did_you_mean(rest.front(), known);
-    return "unknown command \"" + rest.front() + "\"" + (near.empty() ? "; commands: " + commands : near) + help;
+    const std::string near = did_you_mean(rest.front(), commands);
+    return "unknown command \"" + rest.front() + "\"" + (near.empty() ? "; commands: " + listed(commands) : near) +
+           help;
   }
   if (!rest.empty()) return "unexpected argument \"" + rest.front() + "\"" + help;
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !below.empty()) {
-    return "a command is missing: " + commands + help;
+    return "a command is missing: " + listed(commands) + help;
   }
   return in_plain_words(error.what()) + help;
 }

@@ -42,10 +42,9 @@ std::vector<bool> chosen(const std::vector<std::string>& names, const std::vecto
   for (const std::string& name : names) {
     const auto at = std::find(known.begin(), known.end(), name);
     if (at == known.end()) {
-      std::string all;
-      for (const std::string& other : known) all += (all.empty() ? "; it has " : ", ") + other;
       const std::string near = did_you_mean(name, known);
-      throw InputError(fmt::format("--{}: the suite has no {} \"{}\"{}", what, what, name, near.empty() ? all : near));
+      throw InputError(fmt::format("--{}: the suite has no {} \"{}\"{}", what, what, name,
+                                   near.empty() ? "; it has " + listed(known) : near));
     }
     take[static_cast<size_t>(at - known.begin())] = true;
   }

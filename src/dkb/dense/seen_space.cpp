@@ -12,8 +12,6 @@ namespace {
 constexpr int kRayStride = 4;  // view pixels between the rays that look for free space
 constexpr int kDropRays = 3;   // that look below a floor which nobody saw
 constexpr double kMostLayers = 32;
-// [s] From the first to the last view of what stands in a cell: who walks has left it by then.
-constexpr float kStandsFor = 0.2F;
 
 // Of OctoMap (Hornung et al. 2013, "OctoMap: an efficient probabilistic 3D mapping framework based on octrees", section
 // 5.1), in twentieths: what a view that sees a surface in a voxel adds to its log odds, what one that sees through it

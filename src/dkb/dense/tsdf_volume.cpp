@@ -12,7 +12,6 @@ namespace dkb {
 namespace {
 
 constexpr int kMinViews = 2;          // keyframes that must see a surface
-constexpr float kMinTime = 0.2F;      // [s] from the first of them to the last: who walks has left the voxel by then
 constexpr double kFreeShare = 0.08;   // of a voxel's keyframes that may have seen through it (docs/benchmarks.md)
 constexpr int kAllocationStride = 2;  // view pixels: a block is much larger than what lies between them
 
@@ -164,7 +163,7 @@ class BlockFuser {
 
   Voxel result(const Sums& s) const {
     Voxel voxel;
-    voxel.known = s.hits >= kMinViews && s.last - s.first >= kMinTime &&
+    voxel.known = s.hits >= kMinViews && s.last - s.first >= kStandsFor &&
                   s.seen_through <= kFreeShare * static_cast<double>(s.hits + s.seen_through);
     if (!voxel.known) return voxel;
     voxel.distance = s.distance / s.weight;

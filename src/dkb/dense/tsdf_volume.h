@@ -36,6 +36,9 @@ struct VoxelBlock {
   std::array<Voxel, kVoxels> voxels;
 };
 
+// [s] From the first to the last view of what stands somewhere: who walks has left it by then.
+inline constexpr float kStandsFor = 0.2F;
+
 // A view with its place in the finished map.
 struct PlacedView {
   const DepthView* view = nullptr;

@@ -132,7 +132,7 @@ void MotionSegmenter::observe(const RgbdImage& image, double depth_time, const R
                      std::to_string(camera_.height) + "; give images of the camera's size");
   image_time_ = image.timestamp;
   aligned_step_.reset();
-  has_depth_ = std::any_of(image.depth.data(), image.depth.data() + image.depth.size(), [](float z) { return z > 0; });
+  has_depth_ = has_depth(image.depth);
   if (!has_depth_) {
     if (current_) spare_ = std::move(current_);
     if (previous_) depth_from_colour_ = previous_->cam_from_world * cam_from_world_expected.inverse();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 
@@ -21,6 +22,11 @@ struct RgbdImage {
   // [s] When the colour camera saw what the depth image shows.
   double depth_time(const Camera& camera) const { return depth_timestamp + camera.depth_time_offset; }
 };
+
+// Whether it tells anything.
+inline bool has_depth(const DepthImage& image) {
+  return std::any_of(image.data(), image.data() + image.size(), [](float z) { return z > 0; });
+}
 
 // What a detector is shown of a frame, which must outlive it.
 DetectorInput detector_input(const Frame& frame);

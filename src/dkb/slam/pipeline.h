@@ -22,11 +22,11 @@
 #include "dkb/slam/odometry_frame.h"
 #include "dkb/slam/options.h"
 #include "dkb/slam/prior_calibration.h"
-#include "dkb/slam/timing_calibration.h"
 #include "dkb/slam/repeated_depth.h"
 #include "dkb/slam/run_record.h"
 #include "dkb/slam/scene_stage.h"
 #include "dkb/slam/stamp_doubt.h"
+#include "dkb/slam/timing_calibration.h"
 #include "dkb/tracking/tracker.h"
 
 namespace dkb {
@@ -133,8 +133,8 @@ class Pipeline {
   int frames_without_depth_ = 0;  // in a row
   bool told_no_depth_ = false;
   std::optional<double> last_depth_time_;  // [s] of the last tracked frame with depth
-  size_t most_corners_ = 0;   // of a frame before there was a map
-  double crowded_share_ = 0;  // of its features that movers took
+  size_t most_corners_ = 0;                // of a frame before there was a map
+  double crowded_share_ = 0;               // of its features that movers took
   MoverMask last_mask_;
   // A map's first keyframe waits for the frame after it, which tells the velocity at which its features were seen.
   struct MapStart {

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "dkb/slam/few_features.h"
 #include "dkb/slam/pipeline.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/plural.h"
@@ -16,10 +17,6 @@ namespace dkb {
 namespace {
 
 constexpr int kPatience = 30;  // [frames] without a map before that is told: about a second
-
-bool has_depth(const DepthImage& image) {
-  return std::any_of(image.data(), image.data() + image.size(), [](float z) { return z > 0; });
-}
 
 // What depths an image has of those that the camera may tell.
 std::string depths_text(const DepthImage& image, const Camera& camera) {
@@ -138,15 +135,9 @@ void Pipeline::note_changes(const Scene& scene, const TrackedFrame& tracked) {
 
 // What to do about frames of which too few features are left; `scene` is the last of them.
 std::string Pipeline::remedy_without_features(const Scene& scene) const {
-  const auto wanted = static_cast<size_t>(options_.tracking.initial_points);
-  if (most_corners_ < wanted)
-    return "; the images show " + plural(most_corners_, "corner", "corners") +
-           " at most: are they black, covered or out of focus?";
-  if (crowded_share_ > 0.5)
-    return fmt::format(
-        " on what stands still: {:.0f}% of them lie on what the detector ({}) takes for movers; does it mark the still "
-        "world?",
-        100 * crowded_share_, scenes_.detector_kind());
+  std::string why =
+      why_few_features(most_corners_, crowded_share_, scenes_.detector_kind(), options_.tracking.initial_points);
+  if (!why.empty()) return why;
   const Camera& camera = context_.camera;
   return fmt::format("; are there depth images, in units of the camera's depth_factor ({:g} per metre)? ",
                      camera.depth_factor) +

@@ -21,7 +21,7 @@ class RepeatedDepth {
   // it faces, where all depths are one.
   Frame left_out(const Frame& frame) {
     const std::shared_ptr<const RgbdImage> before = std::exchange(last_, frame.image());
-    repeats_ = before && same(before->depth, last_->depth) && !same(before->grey, last_->grey) && !flat(last_->depth);
+    repeats_ = before && before->depth == last_->depth && before->grey != last_->grey && !flat(last_->depth);
     if (!repeats_) return frame;
     auto image = std::make_shared<RgbdImage>(*last_);
     image->depth = DepthImage(image->depth.width(), image->depth.height());
@@ -39,10 +39,6 @@ class RepeatedDepth {
  private:
   static bool flat(const DepthImage& depth) {
     return std::all_of(depth.data(), depth.data() + depth.size(), [&](float z) { return z == depth.data()[0]; });
-  }
-  template <class Pixel>
-  static bool same(const Image<Pixel>& a, const Image<Pixel>& b) {
-    return a.size() == b.size() && std::equal(a.data(), a.data() + a.size(), b.data());
   }
 
   std::shared_ptr<const RgbdImage> last_;  // as it was given

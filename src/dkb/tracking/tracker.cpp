@@ -428,8 +428,9 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
   frame.motion = input.features.motion;
   frame.motion.resize(frame.features->size(), FeatureMotion::still);
   frame.show_nothing();
+  const MatchableFeatures matchable = frame.matchable();
   for (size_t f = 0; f < frame.features->size(); ++f)
-    frame.with_depth += frame.features->keypoints[f].depth > 0 && !frame.matchable().on_mover(f);
+    frame.with_depth += frame.features->keypoints[f].depth > 0 && !matchable.on_mover(f);
 
   const bool has_map = state_ != TrackingState::initialising;
   const auto predicted = frame.predicted = predict(input);
@@ -464,14 +465,14 @@ TrackedFrame Tracker::track(const TrackingInput& input) {
       return frame;
     }
     frame.state = state_ = TrackingState::tracking;
-    lost_since_.reset(), lost_at_.reset();
+    lost_.reset();
     suggested_.reset();
     last_ = frame;
     last_seen_ = frame.timestamp;
     return frame;
   }
   suggested_.reset();
-  lost_since_.reset(), lost_at_.reset();
+  lost_.reset();
   unconfirmed_.reset();
   place_evidence_.clear();
   if (!last_ || frame.timestamp <= last_->timestamp) {

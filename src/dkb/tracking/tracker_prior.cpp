@@ -196,7 +196,7 @@ std::optional<PoseProposal> Tracker::find_where_lost(const TrackedFrame& frame) 
 void Tracker::suggest(const PosePrediction& pose) {
   reset_motion();
   unconfirmed_.reset();
-  lost_since_.reset(), lost_at_.reset();
+  lost_.reset();
   suggested_ = pose;
 }
 

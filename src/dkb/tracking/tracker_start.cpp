@@ -16,21 +16,21 @@ constexpr double kGoOnAfter = 0.1;  // [s] without a pose by the images: more th
 // A map starts where enough depth is in view: the first at once, another one when the old one stays out of sight. Where
 // a prior tells how the camera came here, the old map goes on instead, with a keyframe that shows nothing of it.
 bool Tracker::start_map(TrackedFrame& frame, const PosePrediction* expected) {
-  const double since_last = lost_at_ ? frame.timestamp - *lost_at_ : 0;
-  lost_at_ = frame.timestamp;
+  if (!lost_) lost_.emplace();
+  const double before = std::exchange(lost_->at, frame.timestamp);
   if (frame.with_depth < options_.initial_points) {
     // What cannot start a map says nothing of whether the old one is in sight: its time does not count.
-    if (lost_since_) *lost_since_ += since_last;
+    if (lost_->since) *lost_->since += frame.timestamp - before;
     return false;
   }
   // Nothing followed from the map's first frame: the map begins again, without what that frame made.
   const auto step =
       expected == nullptr && last_ && last_->starts_map ? expected_step(frame.timestamp, nullptr) : std::nullopt;
   if (state_ != TrackingState::initialising && !step) {
-    if (!lost_since_) lost_since_ = frame.timestamp;
+    if (!lost_->since) lost_->since = frame.timestamp;
     // Where the way here is known and the map's points are not found, there are none.
     const double wait = expected != nullptr ? std::min(kGoOnAfter, options_.new_map_after) : options_.new_map_after;
-    if (options_.new_map_after == 0 || frame.timestamp - *lost_since_ < wait) return false;
+    if (options_.new_map_after == 0 || frame.timestamp - *lost_->since < wait) return false;
   }
   if (step) {
     frame.predicted = pose_after(*step);

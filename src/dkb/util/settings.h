@@ -27,6 +27,9 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
 // ` (did you mean "features.count"?)`, or nothing when no candidate is near.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
 
+// "a, b, c".
+std::string listed(const std::vector<std::string>& names);
+
 // Strict numbers, independent of the locale: the whole of `text`, no spaces, nothing after the number.
 bool parse_number(std::string_view text, int64_t* value);
 bool parse_number(std::string_view text, double* value);  // accepts nan and inf, as strtod does
