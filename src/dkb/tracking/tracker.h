@@ -38,6 +38,12 @@ struct PointInView {
   double depth = 0;             // [m]
 };
 
+// Frames in a row that showed nothing of the map.
+struct LostFrames {
+  double at = 0;                // [s] the last of them
+  std::optional<double> since;  // [s] the first that could have started a map; later for those that could not
+};
+
 // Frame to pose, against an immutable view of the map and the tracker's own provisional points.
 // Deterministic: the same frames and views in the same order give the same poses.
 class Tracker {
@@ -84,11 +90,6 @@ class Tracker {
   void set_start(const Rigid3& cam_from_world) { start_ = cam_from_world; }
 
  private:
-  struct Lost {
-    double at = 0;                // [s] the last frame of them
-    std::optional<double> since;  // [s] the first that could have started a map; later for those that could not
-  };
-
   static constexpr int kMatchDistance = 90;  // [bits] largest Hamming distance of a match with a map point
 
   struct Pair {
@@ -163,7 +164,7 @@ class Tracker {
   std::optional<VelocityFilter> velocity_;   // nothing while nobody knows it
   double last_seen_ = 0;                     // [s] when the images told the pose last
   std::optional<PosePrediction> suggested_;  // by the user
-  std::optional<Lost> lost_;                 // frames in a row showed nothing of the map
+  std::optional<LostFrames> lost_;           // nothing while the map is seen
   std::vector<Candidate> candidates_;        // from the view, then of provisional points; either by increasing id
   size_t from_view_ = 0;                     // of these, the first
   std::optional<double> candidates_made_;    // [s] nothing = the view is newer
