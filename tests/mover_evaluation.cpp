@@ -139,6 +139,7 @@ MoverEvaluation evaluate_movers(const MoverRows& truth, const MoverRows& estimat
   std::vector<double> position_errors, velocity_errors;
   std::set<int> true_ids, given_ids;
   size_t within = 0, row = 0;
+  double velocity_nees = 0;
   for (TrueFrame& frame : frames) {
     while (row < estimate.size() && estimate[row].timestamp < frame.timestamp - options.same_stamp) ++row;
     std::vector<const Mover*> estimates;
@@ -158,15 +159,20 @@ MoverEvaluation evaluate_movers(const MoverRows& truth, const MoverRows& estimat
       given_ids.insert(e.id);
       const Eigen::Vector3d off = truth_from_world * e.position_in_world - t->position_in_world;
       position_errors.push_back(off.norm());
-      velocity_errors.push_back((truth_from_world.rotation * e.velocity_in_world - t->velocity_in_world).norm());
+      const double velocity_error = (truth_from_world.rotation * e.velocity_in_world - t->velocity_in_world).norm();
+      velocity_errors.push_back(velocity_error);
+      if (const double sd = velocity_sd(e); sd > 0) velocity_nees += velocity_error * velocity_error / (3 * sd * sd);
       for (int i = 0; i < 3; ++i) within += std::abs(off[i]) <= 2 * e.position_sd;
     }
   }
   result.ids = given_ids.size();
   result.median_position_error = median_or_zero(position_errors);
   result.median_velocity_error = median_or_zero(velocity_errors);
-  if (result.found > 0)
-    result.share_within_two_sd = static_cast<double>(within) / static_cast<double>(3 * result.found);
+  if (result.found > 0) {
+    const auto found = static_cast<double>(result.found);
+    result.share_within_two_sd = static_cast<double>(within) / (3 * found);
+    result.mean_velocity_nees = velocity_nees / found;
+  }
   const CrossingCounter counter(frames, options);
   for (auto a = true_ids.begin(); a != true_ids.end(); ++a)
     for (auto b = std::next(a); b != true_ids.end(); ++b) counter.count(*a, *b, &result);

@@ -26,6 +26,7 @@ struct MoverEvaluation {
   double median_position_error = 0;  // [m] of the matched; 0 when there are none
   double median_velocity_error = 0;  // [m/s]
   double share_within_two_sd = 0;    // of the matched, coordinates within 2 position_sd of the truth
+  double mean_velocity_nees = 0;     // squared velocity error over 3 velocity_sd^2: 1 where that tells the truth
   size_t crossings = 0;              // one for each mover of a pair that passed each other in the image
   size_t kept = 0;                   // of these, followed under the same id before and after
   size_t ids = 0;                    // different ids that were given to true movers

@@ -37,6 +37,15 @@ TEST(MoverEvaluation, ErrorsAreMediansOfMatchedMovers) {
   EXPECT_NEAR(result.share_within_two_sd, 8.0 / 9.0, 1e-12);  // all coordinates but the 0.2
 }
 
+TEST(MoverEvaluation, VelocitiesAreHeldAgainstTheirStandardDeviation) {
+  MoverRows estimate = {row(0, 5, {0, 0, 2}), row(1, 5, {0, 0, 2})};
+  for (MoverRow& r : estimate) r.mover.covariance.bottomRightCorner<3, 3>() = 0.25 * Eigen::Matrix3d::Identity();
+  estimate[0].mover.velocity_in_world = {1, 0, 0.5};  // 1.25 / (3 * 0.25)
+  estimate[1].mover.velocity_in_world = {0, 0.5, 0};  // 0.25 / (3 * 0.25)
+  const MoverEvaluation result = evaluate_movers({row(0, 1, {0, 0, 2}), row(1, 1, {0, 0, 2})}, estimate, Rigid3(), {});
+  EXPECT_NEAR(result.mean_velocity_nees, (5.0 / 3 + 1.0 / 3) / 2, 1e-12);
+}
+
 TEST(MoverEvaluation, TheAlignmentIsApplied) {
   const Rigid3 truth_from_world(Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitZ())), {1, 2, 3});
   const MoverRows truth = {row(0, 1, truth_from_world * Eigen::Vector3d(4, 5, 6))}, estimate = {row(0, 1, {4, 5, 6})};

@@ -18,9 +18,7 @@ constexpr const char* kUnnamed = "object";
 // movers hide legs and bodies, and along the optical axis.
 constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
 constexpr double kSdNoDepth = 1.0;  // [m] the last where the sensor tells no depth
-// Spectral density of the white noise that acceleration is taken for [m^2/s^3]: within a second somebody who walks is
-// as likely as not to stop, which changes the velocity by 1 m/s.
-constexpr double kAgility = 1.0;
+constexpr double kAgility = 3.0;    // [m^2/s^3] spectral density of the white noise that acceleration is taken for
 constexpr double kSpeedSd = 1.2;    // [m/s] standard deviation of the speed of something just found
 
 constexpr double kGate = 25.0;              // squared Mahalanobis distance within which an observation may be a track's
