@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // `dkb-slam run`, as its users start it.
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/image_codecs.h"
@@ -468,25 +463,15 @@ TEST(RunCommand, ABadImageIsSkippedNamedAndCounted) {
   EXPECT_NE(run.finished.err.find(fs::path(rows[10][1]).filename().string()), std::string::npos) << run.finished.err;
 }
 
-// The tenth image is a named pipe: the run cannot get past it before it is interrupted.
 TEST(RunCommand, AnInterruptWritesWhatThereIs) {
   const TempFolder temp;
-  const fs::path folder = temp / "endless";
-  copy_sequence(folder, 20, true);
-  const fs::path pipe = folder / rows_of(folder / "associations.txt")[10][1];
-  fs::remove(pipe);
-  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const Endless endless(temp / "endless");
   const fs::path out = temp / "out";
-  Program program({"run", folder.string(), "--out", out.string(), "--detector", "none"});
-  const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
-  while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause();
+  Program program(endless.run(out));
+  while (program.err().find("frame 1/20") == std::string::npos && !program.ended()) pause_ms(5);
   ASSERT_FALSE(program.ended());
   kill(program.pid(), SIGINT);
-  while (!program.ended()) {
-    const int fd = open(pipe.c_str(), O_WRONLY | O_NONBLOCK);  // whoever reads it finds an empty file
-    if (fd >= 0) close(fd);
-    pause();
-  }
+  while (!program.ended()) endless.let_go(), pause_ms(5);
   const Finished finished = program.wait();
   EXPECT_EQ(finished.exit_code, 130) << finished.err;
   const auto stats = nlohmann::json::parse(read_text(out / "stats.json"));
