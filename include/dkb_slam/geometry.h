@@ -51,7 +51,9 @@ struct DKB_SLAM_API Camera {
   double k4 = 0, k5 = 0, k6 = 0;             ///< of the rational model: the radial polynomial is divided by theirs
   double depth_factor = 5000.0;              ///< [units per metre] of integer depth images, > 0
   double fps = 0;                            ///< [1/s] nominal frame rate; 0 = as the first five stamps say
-  double readout = 0.0;                      ///< [s] rolling shutter, first to last row's exposure; 0 = unknown or none
+  /// [s] of a rolling shutter, from the first row's exposure to the last row's: below 0 where the image is upside down;
+  /// 0 = unknown or none.
+  double readout = 0.0;
   double depth_time_offset = 0.0;            ///< [s] to add to depth stamps: when the colour camera saw it; 0 = unknown
   double depth_min = 0.2, depth_max = 10.0;  ///< [m] depth outside is taken for missing
 

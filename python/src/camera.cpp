@@ -107,8 +107,9 @@ Axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). De
 
 width, height: [px]; fx, fy, cx, cy: [px]; depth_factor: [units per metre] of integer depth images.
 Optional: k1, k2, p1, p2, k3, k4, k5, k6 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
-readout [s] of a rolling shutter (0 = unknown or none), depth_time_offset [s] (added to a depth image's stamp: when the
-colour camera saw the same), depth_min, depth_max [m] (depth outside is taken for missing).
+readout [s] of a rolling shutter, from the first row's exposure to the last row's (below 0 where the image is upside down;
+0 = unknown or none), depth_time_offset [s] (added to a depth image's stamp: when the colour camera saw the same),
+depth_min, depth_max [m] (depth outside is taken for missing).
 
 Raises InputError naming the field that is missing, unknown or out of range.)");
   camera

@@ -237,7 +237,7 @@ std::optional<MotionPrior> DepthAlignment::align(const MotionDepthGrid& here, co
       if (factor && *factor > usual) step = solve(hanging_together = *factor);
       const auto of_readout = sums.of_readout(kTogether * hanging_together, information, step);
       readout_information_ += std::max(0.0, of_readout.information);
-      readout_ = std::clamp(readout_ - of_readout.gradient / readout_information_, 0.0, kMaxReadout);
+      readout_ = std::clamp(readout_ - of_readout.gradient / readout_information_, -kMaxReadout, kMaxReadout);
       if (factor) together_ = together_ ? usual + kFrameShare * (*factor - usual) : *factor;
     }
     pose = rigid3_from_tangent(step) * pose;

@@ -170,7 +170,7 @@ TEST_F(DepthAlignmentTest, SurfacesThatMovedBeforeAreLeftOut) {
 }
 
 TEST_F(DepthAlignmentTest, TheReadoutOfARollingShutterIsLearnt) {
-  for (const double readout : {0.0, 0.015, 0.03}) {
+  for (const double readout : {-0.015, 0.0, 0.015, 0.03}) {
     const TurningCamera turning{readout};
     DepthAlignment alignment(SensorNoise(), plane_test_camera().fx, rays_);
     EXPECT_EQ(alignment.readout(), 0);

@@ -181,7 +181,7 @@ RgbdFeatures make_rgbd_features(std::vector<Descriptor> descriptors, std::vector
   const bool moved =
       options.model_time_offset && (colour_cam_from_depth_cam.translation.norm() > 1e-6 ||
                                     vector_from_rotation(colour_cam_from_depth_cam.rotation).norm() > 1e-6);
-  const bool rolling = options.model_rolling_shutter && camera.readout > 0 && velocity.squaredNorm() > 0;
+  const bool rolling = options.model_rolling_shutter && camera.readout != 0 && velocity.squaredNorm() > 0;
   for (Keypoint& k : result.keypoints) {
     float z = k.depth;
     if (moved && z > 0) {

@@ -233,9 +233,12 @@ TEST(RgbdFeatures, ACameraAtRestOrWithEqualStampsChangesNoDepth) {
 
 // Each row of a rolling shutter sees the scene from where the camera is at that row's time. With the true velocity the
 // features return to where the camera in the middle of the exposure sees them.
-TEST(RgbdFeatures, TheRollingShutterIsUndoneExactly) {
+class UndoneShutter : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(RgbdFeatures, UndoneShutter, testing::Values(0.030, -0.030));  // [s], -: upside down
+
+TEST_P(UndoneShutter, IsExact) {
   CameraModel camera = plain_camera();
-  camera.readout = 0.030;
+  camera.readout = GetParam();
   Vector6d velocity;
   velocity << 0.5, 0.2, -0.4, 0.3, -0.8, 0.6;
   Random random(5);

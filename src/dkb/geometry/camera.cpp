@@ -162,7 +162,7 @@ void CameraModel::check() const {
   require_option(std::isfinite(depth_factor) && depth_factor > 0, "depth_factor", depth_factor,
                  "greater than 0 units per metre");
   require_option(std::isfinite(fps) && fps >= 0 && fps <= 1000, "fps", fps, "0 ... 1000 per second");
-  require_option(std::isfinite(readout) && readout >= 0 && readout <= 0.1, "readout", readout, "0 ... 0.1 s");
+  require_option(std::isfinite(readout) && std::abs(readout) <= 0.1, "readout", readout, "-0.1 ... 0.1 s");
   require_option(std::isfinite(depth_time_offset) && std::abs(depth_time_offset) <= 0.1, "depth_time_offset",
                  depth_time_offset, "-0.1 ... 0.1 s");
   require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");

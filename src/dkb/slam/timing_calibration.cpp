@@ -50,7 +50,8 @@ TimingCalibration::TimingCalibration(const Optics& optics, bool learn_readout, b
     : optics_(optics) {
   const double most = longest(optics.camera), usual = 12 / (most * most);  // of what is as likely anywhere in `most`
   Camera& camera = optics_.camera;
-  readout_ = {camera.readout > 0 || !learn_readout, 0, most, usual};
+  // Until rows tell, the first one is taken to be read first, as in cameras that are not mounted upside down.
+  readout_ = {camera.readout != 0 || !learn_readout, -most, most, usual};
   depth_offset_ = {camera.depth_time_offset != 0 || !learn_depth_offset, -most, most, usual};
   if (!readout_.known) camera.readout = most / 2;
 }

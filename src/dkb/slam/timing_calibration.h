@@ -12,7 +12,7 @@
 namespace dkb {
 
 // Learns when the camera sees what its images show, while it is in use: how long a rolling shutter takes from the first
-// row to the last, and how long after its stamp, or before, a depth image shows what the colour camera saw. Rows that
+// row to the last (or, below 0, from the last to the first: images turned upside down), and how long after its stamp, or before, a depth image shows what the colour camera saw. Rows that
 // are exposed early or late show their points off by the image's motion times the delay, and depths of another time are
 // off by how fast the surface in that pixel comes nearer; what a pose cannot explain of these patterns tells the delay.
 // Recursive least squares with the pose of each frame eliminated. The map was made from the same images, so that each
@@ -34,7 +34,7 @@ class TimingCalibration {
  private:
   struct Delay {  // its value is the camera's
     bool known;
-    double smallest, largest;  // [s] that are believed in; beforehand each between is as likely
+    double smallest, largest;  // [s] that are believed in
     double information;        // [1/s^2]
   };
 

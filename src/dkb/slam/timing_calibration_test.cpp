@@ -56,7 +56,7 @@ double calibrated(double readout, bool estimate = true, double file = 0, int fra
 }
 
 TEST(TimingCalibration, FindsTheReadoutWithinAMillisecond) {
-  for (const double readout : {0.0, 0.012, 0.025}) EXPECT_NEAR(calibrated(readout), readout, 1e-3);
+  for (const double readout : {-0.025, -0.012, 0.0, 0.012, 0.025}) EXPECT_NEAR(calibrated(readout), readout, 1e-3);
 }
 
 TEST(TimingCalibration, KnowsMostOfItAfterHalfASecond) {
@@ -67,12 +67,13 @@ TEST(TimingCalibration, CornersThatSlideAlongOutlinesTellNothing) {
   EXPECT_NEAR(calibrated(0.012, true, 0, 60, true), 0.012, 1e-3);
 }
 
-TEST(TimingCalibration, BeforeAnythingIsSeenAllReadoutsAreAsLikely) {
+TEST(TimingCalibration, BeforeAnythingIsSeenTheFirstRowIsReadFirstAndAllTimesAreAsLikely) {
   EXPECT_DOUBLE_EQ(calibrated(0.02, true, 0, 0), 0.0165);
 }
 
 TEST(TimingCalibration, ACameraThatTellsItsReadoutIsBelieved) {
   EXPECT_EQ(calibrated(0.02, true, 0.01), 0.01);
+  EXPECT_EQ(calibrated(0.02, true, -0.01), -0.01);
 }
 
 TEST(TimingCalibration, StaysOutWhenItIsNotWanted) {
@@ -81,7 +82,7 @@ TEST(TimingCalibration, StaysOutWhenItIsNotWanted) {
 
 TEST(TimingCalibration, NeverLeavesWhatIsBelievable) {
   EXPECT_EQ(calibrated(0.06), 0.033);
-  EXPECT_EQ(calibrated(-0.01), 0.0);
+  EXPECT_EQ(calibrated(-0.06), -0.033);
 }
 
 TEST(TimingCalibration, NoSensorIsReadLongerThanAFrame) {
