@@ -42,15 +42,15 @@ struct Rigid3 {
 /// Camera axes: x right, y down, z forward. The centre of the top-left pixel is (0, 0). Depth is registered to the
 /// colour camera.
 struct DKB_SLAM_API Camera {
-  int width = 640;                           ///< [px] 16 ... 16384
-  int height = 480;                          ///< [px] likewise
-  double fx = 525.0, fy = 525.0;             ///< [px] > 0
-  double cx = 319.5, cy = 239.5;             ///< [px]
-  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;     ///< radial k, tangential p, in OpenCV's order k1 k2 p1 p2 k3
-  double k3 = 0;                             ///< the third radial coefficient
-  double k4 = 0, k5 = 0, k6 = 0;             ///< of the rational model: the radial polynomial is divided by theirs
-  double depth_factor = 5000.0;              ///< [units per metre] of integer depth images, > 0
-  double fps = 0;                            ///< [1/s] nominal frame rate; 0 = as the first five stamps say
+  int width = 640;                        ///< [px] 16 ... 16384
+  int height = 480;                       ///< [px] likewise
+  double fx = 525.0, fy = 525.0;          ///< [px] > 0
+  double cx = 319.5, cy = 239.5;          ///< [px]
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;  ///< radial k, tangential p, in OpenCV's order k1 k2 p1 p2 k3
+  double k3 = 0;                          ///< the third radial coefficient
+  double k4 = 0, k5 = 0, k6 = 0;          ///< of the rational model: the radial polynomial is divided by theirs
+  double depth_factor = 5000.0;           ///< [units per metre] of integer depth images, > 0
+  double fps = 0;                         ///< [1/s] nominal frame rate; 0 = as the first five stamps say
   /// [s] of a rolling shutter, from the first row's exposure to the last row's: below 0 where the image is upside down;
   /// 0 = unknown or none.
   double readout = 0.0;

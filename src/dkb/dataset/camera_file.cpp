@@ -42,8 +42,9 @@ void bind(Settings* settings, CameraModel* c, bool rational = true) {
   settings->bind("fps", &c->fps,
                  "[1/s] nominal frame rate; 0, or one that the first five stamps contradict = as they say");
   settings->bind("depth_min", &c->depth_min, "[m] nearer depth is treated as missing");
-  settings->bind("readout", &c->readout,
-                 "[s] rolling shutter: first row's exposure to the last row's, below 0 upside down; 0 = unknown or none");
+  settings->bind(
+      "readout", &c->readout,
+      "[s] rolling shutter: first row's exposure to the last row's, below 0 upside down; 0 = unknown or none");
   settings->bind(
       "depth_time_offset", &c->depth_time_offset,
       "[s] added to the stamps of depth images: when the colour camera saw what they show; 0 = unknown or none");

@@ -11,12 +11,13 @@
 
 namespace dkb {
 
-// Learns when the camera sees what its images show, while it is in use: how long a rolling shutter takes from the first
-// row to the last (or, below 0, from the last to the first: images turned upside down), and how long after its stamp, or before, a depth image shows what the colour camera saw. Rows that
-// are exposed early or late show their points off by the image's motion times the delay, and depths of another time are
-// off by how fast the surface in that pixel comes nearer; what a pose cannot explain of these patterns tells the delay.
-// Recursive least squares with the pose of each frame eliminated. The map was made from the same images, so that each
-// frame tells less than all that is missing; the next ones make up for it. Deterministic.
+// Learns when the camera sees what its images show, while it is in use: how long a rolling shutter takes from the
+// first row to the last (or, below 0, from the last to the first: images turned upside down), and how long after its
+// stamp, or before, a depth image shows what the colour camera saw. Rows that are exposed early or late show their
+// points off by the image's motion times the delay, and depths of another time are off by how fast the surface in
+// that pixel comes nearer; what a pose cannot explain of these patterns tells the delay. Recursive least squares
+// with the pose of each frame eliminated. The map was made from the same images, so that each frame tells less than
+// all that is missing; the next ones make up for it. Deterministic.
 class TimingCalibration {
  public:
   // What is to be learnt where the camera's file does not tell it (0).
