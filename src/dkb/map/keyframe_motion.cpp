@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "dkb/geometry/rigid3.h"
+
 namespace dkb {
 namespace {
 
