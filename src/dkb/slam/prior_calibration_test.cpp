@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/geometry/rigid3.h"
 #include "dkb/image/rgbd_image.h"
 #include "dkb/util/random.h"
 
