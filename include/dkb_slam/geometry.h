@@ -6,10 +6,12 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "dkb_slam/image.h"
 #include "dkb_slam/version.h"
 
 namespace dkb {
@@ -56,11 +58,15 @@ struct DKB_SLAM_API Camera {
   double readout = 0.0;
   double depth_time_offset = 0.0;            ///< [s] to add to depth stamps: when the colour camera saw it; 0 = unknown
   double depth_min = 0.2, depth_max = 10.0;  ///< [m] depth outside is taken for missing
+  /// Above 0 where every image shows the robot itself, dirt on the lens or writing: no features and no depth are taken
+  /// from there. Of the camera's size, or none. Copies of the camera share it; to_yaml() does not tell it.
+  std::shared_ptr<const Image<uint8_t>> mask;
 
   /// A camera that is known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Throws InputError naming the
   /// nearest one.
   static Camera named(const std::string& name);
-  /// Reads a camera file: a YAML map of the fields above; fx, fy, cx, cy, width, height and depth_factor are required.
+  /// Reads a camera file: a YAML map of the fields above; fx, fy, cx, cy, width, height and depth_factor are required,
+  /// `mask` is an image file, relative to the camera file's folder.
   /// Or a calibration of ROS or OpenCV, whose depth is in millimetres. Throws InputError with file and line.
   static Camera load(const std::filesystem::path& path);
   /// The camera file's text, every field with its unit; k4, k5, k6 where they are not all 0.

@@ -39,8 +39,36 @@ constexpr Field kFields[] = {
     {"depth_max", &Camera::depth_max, nullptr, false},
 };
 
+// Where the images show no world: true or above 0.
+std::shared_ptr<const Image<uint8_t>> mask_from(const py::handle& value) {
+  if (value.is_none()) return nullptr;
+  const auto array = py::array_t<bool, py::array::c_style | py::array::forcecast>::ensure(value);
+  if (!array || array.ndim() != 2) {
+    PyErr_Clear();
+    throw InputError("mask: it must be an array (height, width) of bool or numbers, or None");
+  }
+  auto mask = std::make_shared<Image<uint8_t>>(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)));
+  std::transform(array.data(), array.data() + array.size(), mask->data(), [](bool m) { return uint8_t{m} * 255; });
+  return mask;
+}
+
+py::object mask_array(const Camera& camera) {
+  if (!camera.mask) return py::none();
+  py::array_t<bool> array({camera.mask->height(), camera.mask->width()});
+  std::transform(camera.mask->data(), camera.mask->data() + camera.mask->size(), array.mutable_data(),
+                 [](uint8_t m) { return m != 0; });
+  return array;
+}
+
+bool same_mask(const Camera& a, const Camera& b) {
+  if (a.mask == b.mask) return true;
+  if (!a.mask || !b.mask || a.mask->size() != b.mask->size()) return false;
+  return std::equal(a.mask->data(), a.mask->data() + a.mask->size(), b.mask->data(),
+                    [](uint8_t m, uint8_t n) { return (m != 0) == (n != 0); });
+}
+
 Camera camera_from_fields(const py::kwargs& given) {
-  std::vector<std::string> names;
+  std::vector<std::string> names = {"mask"};
   for (const Field& field : kFields) names.emplace_back(field.name);
   for (const auto& item : given) {
     const auto name = item.first.cast<std::string>();
@@ -61,6 +89,7 @@ Camera camera_from_fields(const py::kwargs& given) {
       camera.*field.whole = argument<int>(value, field.name, "a whole number");
   }
   if (!missing.empty()) throw InputError("Camera: missing: " + missing);
+  if (given.contains("mask")) camera.mask = mask_from(given["mask"]);
   camera.check();
   return camera;
 }
@@ -74,7 +103,7 @@ std::string camera_repr(const Camera& camera) {
     text += field.real != nullptr ? fmt::format("{}={}", field.name, camera.*field.real)
                                   : fmt::format("{}={}", field.name, camera.*field.whole);
   }
-  return text + ")";
+  return text + (camera.mask ? ", mask=...)" : ")");
 }
 
 }  // namespace
@@ -109,7 +138,8 @@ width, height: [px]; fx, fy, cx, cy: [px]; depth_factor: [units per metre] of in
 Optional: k1, k2, p1, p2, k3, k4, k5, k6 (distortion, in OpenCV's order), fps [1/s] (0 = as the first five stamps say),
 readout [s] of a rolling shutter, from the first row's exposure to the last row's (below 0 where the image is upside down;
 0 = unknown or none), depth_time_offset [s] (added to a depth image's stamp: when the colour camera saw the same),
-depth_min, depth_max [m] (depth outside is taken for missing).
+depth_min, depth_max [m] (depth outside is taken for missing), mask: array (height, width), true or above 0 where every
+image shows the robot itself, dirt on the lens or writing: no features and no depth are taken from there.
 
 Raises InputError naming the field that is missing, unknown or out of range.)");
   camera
@@ -128,11 +158,18 @@ Raises InputError naming the field that is missing, unknown or out of range.)");
       .def("__repr__", &camera_repr)
       .def("__eq__",
            [](const Camera& a, const py::object& other) {
-             return py::isinstance<Camera>(other) && a.to_yaml() == other.cast<const Camera&>().to_yaml();
+             if (!py::isinstance<Camera>(other)) return false;
+             const auto& b = other.cast<const Camera&>();
+             return a.to_yaml() == b.to_yaml() && same_mask(a, b);
            })
       .def("__hash__", [](const Camera& c) { return py::hash(py::str(c.to_yaml())); })
-      .def(py::pickle([](const Camera& c) { return py::str(c.to_yaml()); },
-                      [](const py::str& text) { return parse_camera(text, "Camera"); }));
+      .def(py::pickle([](const Camera& c) { return py::make_tuple(c.to_yaml(), mask_array(c)); },
+                      [](const py::tuple& state) {
+                        Camera c = parse_camera(state[0].cast<std::string>(), "Camera");
+                        c.mask = mask_from(state[1]);
+                        return c;
+                      }))
+      .def_property_readonly("mask", &mask_array);
   for (const Field& field : kFields)
     camera.def_property_readonly(field.name, [field](const Camera& c) {
       return field.real != nullptr ? py::object(py::float_(c.*field.real)) : py::object(py::int_(c.*field.whole));

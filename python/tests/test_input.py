@@ -160,6 +160,20 @@ def test_cameras_keep_their_fields():
     assert {camera: 1}[dkb_slam.Camera(**fields)] == 1 and hash(camera) != hash(dkb_slam.Camera.named("fr1"))
 
 
+def test_a_cameras_mask_takes_the_depth_and_the_features():
+    fields = dict(fx=525, fy=525, cx=319.5, cy=239.5, width=640, height=480, depth_factor=1000)
+    mask = np.zeros((480, 640), np.uint8)
+    mask[300:] = 7
+    masked, plain = dkb_slam.Camera(**fields, mask=mask), dkb_slam.Camera(**fields)
+    assert plain.mask is None and masked.mask.dtype == bool and (masked.mask == (mask > 0)).all()
+    assert masked != plain and masked == dkb_slam.Camera(**fields, mask=mask > 0) and "mask=..." in repr(masked)
+    assert pickle.loads(pickle.dumps(masked)) == masked and dkb_slam.Camera(**fields, mask=None) == plain
+    assert not dkb_slam.Frame(masked, 1, RGB, DEPTH).depth[mask > 0].any()
+    for wrong in (mask[1:], np.ones((480, 640)), np.zeros((480, 640, 3)), "body.png"):
+        with pytest.raises(dkb_slam.InputError, match="mask"):
+            dkb_slam.Camera(**fields, mask=wrong)
+
+
 def test_reprs_say_what_it_is(slam):
     motion = np.eye(4)
     motion[:3, 3] = [0.5, 0, 0]

@@ -4,12 +4,15 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 
+#include "dkb/dataset/image_codecs.h"
 #include "dkb/dataset/mutation_test_tools.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/test_errors.h"
+#include "dkb/util/test_folder.h"
 
 namespace dkb {
 namespace {
@@ -135,6 +138,29 @@ TEST(CameraFile, MessagesSayWhereWhatAndWhatToDo) {
   EXPECT_EQ(parse_message(kCamera + "fx: 3\n"), "camera.yaml:8: fx: is given twice; leave one out");
   EXPECT_EQ(parse_message("{{{").substr(0, 32), "camera.yaml:1: is not valid YAML");
   EXPECT_NE(parse_message(std::string("fx: 1\0", 6)), "no error");
+}
+
+TEST(CameraFile, AMaskIsAnImageBesideTheFile) {
+  const test::TempFolder folder;
+  GreyImage mask(640, 480);
+  mask(3, 2) = 1;
+  write_file_atomically(folder / "body.png", encode_png(mask));
+  write_file_atomically(folder / "small.png", encode_png(GreyImage(64, 48)));
+  write_file_atomically(folder / "all.png", encode_png(GreyImage(640, 480, 9)));
+  const auto parse = [&](const std::string& line) { return parse_camera(kCamera + line, folder / "camera.yaml"); };
+  const CameraModel camera = parse("mask: body.png\n");
+  ASSERT_NE(camera.mask, nullptr);
+  EXPECT_EQ((*camera.mask)(3, 2), 255);
+  EXPECT_EQ(std::count(camera.mask->data(), camera.mask->data() + camera.mask->size(), 0), 640 * 480 - 1);
+  EXPECT_EQ(parse("").mask, nullptr);
+  const auto refusal = [&](const std::string& line) { return test::input_error_of([&] { parse(line); }); };
+  for (const auto& [line, words] : {std::pair{"mask: none.png\n", "camera.yaml:8: mask: "},
+                                    {"mask: none.png\n", "none.png"},
+                                    {"mask:\n", "no value"},
+                                    {"mask: camera.yaml\n", "mask: "},
+                                    {"mask: small.png\n", "64 x 48 px is out of range; it must be of the size"},
+                                    {"mask: all.png\n", "it must be 0 where the images show the world"}})
+    EXPECT_NE(refusal(line).find(words), std::string::npos) << refusal(line);
 }
 
 TEST(CameraFile, WrittenCameraReadsBackTheSame) {

@@ -2,6 +2,7 @@
 #include "dkb/dataset/stored_pair.h"
 
 #include "dkb/dataset/image_codecs.h"
+#include "dkb/image/image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 
@@ -70,6 +71,7 @@ std::shared_ptr<RgbdImage> decode(const DatasetPair& pair, const CameraModel& ca
   if (fit_colour) picture = resampled(picture, camera.width, camera.height);
   image->grey = std::move(picture.grey), image->colour = std::move(picture.colour);
   image->depth = decode_depth(depth.bytes, depth.name, camera);
+  leave_out_masked(camera, image->depth);
   return image;
 }
 

@@ -16,6 +16,8 @@ struct PixelCorner {
   bool operator==(const PixelCorner&) const = default;
 };
 
+inline constexpr int kFastRadius = 3;  // [px] of the circle about a corner
+
 // FAST-9 corners with non-maximum suppression (Rosten and Drummond, ECCV 2006; Rosten, Porter, Drummond, PAMI 2010).
 // A pixel is a corner at threshold t if 9 consecutive pixels of the 16 on the circle of radius 3 about it are all
 // brighter than it by more than t, or all darker. The score is computed for whole rows at once as the best over arcs of

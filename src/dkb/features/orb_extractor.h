@@ -46,6 +46,9 @@ class OrbExtractor {
   // `poor`: 255 in the square cells of `cell` px where features are of little use, such as on people who fill the
   // image; these get half of the features at most where there are enough others. Empty: no such place.
   OrbFeatures extract(const GreyImage& image, const Image<uint8_t>& poor = {}, int cell = 1);
+  // Places without corners from the next image on, which has the size of `mask`: above 0. A corner lies there where its
+  // circle does. Empty: no such place.
+  void leave_out(const Image<uint8_t>& mask);
   // Features asked for from now on.
   void set_count(int count) { options_.count = count; }
   // Pyramid of the last image given to extract().
@@ -65,6 +68,8 @@ class OrbExtractor {
   // `step` for every level, by both threads; `before` is done first by the one that calls.
   void each_level(LevelStep step, const auto& before);
   void take_levels(Worker& worker);
+  // Whose circles lie where nothing is to be found.
+  Image<uint8_t> left_out_of(int level) const;
   void find_corners(int level, Worker& worker);
   void describe_corners(int level, Worker& worker);
   // How many of each level's corners to keep, `count` in all: by area, what a level lacks goes to the others.
@@ -77,6 +82,8 @@ class OrbExtractor {
   SteeredBrief brief_;
   std::vector<std::vector<PixelCorner>> corners_, poor_corners_;  // per level
   std::vector<int> quotas_, poor_quotas_;                         // per level
+  Image<uint8_t> left_out_;                                       // as leave_out() was given it
+  std::vector<Image<uint8_t>> left_out_levels_;                   // of it, per level, once there are levels
   std::vector<GreyImage> blurred_;                                // per level
   std::vector<size_t> firsts_;                                    // of each level in `features_`
   OrbFeatures features_;

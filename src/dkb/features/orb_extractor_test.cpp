@@ -71,6 +71,30 @@ void expect_equal(const OrbFeatures& a, const OrbFeatures& b) {
   }
 }
 
+// Whoever sees its own robot wants no corner of it, nor of its outline.
+TEST(OrbExtractor, NoCornersCircleReachesIntoWhatIsLeftOut) {
+  const GreyImage image = test_world(3).render({});
+  Image<uint8_t> mask(640, 480);
+  for (int y = 200; y < 300; ++y)
+    for (int x = 100; x < 420; ++x) mask(x, y) = 1;
+  const auto inside = [](const Corner& c, double margin) {
+    return c.x > 100 - margin && c.x < 419 + margin && c.y > 200 - margin && c.y < 299 + margin;
+  };
+  const auto count = [&](const OrbFeatures& features, double margin) {
+    return std::count_if(features.corners.begin(), features.corners.end(),
+                         [&](const Corner& c) { return inside(c, margin * std::pow(1.2, c.octave)); });
+  };
+  OrbExtractor extractor;
+  const OrbFeatures all = extractor.extract(image);
+  EXPECT_GT(count(all, 0), 50);
+  extractor.leave_out(mask);
+  const OrbFeatures left = extractor.extract(image);
+  EXPECT_EQ(count(left, 2.4), 0);  // a circle of 3 px, and half a pixel of refinement
+  EXPECT_EQ(left.corners.size(), all.corners.size()) << "the others make up for them";
+  extractor.leave_out({});
+  EXPECT_EQ(extractor.extract(image).descriptors, all.descriptors);
+}
+
 TEST(Orientation, PointsAlongTheBrighterSide) {
   const double directions[] = {0.3, 1.7, 3.0, 4.4, 6.0};
   for (const double direction : directions) {

@@ -167,6 +167,12 @@ void CameraModel::check() const {
                  depth_time_offset, "-0.1 ... 0.1 s");
   require_option(std::isfinite(depth_min) && depth_min >= 0, "depth_min", depth_min, "at least 0 m");
   require_option(std::isfinite(depth_max) && depth_max > depth_min, "depth_max", depth_max, "greater than depth_min");
+  if (!mask) return;
+  if (mask->width() != width || mask->height() != height)
+    throw InvalidOption("mask", std::to_string(mask->width()) + " x " + std::to_string(mask->height()) + " px",
+                        "of the size of the images, " + std::to_string(width) + " x " + std::to_string(height) + " px");
+  if (std::none_of(mask->data(), mask->data() + mask->size(), [](uint8_t m) { return m == 0; }))
+    throw InvalidOption("mask", "above 0 everywhere", "0 where the images show the world");
 }
 
 void CameraModel::set_distortion(const std::string& model, const std::vector<double>& coefficients) {

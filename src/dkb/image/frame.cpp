@@ -103,6 +103,7 @@ Frame::Frame(const Camera& camera, const FrameInput& input) : stamp_ns_(input.st
     image->grey = grey_from_colour(image->colour);
   }
   image->depth = copy_depth(input.depth, camera);
+  leave_out_masked(camera, image->depth);
   image_ = std::move(image);
 }
 

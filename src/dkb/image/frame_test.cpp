@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -163,6 +164,20 @@ TEST_F(FrameTest, DepthOutsideTheCamerasRangeIsNone) {
   in.depth = metres.view;
   const Frame frame(camera, in);
   for (int i = 0; i < 10; ++i) EXPECT_EQ(frame.image()->depth(i, 4), i < 7 ? 0 : values[i]) << values[i];
+}
+
+TEST(Frame, TheCamerasMaskHasNoDepth) {
+  Camera camera = small_camera();
+  auto mask = std::make_shared<Image<uint8_t>>(kWidth, kHeight);
+  (*mask)(3, 2) = 1;
+  camera.mask = mask;
+  const Image<float> depth(kWidth, kHeight, 1.5f);
+  const Image<uint8_t> grey(kWidth, kHeight);
+  const Frame frame(camera, {.colour = {grey.data(), kWidth, kHeight, 0, PixelFormat::grey8},
+                             .depth = {depth.data(), kWidth, kHeight, 0, PixelFormat::depth_f32}});
+  const DepthImage& seen = frame.image()->depth;
+  EXPECT_EQ(seen(3, 2), 0);
+  EXPECT_EQ(std::count(seen.data(), seen.data() + seen.size(), 1.5f), kWidth * kHeight - 1);
 }
 
 TEST_F(FrameTest, ViewsThatDoNotFitAreRefusedAndNamed) {

@@ -79,4 +79,10 @@ void depth_from_metres(const float* in, size_t count, const Camera& camera, floa
   for (size_t i = 0; i < count; ++i) metres[i] = within(in[i]);
 }
 
+void leave_out_masked(const Camera& camera, DepthImage& depth) {
+  if (!camera.mask) return;
+  for (size_t i = 0; i < depth.size(); ++i)
+    if (camera.mask->data()[i] != 0) depth.data()[i] = 0;
+}
+
 }  // namespace dkb

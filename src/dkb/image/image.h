@@ -13,5 +13,7 @@ GreyImage grey_from_colour(const ColourImage& colour);
 // the camera's range. Whatever way images come in, they pass here.
 void depth_from_units(const uint16_t* units, size_t count, const Camera& camera, float* metres);
 void depth_from_metres(const float* in, size_t count, const Camera& camera, float* metres);
+// The camera's mask, if any, has no depth.
+void leave_out_masked(const Camera& camera, DepthImage& depth);
 
 }  // namespace dkb

@@ -8,6 +8,7 @@
 #include "dkb/dataset/camera_file.h"
 #include "dkb/dataset/odometry_track.h"
 #include "dkb/dataset/tum_dataset.h"
+#include "dkb/image/image.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/stamps.h"
 
@@ -91,6 +92,7 @@ std::shared_ptr<RgbdImage> RecordedPairs::Decoder::decode(const StampPairing::Pa
   made->grey = std::move(picture.grey), made->colour = std::move(picture.colour);
   made->depth = depth_of(depths, depth.camera);
   if (registration) made->depth = registration->registered(made->depth);
+  leave_out_masked(colour.camera, made->depth);
   return made;
 }
 

@@ -50,6 +50,7 @@ Pipeline::Pipeline(const PipelineContext& context, RunRecord& record, Map map)
       next_keyframe_(map.keyframe_count()),
       mapping_(LocalMapper(optics_of(context), options_.mapping, map), options_.pipeline.threaded),
       loop_(optics_of(context), options_.loop_closing, options_.mapping.ba, options_.seed, options_.pipeline.threaded) {
+  if (context_.camera.mask) extractor_.leave_out(*context_.camera.mask);
   tracker_.set_start(options_.base_from_cam.inverse());
   loop_.start_at(next_keyframe_);
   last_keyframe_ = last_keyframe_of(map, next_keyframe_ - 1);
