@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <vector>
 
+#include "dkb/dataset/image_codecs.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/one_line.h"
 #include "dkb/util/settings.h"
@@ -31,7 +33,8 @@ const std::vector<std::string> kKeys{"image_width",
                                      "readout",
                                      "depth_time_offset",
                                      "depth_min",
-                                     "depth_max"};
+                                     "depth_max",
+                                     "mask"};
 const std::vector<std::string> kKeysOfOurs{"width", "height", "fx", "fy", "cx", "cy", "k1",
                                            "k2",    "k3",     "k4", "k5", "k6", "p1", "p2"};
 
@@ -93,6 +96,16 @@ void read_lens(const YamlReader& file, Camera& camera) {
 
 }  // namespace
 
+std::shared_ptr<const GreyImage> read_camera_mask(const std::string& value, const std::string& where,
+                                                  const std::string& name) {
+  if (value.empty()) throw InputError(where + ": mask: has no value; it must be an image file, or leave it out");
+  try {
+    return std::make_shared<const GreyImage>(read_mask(std::filesystem::path(name).parent_path() / value));
+  } catch (const InputError& e) {
+    throw InputError(where + ": mask: " + e.what());
+  }
+}
+
 bool is_calibration(const std::string& text) {
   for (const char* key : {"image_width", "camera_matrix"}) {
     const std::string line = std::string(key) + ":";
@@ -116,6 +129,7 @@ Calibration parse_calibration(const std::string& text, const std::string& name) 
         std::pair{"readout", &camera.readout}, std::pair{"depth_time_offset", &camera.depth_time_offset},
         std::pair{"depth_min", &camera.depth_min}, std::pair{"depth_max", &camera.depth_max}})
     file.read(key, field);
+  if (file.has("mask")) camera.mask = read_camera_mask(file.at("mask").text(), file.at("mask").where(), name);
   try {
     read_lens(file, camera);
     camera.check();

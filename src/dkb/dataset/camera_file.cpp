@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dkb/dataset/calibration_file.h"
-#include "dkb/dataset/image_codecs.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/files.h"
 #include "dkb/util/settings.h"
@@ -86,17 +85,6 @@ CameraChoice from_file(const fs::path& path) {
           doubt_of(read.camera, name)};
 }
 
-// Where the image shows no world, by a file's name.
-std::shared_ptr<const GreyImage> read_camera_mask(const SettingLine& line, const fs::path& folder) {
-  if (line.value.empty())
-    throw InputError(line.where + ": mask: has no value; it must be an image file, or leave it out");
-  try {
-    return std::make_shared<const GreyImage>(read_mask(folder / line.value));
-  } catch (const InputError& e) {
-    throw InputError(line.where + ": mask: " + e.what());
-  }
-}
-
 std::string folder_name(const fs::path& folder) {
   const fs::path normal = fs::absolute(folder).lexically_normal();
   return (normal.has_filename() ? normal : normal.parent_path()).filename().string();
@@ -111,7 +99,7 @@ CameraModel parse_camera(const std::string& text, const std::string& name) {
   bind(&settings, &camera);
   for (const SettingLine& line : settings.parse_yaml(text, name))
     if (line.key == kMask)
-      camera.mask = read_camera_mask(line, fs::path(name).parent_path());
+      camera.mask = read_camera_mask(line.value, line.where, name);
     else
       settings.set(line.key, line.value, line.where);
   for (const std::string& key : kRequired)

@@ -153,6 +153,7 @@ TEST(CameraFile, AMaskIsAnImageBesideTheFile) {
   EXPECT_EQ((*camera.mask)(3, 2), 255);
   EXPECT_EQ(std::count(camera.mask->data(), camera.mask->data() + camera.mask->size(), 0), 640 * 480 - 1);
   EXPECT_EQ(parse("").mask, nullptr);
+  EXPECT_NE(parse_camera(kRos + "mask: body.png\n", folder / "camera.yaml").mask, nullptr);
   const auto refusal = [&](const std::string& line) { return test::input_error_of([&] { parse(line); }); };
   for (const auto& [line, words] : {std::pair{"mask: none.png\n", "camera.yaml:8: mask: "},
                                     {"mask: none.png\n", "none.png"},

@@ -173,11 +173,14 @@ TEST(Frame, TheCamerasMaskHasNoDepth) {
   camera.mask = mask;
   const Image<float> depth(kWidth, kHeight, 1.5f);
   const Image<uint8_t> grey(kWidth, kHeight);
-  const Frame frame(camera, {.colour = {grey.data(), kWidth, kHeight, 0, PixelFormat::grey8},
-                             .depth = {depth.data(), kWidth, kHeight, 0, PixelFormat::depth_f32}});
+  const FrameInput input{.colour = {grey.data(), kWidth, kHeight, 0, PixelFormat::grey8},
+                         .depth = {depth.data(), kWidth, kHeight, 0, PixelFormat::depth_f32}};
+  const Frame frame(camera, input);
   const DepthImage& seen = frame.image()->depth;
   EXPECT_EQ(seen(3, 2), 0);
   EXPECT_EQ(std::count(seen.data(), seen.data() + seen.size(), 1.5f), kWidth * kHeight - 1);
+  camera.mask = std::make_shared<Image<uint8_t>>(kWidth, 1);
+  EXPECT_NE(test::input_error_of([&] { Frame(camera, input); }).find("mask"), std::string::npos);
 }
 
 TEST_F(FrameTest, ViewsThatDoNotFitAreRefusedAndNamed) {

@@ -7,6 +7,8 @@
 
 #include <cstring>
 
+#include "dkb/util/errors.h"
+
 namespace dkb {
 namespace {
 
@@ -81,6 +83,8 @@ void depth_from_metres(const float* in, size_t count, const Camera& camera, floa
 
 void leave_out_masked(const Camera& camera, DepthImage& depth) {
   if (!camera.mask) return;
+  if (camera.mask->width() != depth.width() || camera.mask->height() != depth.height())
+    throw InputError("mask: it is not of the images' size; give the camera a mask of its own size");
   for (size_t i = 0; i < depth.size(); ++i)
     if (camera.mask->data()[i] != 0) depth.data()[i] = 0;
 }
