@@ -43,8 +43,7 @@ void measure(const fs::path& sequence, const fs::path& run) {
       evaluate_movers(read_movers(sequence / "movers.csv"), read_movers(run / "movers.csv"), truth_from_world, camera);
   fmt::print(
       "{}: found {} of {} ({:.0f}%), {} false; position error median {:.1f} cm, {:.0f}% within 2 sd, velocity {:.2f} "
-      "m/s, "
-      "NEES {:.2f}; kept {} of {} ids at crossings ({:.0f}%), {} ids\n",
+      "m/s, NEES {:.2f}; kept {} of {} ids at crossings ({:.0f}%), {} ids\n",
       run.filename().string(), e.found, e.true_movers,
       100.0 * static_cast<double>(e.found) / std::max<double>(1, static_cast<double>(e.true_movers)), e.false_movers,
       100 * e.median_position_error, 100 * e.share_within_two_sd, e.median_velocity_error, e.mean_velocity_nees, e.kept,

@@ -50,6 +50,10 @@ class SourceFiles {
       for (const std::string& name : found(text, "^#include \"([^\"]+)\""))
         for (const std::string root : {"src/", "include/"})
           if (code_.count(root + name)) includes_[file].insert(root + name);
+    for (const auto& [file, text] : code_)
+      for (const char* declaration : {"(?:class|struct|enum|using|auto|constexpr [\\w:]+) (\\w+)",
+                                      "^ *(?!return|else|throw|case)(?:[\\w:<>,&*]+ )+[&*]*(?:\\w+::)?(\\w+)\\("})
+        declared_[file].merge(found(text, declaration));
     std::map<std::string, std::set<std::string>> headers;
     for (const auto& [file, text] : code_) {
       if (file.substr(file.size() - 2) != ".h") continue;
@@ -71,10 +75,7 @@ class SourceFiles {
     used.merge(found(code, "(?:^|[^\\w.>:~])(?:dkb::)?([A-Zk]\\w+)"));
     // Whatever else of that name it reaches, such as a member: a second one is not told from the first.
     std::set<std::string> own;
-    for (const std::string& near : reached)
-      for (const char* declaration : {"(?:class|struct|enum|using|auto|constexpr [\\w:]+) (\\w+)",
-                                      "^ *(?!return|else|throw|case)(?:[\\w:<>,&*]+ )+[&*]*(?:\\w+::)?(\\w+)\\("})
-        own.merge(found(code_.at(near), declaration));
+    for (const std::string& near : reached) own.insert(declared_.at(near).begin(), declared_.at(near).end());
     std::vector<std::string> missing;
     for (const std::string& name : used) {
       const auto header = header_of_.find(name);
@@ -94,7 +95,7 @@ class SourceFiles {
   }
 
   std::map<std::string, std::string> code_;  // by file
-  std::map<std::string, std::set<std::string>> includes_;
+  std::map<std::string, std::set<std::string>> includes_, declared_;
   std::map<std::string, std::string> header_of_;  // of each name that only one declares
 };
 

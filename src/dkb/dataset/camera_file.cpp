@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 namespace {
 
 const std::vector<std::string> kRequired{"fx", "fy", "cx", "cy", "width", "height", "depth_factor"};
-const std::string kMask = "mask";
 const std::vector<std::string> kBuiltin{"fr1", "fr2", "fr3", "bonn"};
 
 // `rational`: with k4 to k6, which are written for rational cameras alone.
@@ -98,7 +97,7 @@ CameraModel parse_camera(const std::string& text, const std::string& name) {
   Settings settings;
   bind(&settings, &camera);
   for (const SettingLine& line : settings.parse_yaml(text, name))
-    if (line.key == kMask)
+    if (line.key == "mask")
       camera.mask = read_camera_mask(line.value, line.where, name);
     else
       settings.set(line.key, line.value, line.where);

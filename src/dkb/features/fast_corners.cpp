@@ -173,13 +173,13 @@ void fast_contrasts_5x5(const GreyImage& image, int x, int y, uint8_t (&contrast
 
 void FastCornerFinder::find(const GreyImage& image, int threshold, int border, std::vector<PixelCorner>& corners) {
   corners.clear();
-  border = std::max(border, 3);
+  border = std::max(border, kFastRadius);
   threshold = std::clamp(threshold, 1, 254);
   const int begin = border, end = image.width() - border;
   const int top = border, bottom = image.height() - border;
   if (begin >= end || top >= bottom) return;
   // One pixel more on each side, since suppression compares with the neighbours.
-  const int score_begin = std::max(begin - 1, 3), score_end = std::min(end + 1, image.width() - 3);
+  const int score_begin = std::max(begin - 1, kFastRadius), score_end = std::min(end + 1, image.width() - kFastRadius);
   const std::array<ptrdiff_t, 16> circle = circle_offsets(image.width());
   const bool vectorised = simd_ >= Simd::avx2 && score_end - score_begin >= 32;
 
@@ -189,7 +189,7 @@ void FastCornerFinder::find(const GreyImage& image, int threshold, int border, s
   const auto score_row = [&](int y) { return scores_.data() + static_cast<size_t>(y % 3) * stride + kRowPadding; };
   const auto fill_row = [&](int y) {
     uint8_t* scores = score_row(y);
-    if (y < 3 || y >= image.height() - 3) {
+    if (y < kFastRadius || y >= image.height() - kFastRadius) {
       std::fill(scores, scores + image.width(), uint8_t{0});
       return;
     }

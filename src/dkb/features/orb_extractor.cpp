@@ -42,36 +42,27 @@ void OrbExtractor::take_levels(Worker& worker) {
 }
 
 void OrbExtractor::leave_out(const Image<uint8_t>& mask) {
-  left_out_ = mask;
-  left_out_levels_.clear();
+  left_out_ = mask.empty() ? Image<int>() : Image<int>(mask.width() + 1, mask.height() + 1);
+  for (int y = 0; y < mask.height(); ++y)
+    for (int x = 0; x < mask.width(); ++x)
+      left_out_(x + 1, y + 1) = left_out_(x, y + 1) + left_out_(x + 1, y) - left_out_(x, y) + (mask(x, y) != 0);
 }
 
-Image<uint8_t> OrbExtractor::left_out_of(int level) const {
-  const GreyImage& pixels = pyramid_.level(level);
-  Image<uint8_t> left_out(pixels.width(), pixels.height());
-  const auto from = [](double full) { return std::max(0, static_cast<int>(std::floor(full))); };
-  for (int y = 0; y < pixels.height(); ++y)
-    for (int x = 0; x < pixels.width(); ++x) {
-      const int right =
-          std::min(static_cast<int>(std::ceil(pyramid_.full_x(level, x + kFastRadius))), left_out_.width() - 1);
-      const int below =
-          std::min(static_cast<int>(std::ceil(pyramid_.full_y(level, y + kFastRadius))), left_out_.height() - 1);
-      for (int v = from(pyramid_.full_y(level, y - kFastRadius)); v <= below && left_out(x, y) == 0; ++v)
-        for (int u = from(pyramid_.full_x(level, x - kFastRadius)); u <= right; ++u)
-          if (left_out_(u, v) != 0) left_out(x, y) = 1;
-    }
-  return left_out;
+bool OrbExtractor::reaches_into_left_out(int level, const PixelCorner& c) const {
+  const auto first = [](double full) { return std::max(0, static_cast<int>(std::floor(full))); };
+  const auto end = [](double full, int size) { return std::min(static_cast<int>(std::ceil(full)) + 1, size - 1); };
+  const int left = first(pyramid_.full_x(level, c.x - kFastRadius)),
+            top = first(pyramid_.full_y(level, c.y - kFastRadius)),
+            right = end(pyramid_.full_x(level, c.x + kFastRadius), left_out_.width()),
+            bottom = end(pyramid_.full_y(level, c.y + kFastRadius), left_out_.height());
+  return left_out_(right, bottom) - left_out_(left, bottom) - left_out_(right, top) + left_out_(left, top) > 0;
 }
 
 void OrbExtractor::find_corners(int level, Worker& worker) {
   auto& corners = corners_[static_cast<size_t>(level)];
   const GreyImage& pixels = pyramid_.level(level);
   worker.finder.find(pixels, options_.fast_threshold_min, kOrbBorder, corners);
-  if (!left_out_.empty()) {
-    Image<uint8_t>& left_out = left_out_levels_[static_cast<size_t>(level)];
-    if (left_out.empty()) left_out = left_out_of(level);
-    std::erase_if(corners, [&](const PixelCorner& c) { return left_out(c.x, c.y) != 0; });
-  }
+  if (!left_out_.empty()) std::erase_if(corners, [&](const PixelCorner& c) { return reaches_into_left_out(level, c); });
   worker.spread.drop_weak(orb_region(pixels), options_.fast_threshold, kOrbCellSize, corners);
 }
 
@@ -147,7 +138,6 @@ OrbFeatures OrbExtractor::extract(const GreyImage& image, const Image<uint8_t>& 
   pyramid_.start(image);
   const auto levels = static_cast<size_t>(pyramid_.levels());
   corners_.resize(levels);
-  if (!left_out_.empty()) left_out_levels_.resize(levels);
   blurred_.resize(levels);
   levels_built_ = 1;
   each_level(&OrbExtractor::find_corners, [this] {

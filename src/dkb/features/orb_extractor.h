@@ -68,8 +68,8 @@ class OrbExtractor {
   // `step` for every level, by both threads; `before` is done first by the one that calls.
   void each_level(LevelStep step, const auto& before);
   void take_levels(Worker& worker);
-  // Whose circles lie where nothing is to be found.
-  Image<uint8_t> left_out_of(int level) const;
+  // Whether the square around a corner's circle does.
+  bool reaches_into_left_out(int level, const PixelCorner& c) const;
   void find_corners(int level, Worker& worker);
   void describe_corners(int level, Worker& worker);
   // How many of each level's corners to keep, `count` in all: by area, what a level lacks goes to the others.
@@ -82,10 +82,9 @@ class OrbExtractor {
   SteeredBrief brief_;
   std::vector<std::vector<PixelCorner>> corners_, poor_corners_;  // per level
   std::vector<int> quotas_, poor_quotas_;                         // per level
-  Image<uint8_t> left_out_;                                       // as leave_out() was given it
-  std::vector<Image<uint8_t>> left_out_levels_;                   // of it, per level, once there are levels
-  std::vector<GreyImage> blurred_;                                // per level
-  std::vector<size_t> firsts_;                                    // of each level in `features_`
+  Image<int> left_out_;             // how many pixels of the mask are above and left of each; empty without a mask
+  std::vector<GreyImage> blurred_;  // per level
+  std::vector<size_t> firsts_;      // of each level in `features_`
   OrbFeatures features_;
 
   LevelStep step_ = nullptr;
