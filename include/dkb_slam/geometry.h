@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "dkb_slam/image.h"
 #include "dkb_slam/version.h"
 
 namespace dkb {
+
+template <class T>
+class Image;  // of dkb_slam/image.h, whose C++20 users of these types alone need not read: the messages of ROS 1
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;

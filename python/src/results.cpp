@@ -44,7 +44,7 @@ std::string repr_of(const PyResult& result) {
 }
 
 // The mask's cells as pixels of the image.
-py::array_t<bool> mask_array(const PyResult& result) {
+py::array_t<bool> mover_mask_array(const PyResult& result) {
   py::array_t<bool> array({result.height, result.width});
   bool* out = array.mutable_data();
   const MoverMask& mask = result.r.mask;
@@ -171,7 +171,7 @@ frame a to frame b. Camera axes: x right, y down, z forward. World: the first tr
       .def_property_readonly(
           "detections", [](const PyResult& p) { return p.r.detections; },
           "list of Detection: boxes of the detectors, carried to this image.")
-      .def_property_readonly("mask", &mask_array,
+      .def_property_readonly("mask", &mover_mask_array,
                              "bool [H, W], pixels of the image: True where movers are. Made at each access.")
       .def_property_readonly(
           "features",

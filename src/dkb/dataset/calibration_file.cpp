@@ -17,8 +17,7 @@ namespace dkb {
 namespace {
 
 constexpr size_t kMaxNumbers = 64;  // of a matrix that is looked at
-constexpr double kMillimetres = 1000;
-const Range kSides{16, 16384};  // [px]
+const Range kSides{16, 16384};      // [px]
 
 const std::vector<std::string> kKeys{"image_width",
                                      "image_height",

@@ -125,7 +125,7 @@ TumDataset paired_by_number(const fs::path& folder, const std::string& layout, c
 
 CameraModel kinect(double focal, double cx, double cy) {
   CameraModel camera;
-  camera.fx = camera.fy = focal, camera.cx = cx, camera.cy = cy, camera.depth_factor = 1000;
+  camera.fx = camera.fy = focal, camera.cx = cx, camera.cy = cy, camera.depth_factor = kMillimetres;
   return camera;
 }
 

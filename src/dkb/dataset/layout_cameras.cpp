@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "dkb/geometry/camera.h"
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
 #include "dkb/util/text_rows.h"
@@ -13,8 +14,6 @@ namespace dkb {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr double kMillimetres = 1000;
 
 const CameraModel& checked(const CameraModel& camera, const std::string& name) {
   try {

@@ -63,7 +63,7 @@ class Fields {
   size_t at_ = 0;
 };
 
-struct Stream {
+struct OniStream {
   uint32_t type = 0;  // 2 depth, 3 colour
   std::string codec;
   int width = 0, height = 0, fps = 0;
@@ -100,7 +100,7 @@ class OniFile final : public ImageDevice {
     checked_ = true;
   }
 
-  const Stream& colour() const { return streams_.at(*colour_id_); }
+  const OniStream& colour() const { return streams_.at(*colour_id_); }
   double depth_factor() const { return streams_.at(*depth_id_).pixels == kDepth100um ? 10000 : 1000; }
 
   DeviceState next(int, DeviceImages* images) override {
@@ -161,7 +161,7 @@ class OniFile final : public ImageDevice {
     Fields fields(record.fields);
     if (record.type == kAdded || record.type == kAdded4 || record.type == kAdded5) {
       fields.text();
-      Stream stream;
+      OniStream stream;
       stream.type = fields.take<uint32_t>();
       const auto codec = fields.take<uint32_t>();
       stream.codec.assign(reinterpret_cast<const char*>(&codec), 4);
@@ -194,8 +194,8 @@ class OniFile final : public ImageDevice {
   }
 
   void check() const {
-    const Stream &c = streams_.at(*colour_id_), &d = streams_.at(*depth_id_);
-    for (const Stream* s : {&c, &d})
+    const OniStream &c = streams_.at(*colour_id_), &d = streams_.at(*depth_id_);
+    for (const OniStream* s : {&c, &d})
       if (s->width < 16 || s->height < 16 || s->width > 16384 || s->height > 16384)
         throw InputError(name_ + ": a stream's images are of " + std::to_string(s->width) + "x" +
                          std::to_string(s->height) + " px; sides must be 16 ... 16384");
@@ -211,12 +211,12 @@ class OniFile final : public ImageDevice {
   }
 
   template <class Pixel>
-  void turn_back(Pixel* pixels, const Stream& stream) const {
+  void turn_back(Pixel* pixels, const OniStream& stream) const {
     if (!stream.mirrored) return;
     for (int y = 0; y < stream.height; ++y, pixels += stream.width) std::reverse(pixels, pixels + stream.width);
   }
 
-  ImageView depth_view(const Stream& stream) {
+  ImageView depth_view(const OniStream& stream) {
     const size_t pixels = static_cast<size_t>(stream.width) * static_cast<size_t>(stream.height);
     if (stream.codec == "NONE") {
       if (data_.size() < pixels * 2) throw InputError(name_ + ": a depth image is truncated");
@@ -230,7 +230,7 @@ class OniFile final : public ImageDevice {
     return {depth_.data(), stream.width, stream.height, 0, PixelFormat::depth_u16};
   }
 
-  ImageView colour_view(const Stream& stream) {
+  ImageView colour_view(const OniStream& stream) {
     if (stream.codec == "JPEG" || stream.pixels == kJpeg) {
       picture_ = decode_picture(data_, name_);
       if (picture_.grey.width() != stream.width || picture_.grey.height() != stream.height)
@@ -254,7 +254,7 @@ class OniFile final : public ImageDevice {
   const std::string name_;
   std::ifstream in_;
   uint64_t size_ = 0;
-  std::map<uint32_t, Stream> streams_;
+  std::map<uint32_t, OniStream> streams_;
   std::optional<uint32_t> depth_id_, colour_id_;
   std::string data_;  // of the image given out last
   std::vector<uint16_t> depth_;
@@ -265,7 +265,7 @@ class OniFile final : public ImageDevice {
 };
 
 Camera camera_of(const OniFile& file, const std::string& name, const SourceOptions& options) {
-  const Stream& stream = file.colour();
+  const OniStream& stream = file.colour();
   Camera told;
   told.width = stream.width, told.height = stream.height;
   told.fps = std::clamp(stream.fps, 0, 1000);  // 0: as the first stamps say

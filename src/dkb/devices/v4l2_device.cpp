@@ -66,15 +66,15 @@ std::vector<uint32_t> formats_of(int fd) {
 }
 
 // One of the two video devices, streaming into buffers that it shares with us.
-class Stream {
+class V4l2Stream {
  public:
   enum class Kind { colour, depth };
-  Stream(std::string path, Kind kind, const Camera& camera) : path_(std::move(path)), kind_(kind), camera_(camera) {
+  V4l2Stream(std::string path, Kind kind, const Camera& camera) : path_(std::move(path)), kind_(kind), camera_(camera) {
     open();
   }
-  ~Stream() { close(); }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
+  ~V4l2Stream() { close(); }
+  V4l2Stream(const V4l2Stream&) = delete;
+  V4l2Stream& operator=(const V4l2Stream&) = delete;
 
   int fd() const { return fd_.get(); }
 
@@ -214,8 +214,8 @@ class V4l2Device final : public ImageDevice {
  public:
   V4l2Device(const V4l2Place& place, const Camera& camera)
       : place_(place),
-        colour_(place.colour, Stream::Kind::colour, camera),
-        depth_(place.depth, Stream::Kind::depth, camera) {}
+        colour_(place.colour, V4l2Stream::Kind::colour, camera),
+        depth_(place.depth, V4l2Stream::Kind::depth, camera) {}
 
   DeviceState next(int timeout_ms, DeviceImages* images) override {
     std::array<pollfd, 2> waiting{{{colour_.fd(), POLLIN, 0}, {depth_.fd(), POLLIN, 0}}};
@@ -245,7 +245,7 @@ class V4l2Device final : public ImageDevice {
 
  private:
   const V4l2Place place_;
-  Stream colour_, depth_;
+  V4l2Stream colour_, depth_;
 };
 
 }  // namespace

@@ -17,9 +17,9 @@ constexpr const char* kUnnamed = "object";
 // Standard deviations of an observed position [m]: along the image's rows, along its columns, where clutter and other
 // movers hide legs and bodies, and along the optical axis.
 constexpr double kSdAcross = 0.12, kSdDown = 0.45, kSdDeep = 0.12;
-constexpr double kSdNoDepth = 1.0;  // [m] the last where the sensor tells no depth
-constexpr double kAgility = 3.0;    // [m^2/s^3] spectral density of the white noise that acceleration is taken for
-constexpr double kSpeedSd = 1.2;    // [m/s] standard deviation of the speed of something just found
+constexpr double kSdNoDepth = 1.0;     // [m] the last where the sensor tells no depth
+constexpr double kAgility = 3.0;       // [m^2/s^3] spectral density of the white noise that acceleration is taken for
+constexpr double kFirstSpeedSd = 1.2;  // [m/s] standard deviation of the speed of something just found
 
 constexpr double kGate = 25.0;              // squared Mahalanobis distance within which an observation may be a track's
 constexpr double kMaxDistance = 0.9;        // [m] nor may it lie farther from where it is expected than this ...
@@ -218,7 +218,7 @@ std::vector<Mover> MoverTracker::update(MoverSighting sighting, const DepthImage
     t.state << o.position_in_world, Eigen::Vector3d::Zero();
     t.covariance.setZero();
     t.covariance.topLeftCorner<3, 3>() = noise;
-    t.covariance.diagonal().tail<3>().setConstant(kSpeedSd * kSpeedSd);
+    t.covariance.diagonal().tail<3>().setConstant(kFirstSpeedSd * kFirstSpeedSd);
     t.seen = time_;
     t.box = o.box;
     t.observations = 1;

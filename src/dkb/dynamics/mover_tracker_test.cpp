@@ -12,7 +12,7 @@
 namespace dkb {
 namespace {
 
-constexpr double kStep = 1 / 30.0;  // [s]
+constexpr double kFrameTime = 1 / 30.0;  // [s]
 
 // A person 0.5 m wide and 1.4 m tall whose middle is at (x, 0, z) before the camera.
 void add_person(double x, double z, MoverTestScene* scene, bool with_box = true) {
@@ -37,8 +37,8 @@ MoverTestScene one_person(double x, double z) {
 TEST(MoverTracker, TheThirdObservationGivesAnId) {
   MoverTracker tracker(MoverTestScene().camera, {});
   EXPECT_TRUE(show(&tracker, 0, one_person(0, 2)).empty());
-  EXPECT_TRUE(show(&tracker, kStep, one_person(0, 2)).empty());
-  const auto movers = show(&tracker, 2 * kStep, one_person(0, 2));
+  EXPECT_TRUE(show(&tracker, kFrameTime, one_person(0, 2)).empty());
+  const auto movers = show(&tracker, 2 * kFrameTime, one_person(0, 2));
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_EQ(movers[0].id, 1);
   EXPECT_EQ(movers[0].class_name, "person");
@@ -56,7 +56,7 @@ TEST(MoverTracker, FewImagesASecondAreEnough) {
 TEST(MoverTracker, VelocityIsThatOfTheMover) {
   MoverTracker tracker(MoverTestScene().camera, {});
   std::vector<Mover> movers;
-  for (int i = 0; i < 30; ++i) movers = show(&tracker, i * kStep, one_person(-0.5 + i * kStep, 2.5));
+  for (int i = 0; i < 30; ++i) movers = show(&tracker, i * kFrameTime, one_person(-0.5 + i * kFrameTime, 2.5));
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_NEAR(movers[0].velocity_in_world.x(), 1.0, 0.15);
   EXPECT_NEAR(movers[0].velocity_in_world.z(), 0.0, 0.1);
@@ -66,8 +66,9 @@ TEST(MoverTracker, ACameraThatMovesDoesNotMoveTheMovers) {
   MoverTracker tracker(MoverTestScene().camera, {});
   std::vector<Mover> movers;
   for (int i = 0; i < 30; ++i) {
-    const double shift = 0.5 * i * kStep;
-    movers = show(&tracker, i * kStep, one_person(0.3 - shift, 2.5), {Eigen::Quaterniond::Identity(), {shift, 0, 0}});
+    const double shift = 0.5 * i * kFrameTime;
+    movers =
+        show(&tracker, i * kFrameTime, one_person(0.3 - shift, 2.5), {Eigen::Quaterniond::Identity(), {shift, 0, 0}});
   }
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_NEAR(movers[0].position_in_world.x(), 0.3, 0.02);
@@ -80,7 +81,7 @@ void expect_ids_kept_through_a_crossing(bool with_boxes) {
   int left_id = 0, right_id = 0, hidden = 0;
   for (int i = 0; i <= 60; ++i) {
     // The near one walks right and hides the far one, who walks left, for a while.
-    const double t = i * kStep;
+    const double t = i * kFrameTime;
     MoverTestScene scene;
     add_person(-0.9 + 0.9 * t, 1.8, &scene, with_boxes);
     add_person(1.1 - 0.9 * t, 3.0, &scene, with_boxes);
@@ -104,9 +105,9 @@ TEST(MoverTracker, WhatIsSeenFromAnExpectedPoseMovesWithTheOneThatIsFound) {
   MoverTracker tracker(MoverTestScene().camera, {}), told(MoverTestScene().camera, {});
   for (int i = 0; i < 6; ++i) {
     const MoverTestScene scene = one_person(-0.1 + 0.02 * i, 2);
-    const auto movers =
-        tracker.update(tracker.look(i * kStep, scene.depth, scene.mask, scene.boxes, expected), scene.depth, found);
-    const auto same = show(&told, i * kStep, scene, found);
+    const auto movers = tracker.update(tracker.look(i * kFrameTime, scene.depth, scene.mask, scene.boxes, expected),
+                                       scene.depth, found);
+    const auto same = show(&told, i * kFrameTime, scene, found);
     ASSERT_EQ(movers.size(), same.size());
     if (movers.empty()) continue;
     EXPECT_EQ(movers[0].id, same[0].id);
@@ -129,11 +130,11 @@ TEST(MoverTracker, WhoIsHiddenForLongKeepsTheId) {
   for (int i = 0; i <= 120; ++i) {
     // Somebody walks to the right behind a pillar 1 m wide that is as near as half of the way.
     MoverTestScene scene;
-    const double x = -1.2 + 0.6 * i * kStep;
+    const double x = -1.2 + 0.6 * i * kFrameTime;
     for (int y = 0; y < 240; ++y)
       for (int u = 100; u < 225; ++u) scene.depth(u, y) = 2;
     add_person(x, 3.5, &scene, false);
-    movers = show(&tracker, i * kStep, scene);
+    movers = show(&tracker, i * kFrameTime, scene);
     hidden += movers.empty() && i > 5;
   }
   EXPECT_GT(hidden, 40);  // more than the 1.2 s after which one is forgotten who is hidden by nothing
@@ -145,7 +146,7 @@ TEST(MoverTracker, WhoIsHiddenForGoodIsForgotten) {
   const auto id_after = [](double seconds_hidden) {
     MoverTracker tracker(MoverTestScene().camera, {});
     std::vector<Mover> movers;
-    const int gone = 10, back = gone + static_cast<int>(seconds_hidden / kStep);
+    const int gone = 10, back = gone + static_cast<int>(seconds_hidden / kFrameTime);
     for (int i = 0; i < back + 5; ++i) {
       MoverTestScene scene;
       if (i < gone || i >= back)
@@ -153,7 +154,7 @@ TEST(MoverTracker, WhoIsHiddenForGoodIsForgotten) {
       else
         for (int y = 0; y < 240; ++y)
           for (int u = 0; u < 320; ++u) scene.depth(u, y) = 2;
-      movers = show(&tracker, i * kStep, scene);
+      movers = show(&tracker, i * kFrameTime, scene);
     }
     return movers.size() == 1 ? movers[0].id : 0;
   };
@@ -169,7 +170,7 @@ TEST(MoverTracker, WhoStopsIsFollowedThoughNothingMovesUntilHeIsSeenThrough) {
       MoverTestScene scene;
       if (!leaves || i < 110) add_person(-0.5 + way * std::min(1.0, i / 30.0), 2.5, &scene, false);
       if (i > 40) scene.mask.cells = {};  // the motion segmentation has forgotten him
-      movers = show(&tracker, i * kStep, scene);
+      movers = show(&tracker, i * kFrameTime, scene);
     }
     return movers;
   };
@@ -194,7 +195,7 @@ TEST(MoverTracker, FaultsOfTheMaskThatFollowUponEachOtherAreNobodyWhoHasMoved) {
     for (int y = 0; y < 60; ++y)
       for (int x = 0; x < 80; ++x)
         if ((x < 40) != (i < 15) || i >= 30) scene.mask.cells(x, y) = 0;
-    movers = show(&tracker, i * kStep, scene);
+    movers = show(&tracker, i * kFrameTime, scene);
     told += static_cast<int>(movers.size());
   }
   EXPECT_GT(told, 0) << "as long as the mask says so";
@@ -203,11 +204,11 @@ TEST(MoverTracker, FaultsOfTheMaskThatFollowUponEachOtherAreNobodyWhoHasMoved) {
 
 TEST(MoverTracker, ABoxWithoutDepthGoesOnWithWhomItIsLeftOf) {
   MoverTracker tracker(MoverTestScene().camera, {});
-  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kFrameTime, one_person(0, 2));
   MoverTestScene foot;
   foot.boxes.push_back({"person", {150, 190, 20, 17}, 1});
   foot.mask.cells(0, 0) = 255;
-  const auto movers = show(&tracker, 5 * kStep, foot);
+  const auto movers = show(&tracker, 5 * kFrameTime, foot);
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_EQ(movers[0].id, 1);
   EXPECT_NEAR(movers[0].position_in_world.z(), 2, 1e-6);
@@ -217,16 +218,16 @@ TEST(MoverTracker, ABoxWithoutDepthGoesOnWithWhomItIsLeftOf) {
   MoverTestScene elsewhere;
   elsewhere.boxes.push_back({"person", {250, 190, 20, 17}, 1});
   elsewhere.mask.cells(0, 0) = 255;
-  EXPECT_TRUE(show(&tracker, 6 * kStep, elsewhere).empty());
+  EXPECT_TRUE(show(&tracker, 6 * kFrameTime, elsewhere).empty());
 }
 
 int id_after_gap(double seconds) {
   MoverTracker tracker(MoverTestScene().camera, {});
   double t = 0;
-  for (; t < 0.5; t += kStep) show(&tracker, t, one_person(0, 2));
+  for (; t < 0.5; t += kFrameTime) show(&tracker, t, one_person(0, 2));
   t += seconds;
   std::vector<Mover> movers;
-  for (int i = 0; i < 3; ++i) movers = show(&tracker, t + i * kStep, one_person(0, 2));
+  for (int i = 0; i < 3; ++i) movers = show(&tracker, t + i * kFrameTime, one_person(0, 2));
   return movers.empty() ? 0 : movers[0].id;
 }
 
@@ -237,8 +238,8 @@ TEST(MoverTracker, AMoverIsKnownAgainAfterOneSecondAndForgottenAfterTwo) {
 
 TEST(MoverTracker, UnseenMoversAreNotReported) {
   MoverTracker tracker(MoverTestScene().camera, {});
-  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
-  EXPECT_TRUE(show(&tracker, 5 * kStep, MoverTestScene()).empty());
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kFrameTime, one_person(0, 2));
+  EXPECT_TRUE(show(&tracker, 5 * kFrameTime, MoverTestScene()).empty());
 }
 
 TEST(MoverTracker, AThingInTwoBoxesIsOneMover) {
@@ -247,7 +248,7 @@ TEST(MoverTracker, AThingInTwoBoxesIsOneMover) {
   for (int i = 0; i < 6; ++i) {
     MoverTestScene scene = one_person(0, 2);
     scene.boxes.push_back(scene.boxes[0]);
-    movers = show(&tracker, i * kStep, scene);
+    movers = show(&tracker, i * kFrameTime, scene);
   }
   EXPECT_EQ(movers.size(), 1u);
 }
@@ -258,7 +259,7 @@ TEST(MoverTracker, RegionsWithoutABoxAreObjects) {
   for (int i = 0; i < 3; ++i) {
     MoverTestScene scene;
     add_person(0, 2, &scene, false);
-    movers = show(&tracker, i * kStep, scene);
+    movers = show(&tracker, i * kFrameTime, scene);
   }
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_EQ(movers[0].class_name, "object");
@@ -266,10 +267,10 @@ TEST(MoverTracker, RegionsWithoutABoxAreObjects) {
 
 TEST(MoverTracker, RebasingMovesWhatIsRemembered) {
   MoverTracker tracker(MoverTestScene().camera, {});
-  for (int i = 0; i < 5; ++i) show(&tracker, i * kStep, one_person(0, 2));
+  for (int i = 0; i < 5; ++i) show(&tracker, i * kFrameTime, one_person(0, 2));
   const Rigid3 new_from_old(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {5, 0, -3});
   tracker.rebase(new_from_old);
-  const auto movers = show(&tracker, 5 * kStep, one_person(0, 2), new_from_old);
+  const auto movers = show(&tracker, 5 * kFrameTime, one_person(0, 2), new_from_old);
   ASSERT_EQ(movers.size(), 1u);
   EXPECT_EQ(movers[0].id, 1);
 }

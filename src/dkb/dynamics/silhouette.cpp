@@ -19,7 +19,7 @@ constexpr double kCore = 0.5;      // share of the box's width and height around
 constexpr double kMinShare = 0.2;  // of the core's weight that a depth layer needs to be the object
 constexpr double kRelativeLayer = 0.15;  // [1] half-width of that layer relative to its depth
 constexpr float kHalfDepth = 0.3f;       // [m] and no more than half of what a body takes up along the line of sight
-constexpr float kReach = 0.6f;           // [m] parts of the object lie at most so far before or behind its layer
+constexpr float kPartsReach = 0.6f;      // [m] parts of the object lie at most so far before or behind its layer
 constexpr double kMiddle = 0.1;          // share of the box's width and height in which its body is sure to be
 constexpr double kWidening = 0.05;       // share of the box's size by which it is widened
 
@@ -139,7 +139,7 @@ float object_depth(const Window& window, const CellBounds& core) {
   return best_depth;
 }
 
-// Per cell of the window, 255: the surfaces within kReach of the layer that have a cell of it in the core, and
+// Per cell of the window, 255: the surfaces within kPartsReach of the layer that have a cell of it in the core, and
 // limbs. A limb stands before or behind the rest, so that depth steps between them. Unlike the background it ends
 // within the box: surfaces in reach that lie beside the object and do not go on beyond the box are part of it.
 std::vector<uint8_t> find_object(const Window& window, const CellBounds& core, float layer, float half_layer) {
@@ -147,7 +147,7 @@ std::vector<uint8_t> find_object(const Window& window, const CellBounds& core, f
   std::vector<float> within(window.depth.size());
   for (int y = range.y0; y < range.y1; ++y)
     for (size_t i = window.at(range.x0, y), last = window.at(range.x1, y); i < last; ++i)
-      within[i] = std::fabs(window.depth[i] - layer) <= kReach ? window.depth[i] : 0;
+      within[i] = std::fabs(window.depth[i] - layer) <= kPartsReach ? window.depth[i] : 0;
   const std::vector<DepthPart> parts = DepthParts(window.columns, window.rows).find(within, window.jump);
   std::vector<uint8_t> mine(window.depth.size());
   const auto take = [&](const DepthPart& part) {

@@ -9,8 +9,8 @@ namespace dkb {
 namespace {
 
 constexpr int kWeightBits = 14;
-constexpr int kShift = kWeightBits - 4;  // leaves 1/16 grey levels
-constexpr int kRound = 1 << (kShift - 1);
+constexpr int kLkShift = kWeightBits - 4;  // leaves 1/16 grey levels
+constexpr int kLkRound = 1 << (kLkShift - 1);
 
 // Top-left pixel of a window and the bilinear weights that all its samples share.
 struct Placement {
@@ -41,7 +41,7 @@ void sample_scalar(const GreyImage& image, const Placement& p, int size, int16_t
     for (int i = 0; i < size; ++i) {
       const int next = std::min(i + 1, last);
       const int sum = upper[i] * p.w00 + upper[next] * p.w01 + lower[i] * p.w10 + lower[next] * p.w11;
-      samples[row * kLkStride + i] = static_cast<int16_t>((sum + kRound) >> kShift);
+      samples[row * kLkStride + i] = static_cast<int16_t>((sum + kLkRound) >> kLkShift);
     }
   }
 }
@@ -72,7 +72,7 @@ DKB_TARGET_AVX2 inline PixelPairs load_pairs(const uint8_t* p) {
 DKB_TARGET_AVX2 void sample_avx2(const GreyImage& image, const Placement& p, int size, int16_t* samples) {
   const __m256i upper_weights = _mm256_set1_epi32(p.w00 | p.w01 << 16);
   const __m256i lower_weights = _mm256_set1_epi32(p.w10 | p.w11 << 16);
-  const __m256i round = _mm256_set1_epi32(kRound);
+  const __m256i round = _mm256_set1_epi32(kLkRound);
   PixelPairs upper = load_pairs(image.row(p.y) + p.x);
   for (int row = 0; row < size; ++row) {
     const PixelPairs lower = load_pairs(image.row(p.y + row + 1) + p.x);
@@ -80,8 +80,8 @@ DKB_TARGET_AVX2 void sample_avx2(const GreyImage& image, const Placement& p, int
         _mm256_add_epi32(_mm256_madd_epi16(upper.low, upper_weights), _mm256_madd_epi16(lower.low, lower_weights));
     __m256i high =
         _mm256_add_epi32(_mm256_madd_epi16(upper.high, upper_weights), _mm256_madd_epi16(lower.high, lower_weights));
-    low = _mm256_srai_epi32(_mm256_add_epi32(low, round), kShift);
-    high = _mm256_srai_epi32(_mm256_add_epi32(high, round), kShift);
+    low = _mm256_srai_epi32(_mm256_add_epi32(low, round), kLkShift);
+    high = _mm256_srai_epi32(_mm256_add_epi32(high, round), kLkShift);
     const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xD8);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(samples + row * kLkStride), packed);
     upper = lower;

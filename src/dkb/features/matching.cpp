@@ -7,9 +7,9 @@
 namespace dkb {
 namespace {
 
-constexpr int kMaxDistance = 64;  // [bits] largest Hamming distance of a match
-constexpr float kRatio = 0.8F;    // best distance over second best must be below this
-constexpr size_t kBlock = 64;     // distances computed before they are looked at
+constexpr int kMaxDistance = 64;   // [bits] largest Hamming distance of a match
+constexpr float kRatio = 0.8F;     // best distance over second best must be below this
+constexpr size_t kDistances = 64;  // distances computed before they are looked at
 
 // The nearest descriptor, and the distance of the next one.
 struct BestTwo {
@@ -52,11 +52,11 @@ std::vector<DescriptorMatch> match_brute_force(std::span<const Descriptor> a, st
                                                Simd simd) {
   std::vector<DescriptorMatch> best_of_b(b.size(), {.a = -1, .b = -1, .distance = 257});  // the nearest of a to each b
   std::vector<DescriptorMatch> matches;
-  std::array<int32_t, kBlock> distances;
+  std::array<int32_t, kDistances> distances;
   for (size_t i = 0; i < a.size(); ++i) {
     BestTwo best;
-    for (size_t first = 0; first < b.size(); first += kBlock) {
-      const size_t count = std::min(kBlock, b.size() - first);
+    for (size_t first = 0; first < b.size(); first += kDistances) {
+      const size_t count = std::min(kDistances, b.size() - first);
       distances_of(a[i], b.data() + first, count, distances.data(), simd);
       for (size_t j = 0; j < count; ++j) {
         offer(best, static_cast<int>(first + j), distances[j]);

@@ -7,6 +7,7 @@
 
 #include "dkb/util/errors.h"
 #include "dkb/util/settings.h"
+#include "dkb_slam/image.h"
 
 namespace dkb {
 namespace {

@@ -16,6 +16,8 @@ using CameraModel = Camera;
 // [s] The longest readout of a rolling shutter: sensors are read within a frame's time at 30 Hz.
 inline constexpr double kMaxReadout = 0.033;
 
+inline constexpr double kMillimetres = 1000;  // [1/m] the depth factor of most cameras but TUM's
+
 // Cameras known by name: fr1, fr2, fr3 (TUM RGB-D), bonn (Bonn RGB-D Dynamic). Nothing for other names. The readout of
 // TUM's Kinects, and their depth's time offset, are ours: see docs/decisions.md.
 std::optional<CameraModel> builtin_camera(const std::string& name);

@@ -47,9 +47,9 @@ std::string read_sized_packed(ByteReader& in, size_t items, size_t max_bytes_eac
   return read_packed(in, static_cast<size_t>(size));
 }
 
-class ColourColumns {
+class ReadColours {
  public:
-  ColourColumns(ByteReader& in, size_t count)
+  ReadColours(ByteReader& in, size_t count)
       : g_(read_packed(in, count)), r_(read_packed(in, count)), b_(read_packed(in, count)) {}
   Rgb operator[](size_t i) const {
     const auto g = static_cast<uint8_t>(g_[i]);
@@ -135,7 +135,7 @@ std::vector<std::shared_ptr<RgbdFeatures>> read_features(ByteReader& in, std::st
   const auto depth = read_packed_floats(in, n), angle = read_packed_floats(in, n), response = read_packed_floats(in, n);
   const auto place_sigma = format >= 3 ? read_packed_floats(in, n) : std::vector<float>(n);
   const std::string octave = read_packed(in, n);
-  const ColourColumns colour(in, n);
+  const ReadColours colour(in, n);
   ByteReader descriptor_reader(descriptors, "section DESC");
 
   std::vector<std::shared_ptr<RgbdFeatures>> result;
@@ -242,7 +242,7 @@ Points read_points(std::string_view bytes) {
   }
   const auto nx = read_packed_floats(in, n), ny = read_packed_floats(in, n), nz = read_packed_floats(in, n);
   const auto distance = read_packed_floats(in, n), scale = read_packed_floats(in, n);
-  const ColourColumns colour(in, n);
+  const ReadColours colour(in, n);
   const std::string number_bytes = read_sized_packed(in, n, 4 * kMaxVarintBytes + kDescriptorBytes);
   ByteReader numbers(number_bytes, "section POIN");
   for (size_t i = 0; i < n; ++i) {

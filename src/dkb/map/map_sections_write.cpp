@@ -27,7 +27,7 @@ void write_sized_packed(ByteWriter& out, const std::string& bytes) {
 }
 
 // The three channels are much alike, so two of them are stored as differences.
-class ColourColumns {
+class WrittenColours {
  public:
   void add(Rgb c) {
     g_.push_back(static_cast<char>(c.g));
@@ -117,7 +117,7 @@ std::string feature_section(const Map& map, const MapFileContext& context) {
   std::vector<float> image_x, image_y, depth, angle, response, place_sigma;
   std::vector<uint32_t> step_x, step_y;
   std::string octave;
-  ColourColumns colour;
+  WrittenColours colour;
   uint8_t octave_before = 0;
   for (KeyframeId id : map.live_keyframes())
     for (const Keypoint& k : map.keyframe(id)->features->keypoints) {
@@ -160,7 +160,7 @@ std::string point_section(const Map& map) {
   const std::vector<PointId> live = map.live_points();
   out.varint(live.size());
   std::vector<float> normal[3], distance, scale;
-  ColourColumns colour;
+  WrittenColours colour;
   PointId before = 0;
   for (PointId id : live) {
     const MapPoint& p = *map.point(id);

@@ -161,7 +161,7 @@ Converted convert_to_folder(std::unique_ptr<MessageStream> stream, const fs::pat
   reading.prior = PriorKind::none;  // a folder has no room for motion
   RecordingContents contents = look_into(*stream, reading, in.string());
   if (text.empty()) {
-    if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = 1000;  // as the integers are stored
+    if (contents.depth.encoding != "32FC1") contents.camera.depth_factor = kMillimetres;  // as the integers are stored
     text = contents.camera.to_yaml();
   }
   const auto writer = write_pairs(out, contents.camera, text);

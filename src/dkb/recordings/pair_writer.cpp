@@ -279,7 +279,7 @@ class RecordingPairWriter final : public PairWriter {
     pairs_.add(colour_ns, stamp_ns);
     constexpr const char* kTopic = "/camera/depth/image_raw";
     std::optional<Image<uint16_t>> millimetres;
-    if (camera_.depth_factor == 1000) millimetres = exact_units(depth, camera_);
+    if (camera_.depth_factor == kMillimetres) millimetres = exact_units(depth, camera_);
     if (millimetres)
       add_image(kTopic, "16UC1", stamp_ns, *millimetres);
     else

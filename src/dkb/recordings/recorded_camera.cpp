@@ -25,7 +25,7 @@ Camera camera_of(const CameraInfoMessage& info, bool rectified, const std::strin
   Camera camera;
   camera.width = static_cast<int>(std::min<uint32_t>(info.width, 1 << 20));
   camera.height = static_cast<int>(std::min<uint32_t>(info.height, 1 << 20));
-  camera.depth_factor = 1000;
+  camera.depth_factor = kMillimetres;
   const bool as_rectified = rectified && info.p[0] != 0;
   if (as_rectified) {
     camera.fx = info.p[0], camera.cx = info.p[2], camera.fy = info.p[5], camera.cy = info.p[6];

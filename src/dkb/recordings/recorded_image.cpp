@@ -185,7 +185,7 @@ DepthImage depth_of(const RecordedImage& image, const Camera& range) {
   if (image.content != ImageContent::depth)
     throw InputError(image.name + ": is no depth image (" + image.encoding + ")");
   Camera millimetres = range;
-  millimetres.depth_factor = 1000;
+  millimetres.depth_factor = kMillimetres;
   if (!image.compressed) return raw_depth(image, millimetres);
   if (image.inverse_depth) return dequantised(image, millimetres);
   return decode_depth(image.stored, image.name, millimetres);

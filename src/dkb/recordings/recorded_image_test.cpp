@@ -15,7 +15,7 @@
 namespace dkb::test {
 namespace {
 
-constexpr int kWidth = 31, kHeight = 5;  // rows begin at odd bytes
+constexpr int kRawWidth = 31, kRawHeight = 5;  // rows begin at odd bytes
 
 RecordedImage read_raw(const std::string& bytes) {
   return read_recorded_image(bytes, "sensor_msgs/Image", MessageEncoding::ros1, "/image");
@@ -25,7 +25,7 @@ RecordedImage read_compressed(const std::string& bytes) {
 }
 
 std::string raw(const std::string& encoding, const std::string& data) {
-  return encode(image_message(7, encoding, kWidth, kHeight, data));
+  return encode(image_message(7, encoding, kRawWidth, kRawHeight, data));
 }
 std::string compressed(const std::string& format, const std::string& data) {
   CompressedImageMessage message;
@@ -50,7 +50,7 @@ std::string laid_out(const ColourImage& image, size_t channels, bool blue_first,
 }
 
 TEST(RecordedImage, ColourIsThatOfAFileInWhateverWayItIsStored) {
-  const ColourImage image = noise_picture(1, kWidth, kHeight);
+  const ColourImage image = noise_picture(1, kRawWidth, kRawHeight);
   const Picture file = decode_picture(encode_png(image), "file");
   ASSERT_EQ(file.colour, image);
   const std::pair<const char*, std::string> stored[] = {
@@ -73,7 +73,7 @@ TEST(RecordedImage, ColourIsThatOfAFileInWhateverWayItIsStored) {
 }
 
 TEST(RecordedImage, GreyHasNoColour) {
-  GreyImage grey(kWidth, kHeight);
+  GreyImage grey(kRawWidth, kRawHeight);
   for (size_t i = 0; i < grey.size(); ++i) grey.data()[i] = static_cast<uint8_t>(i);
   for (const char* encoding : {"mono8", "8UC1"}) {
     const std::string bytes = raw(encoding, {reinterpret_cast<const char*>(grey.data()), grey.size()});
@@ -86,7 +86,7 @@ TEST(RecordedImage, GreyHasNoColour) {
 TEST(RecordedImage, DepthIsThatOfAFileInWhateverWayItIsStored) {
   Camera camera = small_camera();
   camera.depth_factor = 1000;
-  const Image<uint16_t> units = noise_depth(2, kWidth, kHeight);
+  const Image<uint16_t> units = noise_depth(2, kRawWidth, kRawHeight);
   const std::string png = encode_png(units);
   const DepthImage file = decode_depth(png, "file", camera);
   camera.depth_factor = 5000;  // integers in messages are millimetres whatever the camera says
@@ -99,7 +99,7 @@ TEST(RecordedImage, DepthIsThatOfAFileInWhateverWayItIsStored) {
   for (const auto& [encoding, data, is_big] :
        {std::tuple("16UC1", little, false), std::tuple("mono16", little, false), std::tuple("16UC1", big, true),
         std::tuple("32FC1", floats, false), std::tuple("32FC1", big_floats, true)}) {
-    ImageMessage message = image_message(7, encoding, kWidth, kHeight, data);
+    ImageMessage message = image_message(7, encoding, kRawWidth, kRawHeight, data);
     message.is_bigendian = is_big;
     const std::string bytes = encode(message);
     const RecordedImage image = read_raw(bytes);
@@ -137,7 +137,7 @@ TEST(RecordedImage, InverseDepthIsUndone) {
 }
 
 TEST(RecordedImage, OtherEncodingsAreUnknown) {
-  EXPECT_EQ(read_raw(raw("yuv422", std::string(2 * kWidth * kHeight, 0))).content, ImageContent::unknown);
+  EXPECT_EQ(read_raw(raw("yuv422", std::string(2 * kRawWidth * kRawHeight, 0))).content, ImageContent::unknown);
   EXPECT_EQ(read_compressed(compressed("16UC1; compressedDepth rvl", std::string(40, 0))).content,
             ImageContent::unknown);
   EXPECT_EQ(input_error_of([] { picture_of(read_raw(raw("yuv422", ""))); }),
@@ -145,11 +145,11 @@ TEST(RecordedImage, OtherEncodingsAreUnknown) {
 }
 
 TEST(RecordedImage, MessagesThatContradictThemselvesAreRefused) {
-  const std::string row(3 * kWidth, 0);
+  const std::string row(3 * kRawWidth, 0);
   EXPECT_EQ(input_error_of([&] { read_raw(raw("rgb8", row)); }),
             "/image at 0.000000007: its rows of 18 bytes are too short");
-  ImageMessage message = image_message(7, "rgb8", kWidth, kHeight, row);
-  message.step = 3 * kWidth;
+  ImageMessage message = image_message(7, "rgb8", kRawWidth, kRawHeight, row);
+  message.step = 3 * kRawWidth;
   EXPECT_EQ(input_error_of([&] { read_raw(encode(message)); }), "/image at 0.000000007: is truncated");
   message.width = message.height = message.step = 0xFFFFFFFF;
   EXPECT_NE(input_error_of([&] { read_raw(encode(message)); }).find("4294967295x4294967295 px"), std::string::npos);
@@ -159,11 +159,11 @@ TEST(RecordedImage, MessagesThatContradictThemselvesAreRefused) {
 }
 
 TEST(RecordedImage, SurvivesMutatedMessages) {
-  const ColourImage image = noise_picture(1, kWidth, kHeight);
-  const std::string depth_png = std::string(12, '\x40') + encode_png(noise_depth(2, kWidth, kHeight));
+  const ColourImage image = noise_picture(1, kRawWidth, kRawHeight);
+  const std::string depth_png = std::string(12, '\x40') + encode_png(noise_depth(2, kRawWidth, kRawHeight));
   const std::string raws[] = {raw("bgr8", laid_out(image, 3, true, 2)),
-                              raw("bayer_rggb8", std::string(kWidth * kHeight, 'a')),
-                              raw("16UC1", bytes_of(noise_depth(2, kWidth, kHeight)))};
+                              raw("bayer_rggb8", std::string(kRawWidth * kRawHeight, 'a')),
+                              raw("16UC1", bytes_of(noise_depth(2, kRawWidth, kRawHeight)))};
   const std::string files[] = {compressed("jpeg", encode_jpeg(image)), compressed("png", encode_png(image)),
                                compressed("16UC1; compressedDepth png", depth_png),
                                compressed("32FC1; compressedDepth png", depth_png)};

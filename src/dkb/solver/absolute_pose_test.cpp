@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dkb/solver/test_world.h"
 #include "dkb/util/random.h"
 
 namespace dkb {
@@ -11,11 +12,6 @@ namespace {
 Rigid3 random_pose(Random& random) {
   const Eigen::Vector3d w{random.normal(), random.normal(), random.normal()};
   return {rotation_from_vector(w), {random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2)}};
-}
-
-double distance(const Rigid3& a, const Rigid3& b) {
-  const Rigid3 d = a * b.inverse();
-  return std::max(d.translation.norm(), vector_from_rotation(d.rotation).norm());
 }
 
 TEST(P3p, FindsTheTruePoseAmongAtMostFour) {

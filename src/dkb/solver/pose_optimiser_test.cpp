@@ -11,11 +11,6 @@
 namespace dkb {
 namespace {
 
-double distance(const Rigid3& a, const Rigid3& b) {
-  const Rigid3 d = a * b.inverse();
-  return std::max(d.translation.norm(), vector_from_rotation(d.rotation).norm());
-}
-
 Rigid3 nearby(const Rigid3& pose) {
   return Rigid3(rotation_from_vector({0.02, -0.03, 0.02}), {0.03, 0.02, -0.04}) * pose;
 }

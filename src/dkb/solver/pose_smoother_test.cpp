@@ -11,7 +11,7 @@
 namespace dkb {
 namespace {
 
-constexpr double kStep = 1.0 / 30;  // [s]
+constexpr double kStepTime = 1.0 / 30;  // [s]
 
 // A camera that sways as in a hand, within a few tenths of a metre and radian.
 Rigid3 true_pose(double t) {
@@ -29,7 +29,7 @@ std::vector<MeasuredPose> measured(int n, double sd_m, double sd_rad, double cla
     Vector6d d;
     for (int i = 0; i < 6; ++i) d[i] = sd[i] * normal(random);
     const Vector6d variance = (claimed * sd).cwiseAbs2();
-    poses.push_back({k * kStep, true_pose(k * kStep) * rigid3_from_tangent(d), variance.asDiagonal()});
+    poses.push_back({k * kStepTime, true_pose(k * kStepTime) * rigid3_from_tangent(d), variance.asDiagonal()});
   }
   return poses;
 }
@@ -153,7 +153,7 @@ TEST(PoseSmoother, LongSequencesHaveNoSeams) {
 
 TEST(PoseSmoother, FramesMayBeANanosecondApart) {
   auto one = measured(100, 0.002, 0.002), all = one;
-  for (size_t k = 50; k < 100; ++k) one[k].time += 1e-9 - kStep;
+  for (size_t k = 50; k < 100; ++k) one[k].time += 1e-9 - kStepTime;
   for (size_t k = 0; k < 100; ++k) all[k].time = 1e-9 * static_cast<double>(k);
   for (const auto& poses : {one, all}) {
     const std::vector<Rigid3> smoothed = smoothed_poses(poses);

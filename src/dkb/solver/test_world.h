@@ -10,6 +10,12 @@
 
 namespace dkb {
 
+// [m, rad], whichever is more.
+inline double distance(const Rigid3& a, const Rigid3& b) {
+  const Rigid3 d = a * b.inverse();
+  return std::max(d.translation.norm(), vector_from_rotation(d.rotation).norm());
+}
+
 // A camera moves sideways along a wall of points 1.5 to 4.5 m away, wavering as a hand does. For tests and benchmarks.
 struct TestWorldOptions {
   int cameras = 12;
