@@ -443,6 +443,14 @@ void MotionSegmenter::take_bodies(const MoverMask& bodies) {
   }
 }
 
+void MotionSegmenter::take_second_motion(std::span<const MatchMotion> matches) {
+  if (!current_ || matches.empty()) return;
+  Image<float>& score = current_->score;
+  const MoverMask moving = moving_cells(current_->depth, rays_.cell(), matches);
+  for (size_t i = 0; i < score.size(); ++i)
+    if (moving.cells.data()[i] != 0) score.data()[i] = std::min(std::max(score.data()[i], 0.0f) + 1, kMaxScore);
+}
+
 void MotionSegmenter::commit(const std::optional<Rigid3>& cam_from_world, bool guessed) {
   if (!current_ && !previous_) return;
   if (!cam_from_world) {

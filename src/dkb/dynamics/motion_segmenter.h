@@ -5,9 +5,11 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "dkb/dynamics/depth_alignment.h"
+#include "dkb/dynamics/match_motion.h"
 #include "dkb/dynamics/motion_depth_grid.h"
 #include "dkb/dynamics/motion_smoothing.h"
 #include "dkb/dynamics/mover_mask.h"
@@ -48,6 +50,9 @@ class MotionSegmenter {
   // Bodies that a detector found in it: they carry a score from which no view of them testifies later that they are
   // part of the room, though they stand.
   void take_bodies(const MoverMask& bodies);
+  // Matches of the image last given showed two motions: who walks off moves, as far as a frame can say it. Until then
+  // the map held him for the room, and depth followed him as corners did.
+  void take_second_motion(std::span<const MatchMotion> matches);
   // The colour camera's motion since the frame committed last as depth shows it beside what was expected, of the image
   // last given; nothing when there was no view to hold it against.
   const std::optional<MotionPrior>& aligned_step() const { return aligned_step_; }

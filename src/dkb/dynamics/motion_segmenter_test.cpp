@@ -72,6 +72,37 @@ TEST(MotionSegmenter, DoesNotTakeTheRoomForWhoLeftDuringAGap) {
   EXPECT_LT(see(90, {}).wrong, 0.05) << "two seconds later he is gone";
 }
 
+// A box stands there from the first frame on; in frame 20 matches may show that it moves, and it goes 2 cm a frame if
+// so.
+double share_marked(bool accused, bool goes, int frame) {
+  const World world;
+  MotionSegmenter segmenter(world.camera, {}, {});
+  double covered = 0;
+  for (int f = 0; f <= frame; ++f) {
+    const Picture p = world.render(f, {box_at(goes ? 0.02 * std::max(0, f - 19) : 0)});
+    const Figures figures = judge(segment(segmenter, p.image, world.cam_from_world(f)), p.truth);
+    EXPECT_LT(figures.wrong, 0.01) << f;
+    covered = figures.covered;
+    std::vector<MatchMotion> matches;
+    for (int y = 5; y < World::kHeight; y += 10)
+      for (int x = 5; x < World::kWidth; x += 10)
+        matches.push_back({Eigen::Vector2i(x, y).cast<float>(), p.image.depth(x, y), p.truth(x, y) != 0});
+    if (accused && f == 20) segmenter.take_second_motion(matches);
+    segmenter.commit(world.cam_from_world(f));
+  }
+  return covered;
+}
+
+TEST(MotionSegmenter, WhoMatchesShowToWalkOffIsMarkedInTheNextFrame) {
+  EXPECT_LT(share_marked(false, true, 21), 0.1);
+  EXPECT_GT(share_marked(true, true, 21), 0.9);
+}
+
+// Views of before testify that it stands where it stood.
+TEST(MotionSegmenter, WhatMatchesAccuseWronglyStaysStill) {
+  EXPECT_LT(share_marked(true, false, 21), 0.05);
+}
+
 // The turn over a gap is not what the velocity before it says: a room held against views of before from there moves.
 TEST(MotionSegmenter, SaysNothingWhereALeapLeavesThePoseUnknown) {
   const World world;

@@ -97,6 +97,7 @@ void Pipeline::publish(const Scene& scene, const TrackedFrame& tracked, const Ke
 
   last_mask_ = scene.mask;
   outcome.keyframe = decision.insert;
+  outcome.second_motion = tracked.second_motion;
   scenes_.learn(outcome);
   last_state_ = tracked.state;
   collect_times();

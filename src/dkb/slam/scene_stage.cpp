@@ -53,6 +53,7 @@ void SceneStage::ask_slow_detector(FrameIndex index, const Frame& frame) {
 
 void SceneStage::learn(const FrameOutcome& outcome) {
   if (motion_) {
+    motion_->take_second_motion(outcome.second_motion);
     motion_->correct_guesses(outcome.found_world_from_guessed);
     motion_->commit(outcome.cam_from_world, outcome.guessed);
   }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,7 @@ struct FrameOutcome {
   bool guessed = false;                  // the pose is a prediction
   Rigid3 found_world_from_guessed;       // what the guesses before it were off by, where the images tell the pose again
   bool keyframe = false;
+  std::span<const MatchMotion> second_motion;  // of the matches, where they show two
 };
 
 // Says what of a frame moves (DKB section 3.1): detections made beside tracking are carried to the frame by flow,

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "dkb/geometry/decompositions.h"
+#include "dkb/geometry/view_place.h"
 
 namespace dkb {
 namespace {
@@ -15,7 +16,6 @@ constexpr double kFarthest = 60;     // squared error beyond which a match is wr
 constexpr double kWrong = 20;        // the most that a match costs, as one of a squared error of 110
 constexpr double kApart = 2;         // the cost of a neighbour of the other motion
 constexpr size_t kNeighbours = 5;    // of a match, beside each other in the image and in depth
-constexpr double kDepthRatio = 0.2;  // of depths that are as far apart as a tenth of the image is wide
 constexpr size_t kQuarters = 4;      // of the matches by depth, between which near and far are told apart at first
 constexpr int kRounds = 5;           // of what is of which motion, and of the motions
 constexpr double kSmallest = 0.125;  // of the matches: fewer do not take a robust pose along
@@ -182,12 +182,9 @@ class MotionProblem {
 
  private:
   void find_neighbours(std::span<const PoseObservation> observations, double width) {
-    std::vector<Eigen::Vector3d> place;  // in tenths of the image's width
+    std::vector<Eigen::Vector3d> place;
     place.reserve(matches_.size());
-    for (const Match& m : matches_) {
-      const Eigen::Vector2d at = observations[m.observation].pixel / (0.1 * width);
-      place.emplace_back(at.x(), at.y(), std::log(m.depth) / kDepthRatio);
-    }
+    for (const Match& m : matches_) place.push_back(place_in_view(observations[m.observation].pixel, m.depth, width));
     neighbours_.resize(place.size());
     for (size_t i = 0; i < place.size(); ++i) {
       std::array<double, kNeighbours> nearest;  // squared distances, rising
