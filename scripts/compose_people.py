@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Puts people into a sequence of TUM's fr1 camera, in ways in which they take a camera along. Needs OpenCV's Python module, NumPy.
+"""Puts people into a sequence, in ways in which they take a camera along. Needs OpenCV's Python module, NumPy.
 
     scripts/compose_people.py SEQUENCE CUT_FROM OUT [--ways lead three ...]     # OUT/lead, OUT/three, ... in TUM layout
     scripts/compose_people.py --table build/apps/dkb-slam OUT [-- OPTIONS]      # runs all starts of what is in OUT, scores them
 
-SEQUENCE: a still scene with groundtruth.txt. CUT_FROM: a composed sequence with masks/; three figures are cut out of its pairs 62,
+SEQUENCE: a still scene with groundtruth.txt, of TUM's fr1 camera where it has no camera.yaml (of a pinhole camera). CUT_FROM: a composed sequence with masks/; three figures are cut out of its pairs 62,
 95 and 155 by the mask and by depth, and stand before the camera as relief of that one view. Each way moves them in the axes of the
 sequence's first camera (x right, y down, z ahead, metres). Depth gets the sensor's noise and the shadow beside a body, and is
 missing nearer than 0.5 m. Deterministic.
@@ -22,10 +22,16 @@ import tempfile
 import cv2
 import numpy as np
 
-FOCAL, CENTRE = np.array([517.3, 516.5]), np.array([318.6, 255.3])
-LENS = (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)  # k1 k2 p1 p2 k3
-PER_METRE = 5000
+FR1 = {"fx": 517.3, "fy": 516.5, "cx": 318.6, "cy": 255.3, "depth_factor": 5000, "k1": 0.2624, "k2": -0.9531, "p1": -0.0054,
+       "p2": 0.0026, "k3": 1.1633}
 BASELINE, NEAREST = 0.075, 0.5  # [m] of the sensor
+
+
+def camera_of(folder):
+    if not (folder / "camera.yaml").exists():
+        return FR1
+    rows = (line.split(":") for line in open(folder / "camera.yaml") if ":" in line)
+    return dict.fromkeys(FR1, 0) | {key: float(value.split("#")[0]) for key, value in rows if key in FR1}
 
 
 def pairs_of(folder):
@@ -52,7 +58,7 @@ class Truth:
 def cut_figure(folder, pair, mirrored=False, hue=0):
     """Points of a figure about its head and their colours."""
     row = pairs_of(folder)[pair]
-    image, depth = cv2.imread(str(folder / row[1])), cv2.imread(str(folder / row[3]), -1) / PER_METRE
+    image, depth = cv2.imread(str(folder / row[1])), cv2.imread(str(folder / row[3]), -1) / FR1["depth_factor"]
     mask = cv2.imread(str(folder / "masks" / (pathlib.Path(row[1]).stem + ".png")), 0) > 0
     depth[depth == 0] = np.nan
     middle = np.nanmedian(depth[mask])
@@ -78,14 +84,14 @@ def cut_figure(folder, pair, mirrored=False, hue=0):
     image, depth = twice(image, cv2.INTER_LINEAR), twice(depth, cv2.INTER_LINEAR)
     v, u = np.nonzero(twice(mask, cv2.INTER_NEAREST))
     z = depth[v, u]
-    points = np.stack([(u / 2 + left - CENTRE[0]) / FOCAL[0] * z, (v / 2 + top - CENTRE[1]) / FOCAL[1] * z, z], 1)
+    points = np.stack([(u / 2 + left - FR1["cx"]) / FR1["fx"] * z, (v / 2 + top - FR1["cy"]) / FR1["fy"] * z, z], 1)
     points -= [np.median(points[:, 0]), points[:, 1].min(), np.median(points[:, 2])]
     if mirrored:
         points[:, 0] *= -1
     return points, image[v, u]
 
 
-def draw(figures, rotation, place, shape):
+def draw(figures, rotation, place, shape, camera):
     """Depth and colour of figures in the world, infinity where there are none."""
     height, width = shape
     nearest, colour = np.full(shape, np.inf), np.zeros((*shape, 3), np.uint8)
@@ -97,10 +103,10 @@ def draw(figures, rotation, place, shape):
         inside = (np.abs(x) < 0.9) & (np.abs(y) < 0.75)
         order = np.flatnonzero(inside)[np.argsort(-seen[inside, 2])]
         seen, colours, x, y = seen[order], colours[order], x[order], y[order]
-        r2, (k1, k2, p1, p2, k3) = x * x + y * y, LENS
+        r2, (k1, k2, p1, p2, k3) = x * x + y * y, (camera[k] for k in ("k1", "k2", "p1", "p2", "k3"))
         radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-        u = FOCAL[0] * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + CENTRE[0]
-        v = FOCAL[1] * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + CENTRE[1]
+        u = camera["fx"] * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + camera["cx"]
+        v = camera["fy"] * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + camera["cy"]
         one, one_colour = np.full(shape, np.inf), np.zeros_like(colour)
         for down in (0, 1):
             for right in (0, 1):
@@ -162,45 +168,50 @@ def place_figures(figures, way, truth, start, stamp):
     return placed
 
 
-def draw_before(room, figures, pose):
+def draw_before(room, figures, pose, camera):
     """Depth and colour of what stands before the room's depth, and where that is."""
-    z, colour = draw(figures, *pose, room.shape)
+    z, colour = draw(figures, *pose, room.shape, camera)
     mask = cv2.medianBlur((z < room).astype(np.uint8), 3) > 0
     return z, colour, mask & np.isfinite(z)
 
 
 def compose(sequence, figures, way, out):
     random, truth, pairs = np.random.default_rng(1), Truth(sequence / "groundtruth.txt"), pairs_of(sequence)
+    camera = camera_of(sequence)
+    per_metre = camera["depth_factor"]
     for part in ("rgb", "depth", "masks"):
         (out / part).mkdir(parents=True, exist_ok=True)
     start = float(pairs[0][0])
     for row in pairs:
         image, depth = cv2.imread(str(sequence / row[1])), cv2.imread(str(sequence / row[3]), -1)
-        behind = np.where(depth == 0, np.inf, depth / PER_METRE)
+        behind = np.where(depth == 0, np.inf, depth / per_metre)
         around = cv2.erode(np.where(np.isfinite(behind), behind, 9), np.ones((9, 9)))
 
         room = np.where(depth == 0, around, behind)
-        _, colour, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[0])), truth.at(float(row[0])))
+        _, colour, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[0])), truth.at(float(row[0])),
+                                     camera)
         soft = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 0.8)[..., None] * mask[..., None]
         image = (colour * soft + image * (1 - soft)).astype(np.uint8)
         image[mask] = cv2.GaussianBlur(image, (0, 0), 0.7)[mask]
         cv2.imwrite(str(out / row[1]), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
         cv2.imwrite(str(out / "masks" / (pathlib.Path(row[1]).stem + ".png")), mask.astype(np.uint8) * 255)
 
-        z, _, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[2])), truth.at(float(row[2])))
+        z, _, mask = draw_before(room, place_figures(figures, way, truth, start, float(row[2])), truth.at(float(row[2])), camera)
         noisy = np.where(mask, z, 0)
         noisy = noisy + random.normal(0, 1, z.shape) * (0.0012 + 0.0019 * (noisy - 0.4) ** 2)
         whole = cv2.erode(mask.astype(np.uint8), np.ones((3, 3))) > 0
-        body = np.where(mask & whole & (noisy > NEAREST), np.clip(noisy * PER_METRE, 0, 65535), 0).astype(np.uint16)
+        body = np.where(mask & whole & (noisy > NEAREST), np.clip(noisy * per_metre, 0, 65535), 0).astype(np.uint16)
         depth = np.where(mask, body, depth)
         for y, x in zip(*np.nonzero(mask & ~np.roll(mask, 1, 1))):
             far = behind[y, max(0, x - 6)]
             far = far if np.isfinite(far) else 1.5
-            width = int(max(0, FOCAL[0] * BASELINE * (1 / z[y, x] - 1 / max(far, z[y, x]))))
+            width = int(max(0, camera["fx"] * BASELINE * (1 / z[y, x] - 1 / max(far, z[y, x]))))
             depth[y, max(0, x - width):x] = 0
         cv2.imwrite(str(out / row[3]), depth)
     write_lists(out, pairs)
-    shutil.copyfile(sequence / "groundtruth.txt", out / "groundtruth.txt")
+    for name in ("groundtruth.txt", "camera.yaml"):
+        if (sequence / name).exists():
+            shutil.copyfile(sequence / name, out / name)
 
 
 def write_lists(folder, pairs):
@@ -217,7 +228,8 @@ def error_mm(program, sequence, start, every, options):
         for name in ("rgb", "depth", "groundtruth.txt"):
             (data / name).symlink_to(sequence / name)
         write_lists(data, pairs_of(sequence)[start::every])
-        run = [program, "run", data, "--camera", "fr1", "--seed", start + 1, "--out", out, *options]
+        camera = sequence / "camera.yaml"
+        run = [program, "run", data, "--camera", camera if camera.exists() else "fr1", "--seed", start + 1, "--out", out, *options]
         subprocess.run([str(v) for v in run], check=True, stdin=subprocess.DEVNULL, capture_output=True)
         score = [program, "eval", data / "groundtruth.txt", out / "trajectory.txt", "--json", out / "score.json"]
         subprocess.run([str(v) for v in score], check=True, capture_output=True)

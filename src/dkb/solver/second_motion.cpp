@@ -258,7 +258,8 @@ std::optional<SecondMotion> second_motion(const CameraModel& camera, const Rigid
   const double cost_of_one = problem.cost({one, 0}, motion_of_one) + unexpected(motion_of_one);
   const double cost_of_two = both->cost + kMoves * both->count(1 - of_camera) + unexpected(both->motion[of_camera]);
   if (cost_of_two >= cost_of_one) return std::nullopt;
-  SecondMotion second{std::vector<uint8_t>(observations.size(), 0), 0};
+  const double of_parameters = 6 * std::log(static_cast<double>(matches.size()));
+  SecondMotion second{std::vector<uint8_t>(observations.size(), 0), cost_of_one - cost_of_two > of_parameters, 0};
   for (size_t i = 0; i < matches.size(); ++i) second.moves[matches[i].observation] = both->label[i] != of_camera;
   if (expected != nullptr)
     second.expected_weight = (kStudentFreedom + 6) / (kStudentFreedom + squared_distance(both->motion[of_camera]));

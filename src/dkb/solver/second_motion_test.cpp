@@ -87,6 +87,22 @@ TEST(SecondMotion, IsThatOfSomebodyWhoTakesThePoseAlong) {
   }
 }
 
+TEST(SecondMotion, IsSureOnceItIsMoreThanParametersSave) {
+  const auto count = [](double millimetres) {
+    std::pair<int, int> found_and_sure;
+    for (uint64_t seed = 1; seed <= 40; ++seed) {
+      const BodyInRoom scene({.moved = {0.001 * millimetres, 0, 0}, .seed = seed});
+      const auto second = second_motion(scene.camera, scene.estimate().cam_from_world, scene.observations, 20);
+      found_and_sure.first += second.has_value();
+      found_and_sure.second += second && second->sure;
+    }
+    return found_and_sure;
+  };
+  EXPECT_EQ(count(5).second, 0);
+  EXPECT_GT(count(6).first, count(6).second);
+  EXPECT_EQ(count(9), std::make_pair(40, 40));
+}
+
 TEST(SecondMotion, IsNotSeenWhereEverythingStands) {
   for (uint64_t seed = 1; seed <= 100; ++seed)
     EXPECT_FALSE(BodyInRoom({.moved = {0, 0, 0}, .seed = seed}).look()) << seed;

@@ -155,7 +155,7 @@ void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame
     if (followed[f]->moves || squared_error(pair, by_still.cam_from_world, *by_still.features) <= kChi2TwoDof95)
       by_still.odometry[f] = followed[f];
   }
-  for (size_t i = 0; i < matched.size(); ++i) {
+  for (size_t i = 0; i < matched.size() && second->sure; ++i) {
     const double depth = (frame.cam_from_world * frame.matched_in_world[matched[i]]).z();
     by_still.second_motion.push_back(
         {frame.features->keypoints[matched[i]].image_pixel, static_cast<float>(depth), moves[i] != 0});
