@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "dkb/geometry/camera.h"
 #include "dkb/util/errors.h"
 
 namespace dkb {
