@@ -21,7 +21,7 @@ MoverMask moving_cells(const Image<float>& depth, int cell, std::span<const Matc
       bool moves = false;
       for (size_t i = 0; i < places.size(); ++i) {
         const double distance = (places[i] - at).squaredNorm();
-        if (distance >= nearest) continue;
+        if (!(distance < nearest)) continue;  // nor where a point is not before the camera
         nearest = distance;
         moves = matches[i].moves;
       }
