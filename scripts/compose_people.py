@@ -5,10 +5,10 @@
     scripts/compose_people.py SEQUENCE CUT_FROM OUT [--ways lead three ...]     # OUT/lead, OUT/three, ... in TUM layout
     scripts/compose_people.py --table build/apps/dkb-slam OUT [-- OPTIONS]      # runs all starts of what is in OUT, scores them
 
-SEQUENCE: a still scene with groundtruth.txt, of TUM's fr1 camera where it has no camera.yaml (of a pinhole camera). CUT_FROM: a composed sequence with masks/; three figures are cut out of its pairs 62,
-95 and 155 by the mask and by depth, and stand before the camera as relief of that one view. Each way moves them in the axes of the
-sequence's first camera (x right, y down, z ahead, metres). Depth gets the sensor's noise and the shadow beside a body, and is
-missing nearer than 0.5 m. Deterministic.
+SEQUENCE: a still scene with groundtruth.txt, and camera.yaml where it is not of TUM's fr1. CUT_FROM: a composed sequence of fr1 with
+masks/; three figures are cut out of its pairs 62, 95 and 155 by the mask and by depth, and stand before the camera as relief of that
+one view. Each way moves them in the axes of the sequence's first camera (x right, y down, z ahead, metres). Depth gets the sensor's
+noise and the shadow beside a body, and is missing nearer than 0.5 m. Deterministic.
 """
 import json
 import multiprocessing
