@@ -146,16 +146,6 @@ TEST(GaussianBlur, IsWithinRoundingOfOpenCvs) {
 }
 #endif
 
-TEST(SteeredBrief, TestsAreDistinctAndStayInsideTheDisc) {
-  const std::array<BriefTest, 256> tests = make_brief_tests();
-  for (size_t i = 0; i < tests.size(); ++i) {
-    EXPECT_LE(std::hypot(tests[i].ax, tests[i].ay), kBriefRadius);
-    EXPECT_LE(std::hypot(tests[i].bx, tests[i].by), kBriefRadius);
-    for (size_t j = 0; j < i; ++j)
-      EXPECT_FALSE(tests[i].ax == tests[j].ax && tests[i].ay == tests[j].ay && tests[i].bx == tests[j].bx);
-  }
-}
-
 TEST(SteeredBrief, BitsAreFairAndTestsOfDifferentPlacesDiffer) {
   OrbExtractor extractor;
   const OrbFeatures features = extractor.extract(test_world(3).render({}, 2.0));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,17 +12,7 @@ namespace dkb {
 
 inline constexpr int kBriefRadius = 15;  // [px] tests stay within this distance of the corner
 
-// One comparison of two smoothed pixels, relative to the corner, in the frame of its orientation [px].
-struct BriefTest {
-  float ax = 0, ay = 0, bx = 0, by = 0;
-};
-
-// The 256 comparisons, computed from a fixed seed: isotropic Gaussian positions (BRIEF, Calonder et al., ECCV 2010),
-// chosen greedily for low correlation between tests and for means that do not depend on the orientation itself (the
-// aims of Rublee et al., ICCV 2011, section 4.3), judged by a model of image statistics instead of a training set.
-std::array<BriefTest, 256> make_brief_tests();
-
-// Computes 256-bit descriptors: bit i is set when the first pixel of test i is darker than the second.
+// Computes 256-bit descriptors: bit i is set when the first pixel of test i (kBriefTests) is darker than the second.
 // The pattern is steered in kRotations steps with positions rounded to pixels.
 class SteeredBrief {
  public:
