@@ -16,7 +16,7 @@ namespace dkb {
 namespace {
 
 SimulatorOptions tiny(const std::string& scene, int frames = 0) {
-  return test::small_images(scene, frames, 160, 120);
+  return test::small_images(scene, frames, 80, 60);
 }
 
 TEST(Rate, SamePoseAndPeopleAtTheSameTime) {
@@ -45,7 +45,7 @@ TEST(Rate, StampsAreExactAndFramesAreCountedAtTheRate) {
     double before = 0;
     for (int i = 0; i < 40; ++i) {
       EXPECT_NEAR(s.stamp(i) - s.stamp(0), i / rate, 6e-7) << rate;
-      if (i % 13 != 0) continue;
+      if (i % 19 != 0) continue;
       const SimulatedFrame f = s.render(i);
       EXPECT_GT(f.image.depth_timestamp, before);
       EXPECT_LT(std::abs(f.image.depth_timestamp - f.image.timestamp), 0.5 / std::max(rate, 30.0));
@@ -147,7 +147,7 @@ TEST(StandStill, PeopleStandInViewFirstAndWalkAfterwards) {
     const double nearest = s.nearest_mover(0);
     EXPECT_GT(nearest, 0.5) << scene;
     double fastest = 0;
-    for (int i = 75; i < 110; i += 5)
+    for (int i = 75; i < 110; i += 10)
       for (const SimulatedMover& m : s.render(i).movers) fastest = std::max(fastest, m.velocity_in_world.norm());
     EXPECT_GT(fastest, 0.5) << scene;
   }
