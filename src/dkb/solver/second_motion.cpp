@@ -67,15 +67,17 @@ Match linearise(const CameraModel& camera, const Eigen::Vector3d& q, const PoseO
   return m;
 }
 
+// Those that may be right by the pose, or by the `other` perturbation of it where there is one.
 std::vector<Match> matches_of(const CameraModel& camera, const Rigid3& pose,
-                              std::span<const PoseObservation> observations) {
+                              std::span<const PoseObservation> observations, const Vector6d* other = nullptr) {
   std::vector<Match> matches;
   matches.reserve(observations.size());
   for (size_t i = 0; i < observations.size(); ++i) {
     const Eigen::Vector3d q = pose * observations[i].point_in_world;
     if (!(q.z() > 0)) continue;
     const Match m = linearise(camera, q, observations[i], i);
-    if (m.error.squaredNorm() <= kFarthest) matches.push_back(m);
+    if (m.error.squaredNorm() <= kFarthest || (other != nullptr && m.squared_error(*other) <= kFarthest))
+      matches.push_back(m);
   }
   return matches;
 }
@@ -83,7 +85,7 @@ std::vector<Match> matches_of(const CameraModel& camera, const Rigid3& pose,
 using Labels = std::vector<uint8_t>;  // per match: of which motion it is
 
 // The nearer of the matches as one motion and the farther ones as the other, in each of the ways in which a search
-// begins. None where it saves less than a body must, to let each have its own, in all of them (score test: Rao, 1948).
+// begins. None where it saves less than a body must, to let each have its own, in all of them.
 std::vector<Labels> near_and_far(const std::vector<Match>& matches) {
   std::vector<double> depth;
   depth.reserve(matches.size());
@@ -225,10 +227,17 @@ uint8_t of_most_surface(const TwoMotions& both, const std::vector<Match>& matche
 
 std::optional<SecondMotion> second_motion(const CameraModel& camera, const Rigid3& cam_from_world,
                                           std::span<const PoseObservation> observations, int min_still,
-                                          const PosePrior* expected) {
-  const std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
+                                          const PosePrior* expected, const Rigid3* other) {
+  Vector6d to_other = Vector6d::Zero();
+  if (other != nullptr) to_other = tangent_from_rigid3(cam_from_world * other->inverse());
+  const std::vector<Match> matches =
+      matches_of(camera, cam_from_world, observations, other != nullptr ? &to_other : nullptr);
   if (matches.size() < std::max(static_cast<size_t>(min_still), 2 * kNeighbours)) return std::nullopt;
   std::vector<Labels> ways = near_and_far(matches);
+  if (other != nullptr) {
+    Labels& label = ways.emplace_back();
+    for (const Match& m : matches) label.push_back(m.squared_error(to_other) < m.error.squaredNorm());
+  }
   if (ways.empty()) return std::nullopt;
   const MotionProblem problem(matches, observations, camera.width);
   std::optional<TwoMotions> both;
@@ -259,11 +268,20 @@ std::optional<SecondMotion> second_motion(const CameraModel& camera, const Rigid
   const double cost_of_two = both->cost + kMoves * both->count(1 - of_camera) + unexpected(both->motion[of_camera]);
   if (cost_of_two >= cost_of_one) return std::nullopt;
   const double of_parameters = 6 * std::log(static_cast<double>(matches.size()));
-  SecondMotion second{std::vector<uint8_t>(observations.size(), 0), cost_of_one - cost_of_two > of_parameters, 0};
+  SecondMotion second;
+  second.moves.assign(observations.size(), 0);
+  second.cam_from_world = rigid3_from_tangent(both->motion[of_camera]).inverse() * cam_from_world;
+  second.sure = cost_of_one - cost_of_two > of_parameters;
   for (size_t i = 0; i < matches.size(); ++i) second.moves[matches[i].observation] = both->label[i] != of_camera;
   if (expected != nullptr)
     second.expected_weight = (kStudentFreedom + 6) / (kStudentFreedom + squared_distance(both->motion[of_camera]));
   return second;
+}
+
+bool near_and_far_differ(const CameraModel& camera, const Rigid3& cam_from_world,
+                         std::span<const PoseObservation> observations) {
+  const std::vector<Match> matches = matches_of(camera, cam_from_world, observations);
+  return matches.size() >= 2 * kNeighbours && !near_and_far(matches).empty();
 }
 
 }  // namespace dkb

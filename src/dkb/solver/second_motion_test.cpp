@@ -132,6 +132,35 @@ TEST(SecondMotion, IsThatOfTheNearerOneWhereMostMatchesAreOnHim) {
   }
 }
 
+// Who has taken the camera along altogether leaves no match with the room that a pose near his could be wrong about.
+TEST(SecondMotion, IsSoughtFromAnotherPoseAsWell) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const Eigen::Vector3d moved{0.05, 0, 0};
+    const BodyInRoom scene({.moved = moved, .seed = seed});
+    const Rigid3 along = scene.cam_from_world * Rigid3(Eigen::Quaterniond::Identity(), moved);
+    EXPECT_FALSE(second_motion(scene.camera, along, scene.observations, 20)) << seed;
+    const auto second = second_motion(scene.camera, along, scene.observations, 20, nullptr, &scene.cam_from_world);
+    ASSERT_TRUE(second) << seed;
+    const auto [room, body] = scene.moving(second->moves);
+    EXPECT_LT(room, 0.05) << seed;
+    EXPECT_GT(body, 0.9) << seed;
+    EXPECT_LT((centre_in_world(second->cam_from_world) - centre_in_world(scene.cam_from_world)).norm(), 0.005) << seed;
+  }
+}
+
+TEST(SecondMotion, IsWorthAskingForWhereNearAndFarDiffer) {
+  int asked = 0;
+  for (uint64_t seed = 1; seed <= 100; ++seed) {
+    const auto differ = [&](const BodyInRoom& scene) {
+      return near_and_far_differ(scene.camera, scene.estimate().cam_from_world, scene.observations);
+    };
+    EXPECT_TRUE(differ(BodyInRoom({.seed = seed}))) << seed;
+    asked += differ(BodyInRoom({.moved = {0, 0, 0}, .wrong = 0.2, .seed = seed}));
+  }
+  EXPECT_LT(asked, 30);
+  EXPECT_FALSE(near_and_far_differ(BodyInRoom({}).camera, {}, {}));
+}
+
 // Down a corridor most points of the room are beyond the sensor's range, and how far the map takes them for is a guess.
 TEST(SecondMotion, IsNotToldByPointsWithoutDepth) {
   BodyInRoom scene({});

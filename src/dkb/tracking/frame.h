@@ -78,6 +78,7 @@ struct TrackedFrame : PosedFrame {
   std::vector<Eigen::Vector3d> matched_in_world;
   std::vector<uint8_t> outlier;                        // per feature: 1 = matched, but rejected by the robust pose
   std::vector<std::optional<OdometryMatch>> odometry;  // per feature: of inliers and movers that are no map points
+  std::vector<PointId> in_view, found;                 // map points that should be seen by the pose, and those that are
   std::vector<MatchMotion> second_motion;              // of each match, where they surely show two motions; else empty
   std::vector<uint8_t> makes_point;          // per feature: 1 = it made a map point, when the frame became a keyframe
   std::optional<PosePrior> by_observations;  // the pose without what was predicted, where that was weighed

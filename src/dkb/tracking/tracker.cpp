@@ -267,13 +267,12 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
   }
 
   const double limit = forget_strays(pairs, in_map, pose, features, followed);
-  std::vector<PointId> in_view, found;
-  in_view.reserve(candidates_.size());
-  found.reserve(features.size());
+  frame.in_view = std::move(matched);
+  frame.in_view.reserve(frame.in_view.size() + candidates_.size());
   for (size_t i = 0; i < candidates_.size(); ++i)
-    if (visible[i]) in_view.push_back(candidates_[i].id);
-  visibility_.add_visible(std::move(in_view));
-  visibility_.add_visible(std::move(matched));
+    if (visible[i]) frame.in_view.push_back(candidates_[i].id);
+  frame.found.clear();
+  frame.found.reserve(features.size());
   frame.matched = points;
   frame.matched_in_world = std::move(in_world);
   frame.show_nothing();
@@ -283,7 +282,7 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
       frame.outlier[f] = 1;
     } else if (i < in_map) {
       frame.points[f] = points[f];
-      found.push_back(points[f]);
+      frame.found.push_back(points[f]);
     } else {
       frame.odometry[f] = followed[f];
     }
@@ -297,7 +296,6 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
         shown->moves || odometry_.has_moved(*shown, features.keypoints[f], pose.cam_from_world, pose.covariance, limit);
     frame.outlier[f] = shown->moves;
   }
-  visibility_.add_found(std::move(found));
   frame.cam_from_world = pose.cam_from_world;
   frame.covariance = pose.covariance;
   frame.by_observations = pose.by_observations;
@@ -306,6 +304,8 @@ bool Tracker::track_local_map(const Rigid3& initial, double radius, int min_inli
 }
 
 void Tracker::finish(TrackedFrame& frame) {
+  visibility_.add_visible(std::exchange(frame.in_view, {}));
+  visibility_.add_found(std::exchange(frame.found, {}));
   const std::vector<Covisible> observers = map_.view().observers_of(frame.points);
   KeyframeId reference = observers.empty() ? kNoKeyframe : observers.front().keyframe;
   // A keyframe that is still being mapped is the reference while most matches are its provisional points.

@@ -138,7 +138,12 @@ class Tracker {
   std::vector<uint8_t> candidates_to_skip(const std::vector<PointId>& matched) const;
   VelocityFilter velocity_by(const TrackedFrame& frame) const;
   bool refine_at_velocity(const Vector6d& velocity, const FrameFeatures& features, TrackedFrame& frame) const;
-  void leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const;
+  struct TwoMotions;
+  std::optional<TrackedFrame> found_around(const PosePrediction& expected, const FrameFeatures& features,
+                                           const TrackedFrame& frame);
+  std::optional<TwoMotions> two_motions(const TrackedFrame& frame, const FrameFeatures& features,
+                                        const std::optional<PosePrediction>& by_velocity);
+  void leave_out_mover(const FrameFeatures& features, TrackedFrame& frame);
   void remake_start(std::shared_ptr<const RgbdFeatures> features, TrackedFrame& next);
   bool established(PointId id, double now) const;
   static void drop_unmatched_suspects(TrackedFrame& frame);

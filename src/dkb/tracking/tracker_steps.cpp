@@ -4,8 +4,6 @@
 #include <utility>
 
 #include "dkb/geometry/decompositions.h"
-#include "dkb/matching/pose_observation.h"
-#include "dkb/solver/second_motion.h"
 #include "dkb/tracking/tracker.h"
 #include "dkb/util/chi_square.h"
 
@@ -115,52 +113,6 @@ bool Tracker::track_expected(const PosePrediction& expected, TrackedFrame& frame
     if (track_local_map(expected.cam_from_world, radius, options_.min_inliers / 2, points, frame, agrees)) return true;
   }
   return false;
-}
-
-// Somebody whose points the map holds as still walks off: one motion does not explain all matches. The pose is then by
-// those of the camera's own motion.
-void Tracker::leave_out_mover(const FrameFeatures& features, TrackedFrame& frame) const {
-  std::vector<size_t> matched;
-  std::vector<PoseObservation> observations;
-  for (size_t f = 0; f < frame.matched.size(); ++f) {
-    if (frame.matched[f] == kNoPoint) continue;
-    matched.push_back(f);
-    observations.push_back(pose_observation(frame.features->keypoints[f], frame.matched_in_world[f], optics_));
-  }
-  std::optional<PosePrior> expected;
-  if (const auto pose = pose_by_velocity(frame.timestamp)) expected = {pose->cam_from_world, inverse(pose->covariance)};
-  const auto second = second_motion(optics_.camera, frame.cam_from_world, observations, options_.min_inliers,
-                                    expected ? &*expected : nullptr);
-  if (!second) return;
-  const std::vector<uint8_t>& moves = second->moves;
-  TrackedFrame by_still = frame;
-  by_still.inliers = static_cast<int>(std::count(moves.begin(), moves.end(), 0));
-  // The surfaces that tell the step are his as well. The motion so far holds what the rest leaves open.
-  by_still.predicted.reset();
-  if (expected)
-    by_still.predicted = {.cam_from_world = expected->cam_from_world,
-                          .covariance = inverse(second->expected_weight * expected->information),
-                          .weighs = true};
-  for (size_t i = 0; i < matched.size(); ++i) {
-    by_still.points[matched[i]] = moves[i] ? kNoPoint : frame.matched[matched[i]];
-    by_still.outlier[matched[i]] = moves[i];
-  }
-  // So are some of the points that are followed from frame to frame: those that fit are the room's.
-  const auto followed =
-      std::exchange(by_still.odometry, std::vector<std::optional<OdometryMatch>>(frame.odometry.size()));
-  if (!refine_at_velocity(velocity_by(frame).velocity(), features, by_still)) return;
-  for (size_t f = 0; f < followed.size(); ++f) {
-    if (!followed[f]) continue;
-    const Pair pair = odometry_pair(static_cast<int>(f), *followed[f], by_still.cam_from_world);
-    if (followed[f]->moves || squared_error(pair, by_still.cam_from_world, *by_still.features) <= kChi2TwoDof95)
-      by_still.odometry[f] = followed[f];
-  }
-  for (size_t i = 0; i < matched.size() && second->sure; ++i) {
-    const double depth = (frame.cam_from_world * frame.matched_in_world[matched[i]]).z();
-    by_still.second_motion.push_back(
-        {frame.features->keypoints[matched[i]].image_pixel, static_cast<float>(depth), moves[i] != 0});
-  }
-  frame = std::move(by_still);
 }
 
 bool Tracker::possible_motion(const Rigid3& cam_from_world, double timestamp) const {
