@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "dkb/geometry/decompositions.h"
+#include "dkb/solver/second_motion.h"
 #include "dkb/tracking/tracker.h"
-#include "dkb/util/chi_square.h"
 
 namespace dkb {
 namespace {
