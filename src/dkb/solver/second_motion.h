@@ -39,7 +39,7 @@ struct SecondMotion {
 // one: so much that it makes up for how much less the camera's is `expected` than the one motion was, by what the
 // camera did before (null: nothing is known of that). Blur and a shutter in a fast turn look like two motions, but no
 // hand shifts a camera by a decimetre between two frames. The camera's is the one with the most surface. All is linear
-// about the first pose.
+// about the pose.
 //
 // Nothing where one motion will do, or where fewer than `min_still` observations would be of the camera's, or an eighth
 // of either, or where of the camera's neither half nor `min_still` have a depth of their own. Deterministic.

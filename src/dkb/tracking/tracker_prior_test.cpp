@@ -155,6 +155,16 @@ class WhoWalksOff : public ::testing::Test {
         {.index = index, .timestamp = index * kFrameTime, .features = features, .step = step, .movers = true});
   }
 
+  // [m] in each of five frames.
+  void expect_camera_stays_while_he_goes(double step_of_body, const MotionPrior* step = nullptr) {
+    for (int i = 0; i < 5; ++i) {
+      move_body(Rigid3(Eigen::Quaterniond::Identity(), {step_of_body, 0, 0}));
+      const TrackedFrame frame = see({}, step);
+      ASSERT_EQ(frame.state, TrackingState::tracking) << i;
+      EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
+    }
+  }
+
   size_t of_body = 0;
   TestScene scene{1500, 1, 0.7, 2.5};
   Tracker tracker{scene.optics(), {}, 1};
@@ -164,24 +174,14 @@ class WhoWalksOff : public ::testing::Test {
 TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongByALittleInEachFrame) {
   begin(90);
   const MotionPrior still{{}, false, axis_covariance(0.002, 0.004)};
-  for (int i = 0; i < 5; ++i) {
-    move_body(Rigid3(Eigen::Quaterniond::Identity(), {0.01, 0, 0}));
-    const TrackedFrame frame = see({}, &still);
-    ASSERT_EQ(frame.state, TrackingState::tracking) << i;
-    EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
-  }
+  expect_camera_stays_while_he_goes(0.01, &still);
 }
 
 // His corners are most of what is found, so that the pose goes with him; where the velocity puts the camera, the room
 // is.
 TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongAtOnce) {
   begin(600);
-  for (int i = 0; i < 5; ++i) {
-    move_body(Rigid3(Eigen::Quaterniond::Identity(), {0.045, 0, 0}));
-    const TrackedFrame frame = see({});
-    ASSERT_EQ(frame.state, TrackingState::tracking) << i;
-    EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
-  }
+  expect_camera_stays_while_he_goes(0.045);
   for (const PointVisibility& p : tracker.make_report().visibility)
     EXPECT_LE(p.visible, index) << "searches of one frame count once";
 }
@@ -189,12 +189,7 @@ TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongAtOnce) {
 // As where he is too near for the sensor and hides most of what has depth.
 TEST_F(WhoWalksOff, DoesNotTakeTheCameraAlongWhereNothingElseTells) {
   begin(90);
-  for (int i = 0; i < 5; ++i) {
-    move_body(Rigid3(Eigen::Quaterniond::Identity(), {0.01, 0, 0}));
-    const TrackedFrame frame = see({});
-    ASSERT_EQ(frame.state, TrackingState::tracking) << i;
-    EXPECT_LT(distance_between(frame.cam_from_world, {}), 0.015) << i;
-  }
+  expect_camera_stays_while_he_goes(0.01);
 }
 
 }  // namespace
